@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.optimise import refine as refine
     from rotor.plots.show import plot as plot
+    from rotor.quantum.effects.of_top import effects_of as effects_of
     from rotor.quantum.effects.stark import stark_map as stark_map
     from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
     from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
@@ -72,6 +73,8 @@ if TYPE_CHECKING:
     from rotor.thermo.request import answer_thermo as answer_thermo
     from rotor.thermo.thermal_tumble import thermal_tumble as thermal_tumble
     from rotor.tops.constants import Constants as Constants
+    from rotor.tops.spins.spin_constants import SpinConstants as SpinConstants
+    from rotor.tops.states.state_constants import StateConstants as StateConstants
     from rotor.tops.top import Top as Top
 
 _MODULES = {
@@ -91,6 +94,8 @@ _MODULES = {
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
     "EmissionRequest": "rotor.spectra.emission_request",
+    "SpinConstants": "rotor.tops.spins.spin_constants",
+    "StateConstants": "rotor.tops.states.state_constants",
     "SpectrumRequest": "rotor.spectra.request",
     "StarkRequest": "rotor.quantum.fields.stark_request",
     "ThermoRequest": "rotor.thermo.request",
@@ -110,6 +115,7 @@ _MODULES = {
     "answer_thermo": "rotor.thermo.request",
     "answer_tumble": "rotor.classical.tumble",
     "answer_zeeman": "rotor.quantum.fields.zeeman_request",
+    "effects_of": "rotor.quantum.effects.of_top",
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
@@ -133,7 +139,7 @@ _MODULES = {
 
 _OF_TOPS = frozenset(
     {
-        "align", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
+        "align", "effects_of", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
         "thermal_tumble", "thermodynamic_functions", "zeeman_map",
     }
 )  # fmt: skip  # functions whose first argument is a top

@@ -30,8 +30,8 @@ INFO = """
     partition_function source notes sizes_at_j effects limits splitting_nuclei
 """
 SPECTRUM = """
-    temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
-    hyperfine patterns strongest lines files
+    temperature_k q jmax jmax_source constants_reason min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2
+    optical_depth hyperfine patterns strongest lines files
 """
 INFO_KEYS = set(INFO.split())
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())

@@ -140,6 +140,23 @@ KINDS = {
 """,
         "001 3.92\n111 3.92", 6, 100, held="A-B -DK E8 -2Az",
     ),
+    "l-doubled states with a quadrupole nucleus": Kind(
+        E_AXES.replace("s -1", "s -3"),
+        """1099 148900.0 A-B
+199 9198.9 B
+299 -3.8e-3 -DJ
+1199 -0.177 -DJK
+2099 -2.83 -DK
+11 3.0e5 E8
+111 27.0 dB
+200011 -277854.0 -2Az
+200111 0.45 etaJ
+40012 8.9 q
+110010099 -6.3 1.5eQq
+110040012 4.0 1.5eQq2
+""",
+        "001 3.92\n111 3.92", 5, 100, held="A-B -DK E8 -2Az 1.5eQq2",
+    ),
     "an oblate basis, two states, a quadrupole nucleus": Kind(
         "a 3 -2 0 20 0 1 1 1 0 1 0",
         """10099 6039.2 A
@@ -188,6 +205,7 @@ FAST = (
     "three states with Coriolis and Fermi terms",
     "chlorine and nitrogen, half-integer F",
     "l-doubled states beside the ground state",
+    "l-doubled states with a quadrupole nucleus",
     "three equivalent nuclei of one total spin",
 )
 

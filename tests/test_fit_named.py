@@ -82,7 +82,7 @@ TOPS = {
     "symmetric": Top.from_constants(
         "A=9 B=3 GHz", spin_constants=SpinConstants.parse("chi_aa(35Cl)=-40 C_iso(35Cl)=0.01")
     ),
-    "linear": Top.from_constants("B=3000 D=1e-3", spin_constants=SpinConstants.parse("chi_aa(14N)=-4 C_bb(14N)=0.01")),
+    "linear": Top.from_constants("B=3000 D=1e-3", spin_constants=SpinConstants.parse("chi_aa(14N)=-4 C_iso(14N)=0.01")),
 }
 
 

@@ -15,6 +15,7 @@ from rotor.quantum.spins.method import used_method
 from rotor.quantum.spins.splittings import casimir
 from rotor.spectra.lines import line_list
 from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
 CHLORIDE = Top.from_constants(
@@ -234,3 +235,23 @@ def test_the_estimate_holds_where_levels_nearly_coincide():
             order = [np.lexsort((levels.energy_mhz, levels.multiplicity)) for levels in (exact, simple)]
             shift = simple.energy_mhz[order[1]] - exact.energy_mhz[order[0]]
             assert shift.max() - shift.min() <= used.estimate_mhz
+
+
+@pytest.mark.parametrize("spins", [None, SpinConstants.parse("chi_aa(14N)=2 chi_bb-cc(14N)=5.7 MHz")])
+def test_states_whose_levels_fall_below_the_ground_keep_their_lines_of_low_j(spins):
+    """The same series in two states: J with a level below 0 are left out, and the lines of low J have their population."""
+    states = StateConstants(
+        {"E[1]": 1e5, "A[1]": 71900.0, "B[1]": 11390.0, "C[1]": 9790.0, "DJ[1]": 0.5, "DJK[1]": -1.0, "HJ[1]": -0.01}
+    )
+    plain = "A=72000 B=11400 C=9800 DJ=0.5 DJK=-1 HJ=-0.01 MHz"
+    top = Top.from_constants(plain, dipole_abc_debye=(3.6, 0, 0), states=states, spin_constants=spins)
+    effects = effects_of(top, spins is not None)
+    high, low = (line_list(top, jmax=j, min_lgint=None, q=1.0, effects=effects) for j in (36, 3))
+    assert high.untrusted > 0 == low.untrusted
+    kept = high.levels.rotational[high.levels.weight > 0]
+    assert 20 < kept.max() < 36
+    ends = [np.hstack([one.quanta(one.upper), one.quanta(one.lower)]).tolist() for one in (low, high)]
+    rows = [ends[1].index(quanta) for quanta in ends[0]]
+    assert high.lgint[rows] == pytest.approx(
+        low.lgint, abs=1e-9
+    )  # blocks of other sizes: round-off of energies over kT

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -213,3 +214,23 @@ def test_a_report_does_not_show_constants_that_the_file_does_not_have(call, fold
     assert "constants     those of the file, which have no names here" in out
     assert "classical limit" not in out
     assert "κ" not in out
+    code, out, _ = call("spectrum", "e.int", "--top", "0", "--json", "-", "--cat", "e.cat")
+    content = json.loads(out)
+    for key in ("constants_mhz", "kind", "kappa", "moments_u_angstrom2", "rotational_constants_mhz", "spin_weights"):
+        assert content[key] is None
+    assert content["q"]["classical"] is None
+    assert content["limits"] == []
+    assert "have no names here" in content["constants_reason"]
+    record = json.loads((folder / "e.cat.provenance.json").read_text(encoding="utf-8"))
+    assert record["constants"] is None
+    assert record["constants_reason"] == content["constants_reason"]
+
+
+def test_constants_in_wavenumbers_become_mhz(call, folder):
+    """FLAGS of 1000 and more: 0.75, 0.13 and 0.11 cm⁻¹, two states and a nucleus of spin 1."""
+    source = ORACLES / "kinds" / "wavenumbers" / "wavenumbers.int"
+    assert call("convert", str(source), "found.toml")[0] == 0
+    top = rotor.read(str(folder / "found.toml"))
+    assert top.rotational_constants_mhz == pytest.approx([29979.2458 * x for x in (0.75, 0.13, 0.11)], rel=1e-14)
+    assert top.states.values["G_a[0,1]"] == pytest.approx(299.792458, rel=1e-14)
+    assert top.spin_constants.values["chi_aa(I1)"] == pytest.approx(-1.4e-4 * 29979.2458 / 1.5, rel=1e-12)

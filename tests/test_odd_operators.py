@@ -156,6 +156,8 @@ def test_those_of_the_rarer_kind_are_left_out_with_a_note():
     assert [note[:16] for note in left_out(_file(both))] == ["parameter 200099"]
     assert [note[:16] for note in left_out(_file(both, phase=4))] == ["parameter 210099"]
     assert left_out(_file(both, phase=8)) == left_out(_file(both))
+    of_all_states = (*both[:3], (11, 9.0), (200099, 70.0), (210000, 20.0))  # the odd one counts twice
+    assert [note[:16] for note in left_out(_file(of_all_states, nvib=2))] == ["parameter 210000"]
     assert _energies(_file(both), 3) == pytest.approx(_energies(_file((*ABC, both[-1])), 3), abs=ROUND_OFF_MHZ)
 
 

@@ -15,7 +15,8 @@ from slow_matrix import AXES, watson_matrix
 import rotor
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tensors import body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import body_tensor
 from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
 from rotor.spectra.raman_strengths import anisotropy_squared, raman_transitions
 from rotor.tops.constants import Constants

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from rotor.cli import run
+from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.quantum.effects.of_top import effects_of, spin_effects
+from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
+from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermo import partition_function
 from rotor.thermo.spin_factor import without_spins
+from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
@@ -162,3 +166,103 @@ def test_a_unit_at_one_constant_does_not_serve_the_others():
     ):
         SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz")
     assert SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8 MHz").values["C_bb(14N)"] == 1.8
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("chi_bb-cc(14N)=2 MHz", r"chi_bb-cc\(14N\) = 2 MHz: a linear molecule has none"),
+        ("chi_aa(14N)=2 chi_ab(14N)=1 MHz", r"chi_ab\(14N\) = 1 MHz: a linear molecule has none"),
+        (
+            "C_bb(1H)=2 MHz",
+            r"C_bb\(1H\) = 2 MHz and C_cc\(1H\) = 0 MHz: alike in a linear molecule; .* C_iso\(1H\) alone",
+        ),
+        ("C_bb(1H)=2 C_cc(1H)=1 MHz", "alike in a linear molecule"),
+    ],
+)
+def test_tensors_that_a_linear_molecule_cannot_have_are_refused(text, says):
+    top = Top.from_constants("B=9400 MHz", spin_constants=SpinConstants.parse(text))
+    with pytest.raises(ValueError, match=says):
+        effects_of(top, True)
+
+
+def test_perpendicular_spin_rotation_of_a_linear_molecule_is_the_scalar():
+    """N has no component along the axis."""
+    texts = ("C_bb(1H)=2 C_cc(1H)=2 MHz", "C_iso(1H)=2 MHz")
+    tops = [Top.from_constants("B=9400 MHz", spin_constants=SpinConstants.parse(text)) for text in texts]
+    found = [solve_levels(top, 2, effects=effects_of(top, True)).energy_mhz for top in tops]
+    assert found[0] == pytest.approx(found[1], abs=1e-9)  # round-off of 56 GHz
+
+
+@pytest.mark.parametrize("spins", ["X=1/3", "X=0.75", "X=-1", "X=3/4", "X"])
+def test_spins_that_are_no_multiple_of_a_half_are_refused_by_their_rule(spins, capsys):
+    words = ["spectrum", "--constants", "B=9400 MHz", "--dipole-abc", "1,0,0", "--spin-constants", "C_iso(X)=1kHz"]
+    assert run([*words, f"--spins={spins}"]) == 2
+    assert "--spins: " in (error := capsys.readouterr().err)
+    assert "1/2" in error
+
+
+def test_the_classical_limit_counts_the_spins_that_q_counts():
+    top = Top.from_constants(
+        "B=3000 MHz", dipole_abc_debye=(1, 0, 0), spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz")
+    )
+    found = answer_spectrum(SpectrumRequest(top, jmax=2, effects=effects_of(top, True))).facts()["q"]
+    assert found["classical"] == pytest.approx(found["q"], rel=1e-3)  # B/3kT of 1.6e-4
+
+
+NAMED = {"A": "9.4 GHz", "B": 3100.0, "C": 2500.0, "chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"}
+
+
+def test_a_mapping_divides_into_constants_spins_and_states():
+    top = Top.from_constants(
+        NAMED | {"E[1]": "5 GHz", "A[1]": 9300, "B[1]": 3000, "C[1]": 2400, "chi_aa(14N)[1]": -4.1, "G_c[0,1]": 450},
+        spins="S=1/2",
+    )
+    assert top.constants.text() == "A=9400.0 B=3100.0 C=2500.0 MHz"
+    assert dict(top.spin_constants.values) == {"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0, "chi_aa(14N)[1]": -4.1}
+    assert (top.states.values["E[1]"], top.states.couplings) == (5000.0, ("G_c[0,1]",))
+
+
+def test_constants_of_spins_as_text_or_mapping_are_the_same():
+    found = [
+        Top.from_constants("A=9.4 B=3.1 C=2.5 GHz", spin_constants=given, spins="S=1/2").spin_constants
+        for given in ("chi_aa(14N)=-4.2 eps_aa(S)=300 MHz", {"chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"})
+    ]
+    assert [dict(one.values) for one in found] == [{"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0}] * 2
+    assert list(found[0].twice) == ["S", "14N"]
+
+
+def test_what_a_mapping_refuses():
+    with pytest.raises(ValueError, match="say how large it is, such as S=1/2"):
+        Top.from_constants(NAMED)
+    with pytest.raises(ValueError, match="spin_constants: given by name among the constants and again"):
+        Top.from_constants(NAMED, spin_constants="chi_aa(14N)=1 MHz", spins="S=1/2")
+    with pytest.raises(ValueError, match="go to a Top, as spin_constants and states"):
+        Constants(A=9400.0, B=3100.0, C=2500.0, chi_aa=3.0)
+
+
+def test_the_public_names_make_hyperfine_lines():
+    import rotor
+
+    lines = rotor.line_list("HCN", jmax=1, effects=rotor.effects_of("HCN", True, "first-order"))
+    assert lines.levels.quanta_names[-1] == "f"
+    assert rotor.SpinConstants is SpinConstants
+
+
+def test_a_file_says_spins_as_text_or_number(tmp_path):
+    head = "constants = { A = 9400.0, B = 3100.0, C = 2500.0 }\n[spins.X]\nC_iso = 0.003\n"
+    found = [
+        parse_molecule_file(f"{head}spin = {size}").spin_constants.twice["X"] for size in ('"3/2"', "1.5", "2", '"2"')
+    ]
+    assert found == [3, 3, 4, 4]
+    for size in ("0.75", '"1/3"', "-1"):
+        with pytest.raises(ValueError, match="each a multiple of 1/2"):
+            parse_molecule_file(f"{head}spin = {size}")
+
+
+def test_a_quadrupole_of_a_spin_of_a_half_in_a_file_is_named(tmp_path, capsys):
+    (tmp_path / "a.int").write_text("a\n00 91 100.0 0 3 -12. -12. 100 300.\n 001 1.0\n")
+    options = "a\n 4 1 1 0 0 1. 1. 1. 1.\n'a' 2 1 0 9 0 1 1 1 0 -1 0\n"
+    (tmp_path / "a.var").write_text(options + "10000 9400. 0\n20000 3100. 0\n30000 2500. 0\n110010000 -6. 0\n")
+    assert run(["spectrum", str(tmp_path / "a.int")]) == 2
+    assert "parameter 110010000: spin I1 of 1/2 has no quadrupole moment" in capsys.readouterr().err

@@ -16,6 +16,7 @@ from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.symmetric_top_elements import coupling, symmetric_top_elements
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,
@@ -23,11 +24,9 @@ from rotor.quantum.tensors import (
     bands_between,
     block_elements,
     body_tensor,
-    coupling,
     frame_of,
     phase_exponent,
     spherical_components,
-    symmetric_top_elements,
 )
 from rotor.quantum.wang.basis import REPRESENTATIONS, WangBlock, wang_blocks
 from rotor.quantum.wigner import three_j

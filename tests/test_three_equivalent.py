@@ -300,3 +300,15 @@ def test_what_is_refused():
         solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *_effects(2), HyperfineMethod("first-order", 1.0, tuple(three))))
     with pytest.raises(ValueError, match="no products"):
         unmixed_levels(PROLATE, (*SEMI_RIGID, *_effects(1)), [1])
+
+
+def test_tensors_that_are_axial_alone():
+    """χ along the axis of a prolate top, for which K is good: F = 0 has the energies of the limit of small elements off the axis."""
+    spins = tuple(Spin(f"2H_{i}", 2, total="I") for i in (1, 2, 3))
+    axial = {"chi_aa(2H_1)": 0.2}
+    found = [
+        np.sort(solve_levels(PROLATE, 2, effects=(*SEMI_RIGID, NuclearQuadrupole(axial | further, spins))).energy_mhz)
+        for further in ({}, {"chi_bb-cc(2H_1)": 1e-9})
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-7)  # the small elements, and round-off
+    assert np.unique(found[0].round(4)).size > 9  # levels of N and K are split

@@ -25,7 +25,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.direction_cosines import cosine_bands
 from rotor.quantum.fields.space import field_space
-from rotor.quantum.tensors import coupling
+from rotor.quantum.symmetric_top_elements import coupling
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

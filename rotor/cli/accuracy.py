@@ -97,11 +97,13 @@ def _content(found: WorkPrecision, options: Options, files: Files, command: str)
 
 def _writers(found: WorkPrecision, scene: Scene, content: dict[str, Any]) -> dict[str, Callable[[Path], None]]:
     def rows(path: Path) -> None:
+        """The table as a file."""
         from rotor.formats import write
 
         write(found, path)
 
     def plot(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.work_precision import plot_work_precision
         from rotor.scenes.accuracy_panels import panels_of
 

@@ -197,11 +197,13 @@ def _writers(answer: AlignAnswer, content: dict[str, Any], view: View) -> dict[s
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(answer.table, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.alignment import plot_alignment
         from rotor.plots.picture import name_of_top
 

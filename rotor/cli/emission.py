@@ -12,6 +12,7 @@ from rotor.checks import require_whole
 from rotor.cli.shared import inputs, plot_options
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_of_each, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.line_tables import the_first
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     Files,
@@ -26,7 +27,6 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
-from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
@@ -203,6 +203,7 @@ def _writers(answer: EmissionAnswer, content: dict[str, Any], drawn: dict[str, A
     record = {key: content[key] for key in keys}
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.emission import plot_emission
 
         plot_emission(answer, path, provenance=record, **drawn)
@@ -293,7 +294,7 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         )
         for i in rows
     ]
-    title = f"the {counted(len(rows), 'brightest line')}" if len(rows) < len(lines) else "all lines"
+    title = the_first(len(rows), "brightest line") if len(rows) < len(lines) else "all lines"
     columns = (
         "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
     )  # fmt: skip

@@ -344,6 +344,7 @@ def _progress() -> Any:
         return None
 
     def show(one: Iteration) -> None:
+        """One iteration as a line."""
         taken = "" if one.taken else " refused"
         print(
             f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr
@@ -362,6 +363,7 @@ def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dic
     request, fit = answer.request, answer.fit
 
     def picture(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.fit import plot_fit
 
         plot_fit(fit, path, title=request.title, provenance={"command": content["command"]})

@@ -244,6 +244,7 @@ def _answer(
     head = {"rotor_version": rotor.__version__, **said, "engine": request.engine, "settings": asdict(request.settings)}
 
     def on_start() -> None:
+        """What is written before the run begins."""
         from rotor.formats.provenance import write_beside
 
         if growing.csv is not None and not outputs.resume:

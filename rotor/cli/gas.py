@@ -153,11 +153,13 @@ def _writers(answer: GasAnswer, content: dict[str, Any], view: View) -> dict[str
     provenance = {key: content[key] for key in keys}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(answer.correlations, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.gas import plot_gas
         from rotor.plots.picture import name_of_top
 

@@ -12,6 +12,7 @@ from rotor.checks import require_one_of, require_whole
 from rotor.cli.shared import inputs
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.line_tables import the_first
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -28,7 +29,6 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
-from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -139,9 +139,11 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str, view: Vie
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         rotor.write(answer.table, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.levels import plot_levels
 
         plot_levels(answer.table, answer.request.top, path, unit=unit, view=view, provenance=provenance)
@@ -168,15 +170,17 @@ def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str
 
     top, request = answer.request.top, answer.request
     weights = report.weights_text(content["spin_weights"])
-    asked = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} from {request.jmin} to {request.jmax}"
+    between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
+    asked = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
     if request.kmin is not None or request.kmax is not None:
         asked += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
     if request.max_energy_mhz is not None:
         asked += f", up to {request.max_energy_mhz:g} MHz"
-    ground = f"{content['ground_mhz']:.4f} MHz above the Hamiltonian's zero"
+    ground = f"{round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
     return [
         ("constants", report.constants_text(top)),
         ("spin weights", weights),
+        *report.states_facts(top)[:1],
         ("levels", f"{len(answer.table)}: {asked}"),
         ("lowest", f"{ground}: energies count from there"),
         *hyperfine_lines(content["hyperfine"]),
@@ -200,6 +204,6 @@ def _table(answer: LevelsAnswer, options: Options) -> Table:
             labels, energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist(), strict=True
         )
     ]
-    title = f"the {counted(len(rows), 'lowest level')}" if len(rows) < len(table) else "all levels"
+    title = the_first(len(rows), "lowest level") if len(rows) < len(table) else "all levels"
     head = (quanta.headings(table.levels.quanta_names), f"E ({options.unit})", "spin weight", "g")
     return Table(f"{title}, in order of energy", head, cells)

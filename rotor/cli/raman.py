@@ -13,6 +13,7 @@ from rotor.cli.shared import gas_layer, inputs
 from rotor.cli.shared.gas_layer import Vibration
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.line_tables import the_first
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -29,7 +30,6 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
-from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -166,11 +166,13 @@ def _writers(lines: RamanLines, content: dict[str, Any], view: View) -> dict[str
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(lines, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.raman import plot_raman
 
         plot_raman(lines, path, view=view, provenance={"command": provenance["command"]})
@@ -209,6 +211,7 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("polarizability", report.tensor_text(top)),
         ("anisotropy", f"{content['anisotropy_angstrom3']:.6g} Å³"),
         ("spin weights", weights),
+        *report.states_facts(top)[:1],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("laser", f"{lines.laser_nm:g} nm in vacuum"),
         ("Q", report.q_text(content["q"])),
@@ -233,5 +236,5 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, shown.columns.values(), strict=False)]
     labels = [shown.levels.labels(states) for states in (shown.initial, shown.final)]
-    title = f"the {counted(len(shown), 'strongest line')}" if len(shown) < len(lines) else "all lines"
+    title = the_first(len(shown), "strongest line") if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

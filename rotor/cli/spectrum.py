@@ -163,6 +163,7 @@ def _settings(options: Options, usual_k: str) -> dict[str, Any]:
     from rotor.units import parse_range
 
     def whole_range(text: str) -> tuple[float, float]:
+        """First and last frequency in MHz."""
         return parse_range(text, "MHz")
 
     settings: dict[str, Any] = {
@@ -243,6 +244,7 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
     from rotor.formats.spcat.text.cat import write_cat
 
     def write(path: Path) -> None:
+        """The file, with what it was made from."""
         write_cat(prediction.catalogue, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
@@ -260,6 +262,7 @@ def _program_levels(prediction: Prediction, content: dict[str, Any], source: str
     levels = levels_of_file(source, as_spcat=as_spcat) if found is None else found
 
     def write(path: Path) -> None:
+        """The file, with what it was made from."""
         write_egy(levels, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"levels": len(levels)})
@@ -283,6 +286,7 @@ def _writers(
     record = {"command": content["command"], "input": content["input"], **numbers}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         rotor.write(answer.lines, path, settings=record)
 
     return {
@@ -304,11 +308,12 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
     from rotor.cli.shared import report
+    from rotor.quantum.quanta import headings, of_rotation
 
     lines = answer.lines
     print(
         report.heading(lines.top)
-        if spcat.has_named_constants(lines)
+        if lines.levels.of_named_constants
         else f"{lines.top.name}: levels of the file's own parameters"
     )
     show_facts(_facts(lines, content))
@@ -316,7 +321,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
         print(f"\nno lines: {_why_none(answer, range_text)}")
     elif content["patterns"] is not None:
         print()
-        show_table(patterns_table(content["patterns"]))
+        show_table(patterns_table(content["patterns"], headings(of_rotation(lines.levels.quanta))))
     elif len(content["strongest"]):
         print()
         show_table(lines_table(lines, content["strongest"], content["optical_depth"]))
@@ -331,20 +336,21 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
 
     top = lines.top
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"
-    weights = report.weights_text(content["spin_weights"])
+    own = content["spin_weights"]
+    weights = "those of the file" if own is None else report.weights_text(own)
     dipole = report.vector_text(top.dipole_abc_debye)
     return [
         (
             "constants",
             report.constants_text(top)
-            if spcat.has_named_constants(lines)
+            if lines.levels.of_named_constants
             else "those of the file, which have no names here",
         ),
         ("dipole", dipole),
         ("spin weights", weights),
         *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", report.q_text(content["q"], classical=spcat.has_named_constants(lines))),
+        ("Q", report.q_text(content["q"], classical=lines.levels.of_named_constants)),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(content["hyperfine"]),

@@ -193,7 +193,10 @@ def _further_writers(made: dict[str, tables.Table], content: dict[str, Any]) -> 
     provenance = {"command": content["command"], "input": content["input"]}
 
     def writer(table: tables.Table) -> Writer:
+        """What writes one table."""
+
         def write(path: Path) -> None:
+            """The file, with what it was made from."""
             import rotor
 
             rotor.write(table, path, settings=provenance)
@@ -201,6 +204,7 @@ def _further_writers(made: dict[str, tables.Table], content: dict[str, Any]) -> 
         return write
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.stark import plot_lobes
 
         plot_lobes(made["lines"], path, title=content["name"] or "", provenance=provenance)  # type: ignore[arg-type]
@@ -292,11 +296,13 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any], view: View) ->
     provenance = {"command": content["command"], "input": content["input"], "dipole_abc_debye": top.dipole_abc_debye}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(states, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.picture import name_of_top
         from rotor.plots.stark import plot_stark
 
@@ -319,6 +325,7 @@ def _table(states: FieldMap, mixed: bool) -> Table:
     first, last = states.fields[0], states.fields[-1]
 
     def row(rows: slice) -> list[str]:
+        """One row of the printed table."""
         at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
         m = "mixed" if mixed else f"{states.m[at]:g}"

@@ -115,6 +115,7 @@ def answered(
         substitution = substitution_structure(file.family, pair=pair, coordinates=file.coordinates)
 
     def fitted_to(family: Family, name: str) -> FittedStructure:
+        """The structure of one kind, fitted."""
         return fit_structure(
             family, name, coordinates=file.coordinates, held=file.held, weights=weights, leave_out=tuple(leave_out)
         )
@@ -220,6 +221,7 @@ def _geometry(file: FamilyFile, answer: Answer) -> tuple[Molecule, Sequence[Valu
 
 def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[str, Writer]:
     def geometry(path: Path) -> None:
+        """The geometry as a file."""
         molecule, _, method = _geometry(file, answer)
         rows = [
             f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}"
@@ -232,6 +234,7 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
         )
 
     def picture(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.picture import name_text
         from rotor.plots.structure import plot_structure
 

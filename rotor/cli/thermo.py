@@ -135,11 +135,13 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any], view: View) -> dict[
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(answer.functions, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
         from rotor.plots.picture import name_of_top
         from rotor.thermo.request import answer_thermo
@@ -168,6 +170,7 @@ def _show(functions: ThermoFunctions, content: dict[str, Any]) -> None:
     if functions.gas is not None:
         print()
         show_table(_gas_table(functions))
+    print()
 
 
 def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[str, str]]:
@@ -184,6 +187,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     return [
         ("constants", report.constants_text(top)),
         ("spin weights", weights),
+        *report.states_facts(top)[:1],
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
@@ -199,7 +203,7 @@ def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
     if used is None:
         return []
     up_to, size = used["summed_up_to_k"], f"splittings of {used['splitting_mhz']:.2g} MHz"
-    where = "too small to count" if up_to is None else f"summed level by level up to {up_to:g} K"
+    where = "too small to change them" if up_to is None else f"summed level by level up to {up_to:g} K"
     return [("hyperfine", f"Q counts {used['spin_functions']:.6g} functions of the spins; {size}, {where}")]
 
 

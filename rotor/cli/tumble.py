@@ -112,11 +112,13 @@ def _writers(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> dic
     provenance = {key: plain(content[key]) for key in keys if key in content}
 
     def rows(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(table, path, settings=provenance)
 
     def plot(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.polhodes import plot_polhodes
 
         inner = table.times / units.time_factor
@@ -126,6 +128,7 @@ def _writers(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> dic
         )  # fmt: skip
 
     def film(path: Path) -> None:
+        """The film as a file."""
         from rotor.plots.animation import animate
 
         inner = table.times / units.time_factor

@@ -186,11 +186,13 @@ def _writers(answer: ZeemanAnswer, content: dict[str, Any], view: View) -> dict[
     provenance = {name: content[name] for name in ("command", "input", "g_abc", "magnetisability_abc", "nuclear_g")}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(answer.states, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.picture import name_of_top
         from rotor.plots.zeeman import plot_zeeman
 
@@ -215,6 +217,7 @@ def _table(states: FieldMap) -> Table:
     first, last = states.fields[0], states.fields[-1]
 
     def row(rows: slice) -> list[str]:
+        """One row of the printed table."""
         at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end])
         return [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]

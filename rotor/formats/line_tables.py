@@ -9,7 +9,6 @@ import gzip
 import os
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,8 @@ from rotor.formats.spcat.text.fields import BLANK
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
+
     from rotor.formats.hitran import HitranLines
 
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
@@ -97,6 +98,8 @@ def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], setting
 
 def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
     """The 80-column file of a long list: pieces made side by side on all cores and written in order."""
+    from concurrent.futures import ThreadPoolExecutor
+
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
     load_compiled(len(lines))
 

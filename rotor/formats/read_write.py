@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rotor.formats.molecules.library import library_file, names
-from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import reader_of, writer_of
 from rotor.tops.constants import Constants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
+
+if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
 
 Isotopes = Mapping[int | str, str] | str
 
@@ -80,6 +80,8 @@ def _g2_names() -> tuple[str, ...]:
 
 def _meaning(word: str) -> Path | str:
     """The path that a bare word names: a file that exists, else a file of the library; else the word itself."""
+    from rotor.formats.molecules.library import library_file
+
     known, path = library_file(word), Path(word)
     if path.exists() and (known or word in _g2_names()):
         what = "a molecule of the library" if known else "a molecule of ASE's g2 set"
@@ -92,6 +94,10 @@ def _meaning(word: str) -> Path | str:
     if known is None and word not in _g2_names():
         if _SMILES.fullmatch(word):
             raise ValueError(f"{word!r} is no file and no name of a molecule; did you mean 'SMILES:{word}'?")
+        import difflib
+
+        from rotor.formats.molecules.library import names
+
         near = difflib.get_close_matches(word, [*names(), *_g2_names()], n=3)
         meant = f"did you mean {', '.join(dict.fromkeys(near))}? " if near else ""
         raise ValueError(
@@ -131,13 +137,15 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
 def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise.
 
-    errors: of files with spins or several states, whether errors of parameters become uncertainties.
+    Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
+    become uncertainties.
     """
     from rotor.formats.spcat.hamiltonian.states import has_one_state
     from rotor.formats.spcat.model import top_of
     from rotor.formats.spcat.names.named_top import named_top
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
+    from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
 
     intensities = path.with_suffix(".int")
     parameters = path
@@ -147,6 +155,8 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
         if parameters == path:
             raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
+    if light is not None and light.request.flags >= FROM:
+        file, light = files_in_mhz(file, light)
     return top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
 
 
@@ -165,6 +175,8 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
     if not text.strip():
         raise ValueError("standard input is empty; expected a geometry (xyz, sdf) or a TOML of constants")
     if any(line.strip().startswith("[constants]") for line in text.splitlines()):
+        from rotor.formats.molecules.molecule_file import parse_molecule_file
+
         return top_of_file(parse_molecule_file(text, "standard input"), isotopes)
     return _with_isotopes(Top.from_molecule(parse_molecule(text, "standard input")), isotopes)
 
@@ -179,6 +191,8 @@ def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
 
 def read_top_file(path: Path) -> Top:
     """The top that a molecule file in TOML describes."""
+    from rotor.formats.molecules.molecule_file import read_molecule_file
+
     return top_of_file(read_molecule_file(path))
 
 

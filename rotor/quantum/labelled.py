@@ -196,21 +196,27 @@ class WangBlocks(LevelModel):
 
     def _solved(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
-        return self._in_order(chunk, self._bands(chunk, coefficients))
+        bands = self._bands(chunk, coefficients)
+        return self._in_order(chunk, bands, self._turned(chunk, bands))
 
-    def _in_order(self, chunk: Chunk, bands: Sequence[Floats]) -> tuple[Floats, Floats]:
+    def _turned(self, chunk: Chunk, bands: Sequence[Floats]) -> tuple[Ints, Ints] | None:
+        """Which blocks turn and where, see `turn`; None where there are none."""
+        found = turned(self.rise * bands[0], chunk.sizes) if self.rise else None
+        return found if found is not None and len(found[0]) else None
+
+    def _in_order(self, chunk: Chunk, bands: Sequence[Floats], turn: tuple[Ints, Ints] | None) -> tuple[Floats, Floats]:
         energies, vectors = _diagonalised(bands, chunk, self._space)
-        if self.rise:
-            order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
+        if turn is not None:
+            order_beyond_the_turn(turn, chunk.sizes, energies, vectors)
         return energies, vectors
 
     def _labelled(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size), and the eigenvectors of the labelled states (blocks, size, most labels), or of all states."""
         bands, states = self._bands(chunk, coefficients), chunk.states
+        turn = self._turned(chunk, bands)
         if states is None:
-            return self._in_order(chunk, bands)
-        by_energy = not self.rise or not len(turned(self.rise * bands[0], chunk.sizes)[0])
-        if len(bands) == 2 and _dense() and by_energy:
+            return self._in_order(chunk, bands, turn)
+        if len(bands) == 2 and _dense() and turn is None:
             energies = _banded(bands, chunk, self._space)
             found = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
             if found is not None:
@@ -218,7 +224,7 @@ class WangBlocks(LevelModel):
                 chosen.fill(0.0)
                 chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = found
                 return energies, chosen
-        energies, vectors = self._in_order(chunk, bands)
+        energies, vectors = self._in_order(chunk, bands, turn)
         count, size, most = len(vectors), vectors.shape[1], states.shape[1]
         rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
         chosen = self._space.array("chosen", count, size, most)

@@ -98,6 +98,11 @@ class Levels(Table):
         return tuple(self.quanta)
 
     @property
+    def of_named_constants(self) -> bool:
+        """Whether the constants of the top make the levels; those of an .int file may have codes alone."""
+        return all(effect.name for effect in self.effects)
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """The Hamiltonian that the levels are of, and how far they go."""
         return {

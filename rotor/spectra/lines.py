@@ -43,6 +43,7 @@ from rotor.table import counted
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 from rotor.thermo.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
+from rotor.tops.facts import without_constants
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -150,7 +151,8 @@ class Lines(TransitionTable):
     @property
     def provenance(self) -> dict[str, Any]:
         """What the lines were made from: the top and its sources, the settings, Q."""
-        return self.top.provenance | {
+        known = self.top.provenance
+        return (known if self.levels.of_named_constants else without_constants(known)) | {
             "errors_from": self.errors_from,
             "temperature_k": self.temperature_k,
             "jmax": self.jmax,
@@ -318,7 +320,8 @@ def line_list(
 
     Notes
     -----
-    Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
+    Neglected: all but electric dipole, dependence of μ on J, and what the effects do not contain: nuclear hyperfine structure
+    comes with `effects=rotor.effects_of(top, True)`, of the constants of spins that the top has.
 
     Examples
     --------

@@ -36,7 +36,8 @@ from rotor.thermo import PartitionFunction, VibrationalStates, partition_functio
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from rotor.tops.top import Tensor, Top
+    from rotor.tops.components import Tensor
+    from rotor.tops.top import Top
 
 
 ANGSTROM6_IN_CM6 = 1e-48

@@ -29,7 +29,8 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
-from rotor.quantum.tensors import body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import body_tensor
 from rotor.quantum.wang.basis import wang_blocks
 from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
 from rotor.tops.spins.spin_weights import SpinWeights

@@ -24,7 +24,7 @@ from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
 from rotor.thermo.partition_table import partition_facts
 from rotor.tops.covariance import Covariance
-from rotor.tops.facts import top_facts
+from rotor.tops.facts import top_facts, without_constants
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -195,8 +195,9 @@ class SpectrumAnswer(TextOf):
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
         lines, layer = self.lines, self.request.layer
-        return {
+        found = {
             **top_facts(lines.top),
+            "constants_reason": None,
             "temperature_k": lines.temperature_k,
             "q": partition_facts(lines.top, lines.partition, lines.levels.effects),
             "jmax": lines.jmax,
@@ -214,6 +215,9 @@ class SpectrumAnswer(TextOf):
             "notes": [*lines.top.notes, *lines.warnings],
             **limit_facts(lines.top, self.typical_j, lines.levels.effects),
         }
+        if lines.levels.of_named_constants:
+            return found
+        return without_constants(found) | {"q": found["q"] | {"classical": None}, "limits": []}
 
 
 def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) -> SpectrumAnswer:

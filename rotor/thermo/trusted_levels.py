@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 TRUSTED = (0.6, 2.0)  # energy over the rigid estimate, outside which a level is not trusted
+GROUND_J = 10  # the lowest level of all states has at most this J
 LOWEST = 0.4  # of the rigid estimate: distortion lowers no level further
 
 
@@ -77,12 +78,15 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 
 def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
-    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with further states.
+    """Which levels (n,) are energies of a molecule; all of a rigid top.
 
-    Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them.
+    Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them; of one
+    with further states those of a J without a level below the ground.
     """
-    if {"v", "irrep"} & levels.quanta.keys() or not centrifugal_operators(top.constants):
+    if "irrep" in levels.quanta or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
+    if "v" in levels.quanta:
+        return _above_the_ground(levels)
     if "n" in levels.quanta:
         return _of_trusted_rotation(top, levels)
     if (tabulated := in_level_table(top, levels)) is not None:
@@ -91,6 +95,15 @@ def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
     if not _untrusted(levels, levels.energy_mhz, rigid).any():
         return np.ones(len(levels), dtype=np.bool_)
     return ~_untrusted(levels, levels.energy_mhz, _simpler_mhz(top, levels, rigid)[0])
+
+
+def _above_the_ground(levels: Levels) -> NDArray[np.bool_]:
+    """Levels of every J but those that have one below all of low J, which no rotating molecule has; all, of a piece without low J."""
+    low = levels.rotational <= GROUND_J
+    if not low.any():
+        return np.ones(len(levels), dtype=np.bool_)
+    fallen = levels.energy_mhz < levels.energy_mhz[low].min()
+    return ~np.isin(levels.rotational, levels.rotational[fallen])
 
 
 def _of_trusted_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:

@@ -23,6 +23,7 @@ from rotor.units import parse_quantity
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
 LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below that of any body of atoms, far above that of H2 (1.8e6 MHz)
+_OF_SPIN_OR_STATE = re.compile(r"(chi|eps|[CTDGF])[abc]{1,2}|(bF|W|E|gamma|lambda|[CJ]iso)\b")
 _SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
 
 
@@ -277,6 +278,8 @@ def _refuse_unknown(names: Iterable[str]) -> None:
             near = [known for known in KNOWN if known.casefold() == name.casefold()]
             near = near or difflib.get_close_matches(name, KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
+            if _OF_SPIN_OR_STATE.match(name):
+                hint = "constants of spins and of further states go to a Top, as spin_constants and states, such as chi_aa(14N). "
             raise ValueError(
                 f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"

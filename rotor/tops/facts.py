@@ -59,6 +59,26 @@ def top_facts(top: Top) -> dict[str, Any]:
     }
 
 
+_OF_CONSTANTS = (
+    "kind", "constants_mhz", "uncertainties_mhz", "reduction", "rotational_constants_mhz", "rotational_constants_cm", "kappa",
+    "moments_u_angstrom2", "planar_moments_u_angstrom2", "inertial_defect_u_angstrom2", "spin_weights", "constants",
+)  # fmt: skip
+NO_CONSTANTS = "the parameters of the file have no names here; the levels are those of its own codes"
+
+
+def without_constants(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts of a top that stands for the symmetry of a file alone: null in place of constants and of what follows from them.
+
+    `constants_reason` says why.
+
+    >>> without_constants({"name": "x", "constants_mhz": {"B": 2.0}})["constants_mhz"] is None
+    True
+    """
+    return {key: None if key in _OF_CONSTANTS else value for key, value in facts.items()} | {
+        "constants_reason": NO_CONSTANTS
+    }
+
+
 def _states(top: Top) -> dict[str, Any] | None:
     """Further states of a top: constants and couplings by name, names, weights and dipoles of states."""
     states = top.states

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.arrays import Floats, same
+from rotor.arrays import same
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
 from rotor.tops.allowed import (
     allowed_dipole,
@@ -24,10 +24,12 @@ from rotor.tops.allowed import (
     refuse_forbidden_dipole,
     refuse_forbidden_polarizability,
 )
+from rotor.tops.components import Tensor, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
+from rotor.tops.named_values import constants_of_names, fields_of_texts
 from rotor.tops.operators import KINDS
 from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -43,9 +45,6 @@ from rotor.tops.states.state_rules import (
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.molecules.symmetry.point_group import Symmetry
-
-Vector = tuple[float, float, float]
-Tensor = tuple[Vector, Vector, Vector]
 
 NOISE_ANGSTROM = 0.01  # displacements below it may be noise of a geometry: a symmetry that they spoil is named
 SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
@@ -161,6 +160,7 @@ class Top:
         *,
         dipole_abc_debye: ArrayLike | None = None,
         spin_weights: SpinWeights | dict[str, int] | None = None,
+        spins: str | None = None,
         **others: Any,
     ) -> Top:
         """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
@@ -168,13 +168,16 @@ class Top:
         Parameters
         ----------
         constants : Constants, mapping or str
-            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
+            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`, constants of
+            spins and of further states too: `{..., "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}`.
         dipole_abc_debye : (3,) array, optional
             Along the principal axes.
         spin_weights : SpinWeights or dict of str to int, optional
             Nuclear-spin weights; 1 for all by default.
+        spins : str, optional
+            How large spins are that are not called after isotopes, "S=1/2", and which are coupled first, "35Cl_1+35Cl_2".
         others : object
-            Any further field of `Top`.
+            Any further field of `Top`; `spin_constants` and `states` as texts or mappings too.
 
         Returns
         -------
@@ -189,11 +192,13 @@ class Top:
         if isinstance(constants, str):
             constants = Constants.parse(constants)
         if not isinstance(constants, Constants):
-            values: dict[str, Any] = {name: units.parse_quantity(value, "MHz") for name, value in constants.items()}
-            constants = Constants(**values)
+            constants, found = constants_of_names(constants, spins)
+            if twice := ", ".join(found.keys() & others.keys()):
+                raise ValueError(f"{twice}: given by name among the constants and again; give each once")
+            others |= found
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
-        return cls(constants, _three(dipole_abc_debye), spin_weights, **others)
+        return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **fields_of_texts(others, spins))
 
     @classmethod
     def from_molecule(
@@ -259,7 +264,7 @@ class Top:
         weights = spin_weights(symmetry, [one.spin for one in molecule.nuclei], molecule.electronic)
         return cls(
             constants=constants_of_moments(frame.moments, kind.kind),
-            dipole_abc_debye=None if dipole is None else _in_frame(frame, allowed_dipole(dipole, symmetry)),
+            dipole_abc_debye=None if dipole is None else in_frame(frame, allowed_dipole(dipole, symmetry)),
             spin_weights=weights,
             name=molecule.name,
             mass_u=float(np.sum(molecule.masses_u)),
@@ -273,7 +278,7 @@ class Top:
             notes=(*molecule.notes, *_near_notes(symmetry)),
             polarizability_abc_angstrom3=None
             if tensor is None
-            else _tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
+            else tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
             polarizability_source="" if tensor is None else molecule.polarizability_source,
             spin_constants=computed_couplings(molecule, frame),
         )
@@ -348,7 +353,7 @@ class Top:
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""
-        dipole = _three(dipole_abc_debye)
+        dipole = dipole_vector(dipole_abc_debye)
         states = self.states.with_dipole(self.dipole_abc_debye, dipole) if self.states and dipole else self.states
         return replace(self, dipole_abc_debye=dipole, dipole_source=source, states=states)
 
@@ -362,7 +367,7 @@ class Top:
         if self.frame is None or self.symmetry is None:
             raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
         allowed = invariant_vector(np.asarray(dipole_debye, dtype=float), self.symmetry)
-        return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
+        return replace(self, dipole_abc_debye=in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights, which serve all of its states."""
@@ -407,42 +412,6 @@ def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
     if kind == "oblate":
         return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
     return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
-
-
-def _in_frame(frame: PrincipalFrame, dipole: Floats) -> tuple[float, float, float] | None:
-    """Components along a, b, c; those below 1e-6 of the whole are round-off of the frame, and 0."""
-    components = frame.axes @ dipole
-    return _three(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
-
-
-def _tensor_in_frame(frame: PrincipalFrame, tensor: Floats) -> Tensor:
-    """The tensor in a, b, c; elements below 1e-6 of the whole are round-off of the frame, and 0."""
-    turned = frame.axes @ tensor @ frame.axes.T
-    return symmetric_tensor(np.where(np.abs(turned) < 1e-6 * np.linalg.norm(turned), 0.0, (turned + turned.T) / 2))
-
-
-def symmetric_tensor(tensor: ArrayLike) -> Tensor:
-    """A polarizability as nested tuples, checked: (3, 3), finite, symmetric within 1e-9 of its size.
-
-    >>> symmetric_tensor([[2, 0, 0], [0, 1, 0], [0, 0, 1]])
-    ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    """
-    values = np.asarray(tensor, dtype=float)
-    if values.shape != (3, 3) or not np.isfinite(values).all():
-        raise ValueError(f"a polarizability is a (3, 3) tensor of finite numbers in Å³, not {values.tolist()}")
-    if not np.allclose(values, values.T, rtol=0, atol=1e-9 * float(np.abs(values).max())):
-        raise ValueError(f"a polarizability is a symmetric tensor; this one is not: {values.tolist()}")
-    a, b, c = ((float(x), float(y), float(z)) for x, y, z in values)
-    return a, b, c
-
-
-def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:
-    if vector is None:
-        return None
-    values = np.asarray(vector, dtype=float)
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def one_state(top: Top, what: str) -> Top:

@@ -149,6 +149,7 @@ def _rows(answer: DrivenAnswer, content: dict[str, Any]) -> Callable[[Path], Non
     keys = ("command", "input", "units", "moments", "effects", "method")
 
     def write(path: Path) -> None:
+        """The file, with what it was made from."""
         import rotor
 
         rotor.write(answer.table, path, settings={key: plain(content[key]) for key in keys})

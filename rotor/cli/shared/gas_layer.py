@@ -37,16 +37,16 @@ class Layer:
 
 def vibrations_of(given: Vibration) -> VibrationalStates | None:
     """The vibrational states that one of the two options gives."""
+    fundamentals, states = given.vibration, given.vibrational_states
+    if fundamentals is None and states is None:
+        return None
     from rotor.thermo import VibrationalStates
 
-    fundamentals, states = given.vibration, given.vibrational_states
     if fundamentals is not None and states is not None:
         raise ValueError("--vibration and --vibrational-states: give one of them, fundamentals or a list of states")
     if fundamentals is not None:
         return inputs.parsed("--vibration", fundamentals, lambda text: VibrationalStates.parse(text, harmonic=True))
-    if states is not None:
-        return inputs.parsed("--vibrational-states", states, VibrationalStates.parse)
-    return None
+    return inputs.parsed("--vibrational-states", str(states), VibrationalStates.parse)
 
 
 def layer_of(given: Layer) -> GasLayer | None:

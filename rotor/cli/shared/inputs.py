@@ -197,6 +197,7 @@ def times(name: str, text: str | None, unit: str) -> tuple[float, ...] | None:
     from rotor.units import parse_grid
 
     def parse(value: str) -> tuple[float, ...]:
+        """Times from a grid of bounded length."""
         count = value.rpartition(":")[2].strip()
         if ":" in value and count.isdecimal() and int(count) > MOST_TIMES:
             raise ValueError(f"{value!r}: at most {MOST_TIMES} times in one run; ask for fewer")
@@ -214,6 +215,7 @@ def cut(name: str, text: str) -> float | None:
         return None
 
     def parse(value: str) -> float:
+        """A finite number."""
         try:
             number = float(value.replace("−", "-"))
         except ValueError:
@@ -232,6 +234,7 @@ def vector(name: str, text: str) -> tuple[float, float, float]:
     from rotor.units import parse_grid
 
     def parse(value: str) -> tuple[float, float, float]:
+        """Three finite numbers."""
         numbers = parse_grid(value, "D").tolist() if ":" not in value else []
         if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
             raise ValueError(f"{value!r}: expected three finite numbers, such as 0,0,1.85 (debye)")
@@ -289,9 +292,13 @@ def _with_states(top: Top, given: Input) -> Top:
 
 
 def _spin_constants(text: str, spins: str | None, top: Top) -> SpinConstants:
-    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
+    from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
+
+    if spins is not None:
+        parsed("--spins", spins, parse_coupled)
 
     def read(value: str) -> SpinConstants:
+        """Constants of spins that the molecule has."""
         constants = SpinConstants.parse(value, spins, "given (--spin-constants)")
         refuse_other_nuclei(constants, top.molecule)
         return constants

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotor.cli.shared.output import Table
-from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
@@ -29,11 +28,22 @@ def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dic
     return records
 
 
-def patterns_table(records: list[dict[str, Any]]) -> Table:
+def the_first(count: int, what: str) -> str:
+    """What a table begins with where it shows some rows of many.
+
+    >>> the_first(1, "strongest line"), the_first(3, "strongest line")
+    ('the strongest line', 'the 3 strongest lines')
+    """
+    return f"the {what}" if count == 1 else f"the {count} {what}s"
+
+
+def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
+    """Patterns of lines by frequency; names: headings of the quantum numbers of their rotational levels."""
     forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
     rows = [(*(form.format(one[name]) for name, form in forms.items()), one["upper"], one["lower"]) for one in records]
     columns = ("frequency (MHz)", "nm² MHz", "components", "width (MHz)", "upper", "lower")
-    return Table("the strongest lines at this resolution, in order of frequency", columns, rows)
+    title = f"the strongest lines at this resolution, in order of frequency (states: {names})"
+    return Table(title, columns, rows)
 
 
 class _Column(NamedTuple):
@@ -72,5 +82,5 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
         cells.append([f"{x:.3e}" for x in depth[rows]])
     labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
     columns = (*headings, "upper", "lower")
-    title = f"the {counted(len(shown), 'strongest line')}" if len(shown) < len(lines) else "all lines"
+    title = the_first(len(shown), "strongest line") if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

@@ -106,6 +106,7 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
     """
 
     def decorate(command: Command) -> Command:
+        """The command with one parameter for each field of its groups."""
         hints = get_type_hints(command)
         groups = {name: hints[name] for name in inspect.signature(command).parameters if is_dataclass(hints[name])}
         chosen = {
@@ -233,6 +234,7 @@ class PlainGroup(typer.core.TyperGroup):
 
 def _unconverted(parameter: Any) -> Any:
     def process_value(context: Any, value: Any) -> Any:
+        """The value after the callback of its parameter."""
         return parameter.callback(context, parameter, value) if parameter.callback else value
 
     parameter.process_value = process_value

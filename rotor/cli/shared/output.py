@@ -46,6 +46,7 @@ def sum_progress() -> Callable[[int, int], None] | None:
     start = time.monotonic()
 
     def show(j: int, last: int) -> None:
+        """How far the levels are solved, after two seconds."""
         if time.monotonic() - start > 2.0:
             print(f"\rlevels solved to J = {j} of about {last} ", end="", file=sys.stderr, flush=True)
 

@@ -46,6 +46,8 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
     facts = [("effects", sizes)]
+    if content.get("constants_reason"):
+        return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     limits = [with_option(Limit(**one).sentence, content["command"]) for one in content["limits"]]
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
@@ -83,9 +85,11 @@ def states_facts(top: Top) -> list[tuple[str, str]]:
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    from rotor.formats.molecules.library import written_formula
+    formula = formula_of(top)
+    if formula:  # the library, which takes some ms to load, may write it in another way
+        from rotor.formats.molecules.library import written_formula
 
-    formula = written_formula(top.name, formula_of(top) or "")
+        formula = written_formula(top.name, formula)
     names = ", ".join(dict.fromkeys(filter(None, (top.name, formula)))) or "constants"
     kappa = f" (κ = {top.kappa:.4f})" if top.kind == "asymmetric" and top.kappa is not None else ""
     return f"{names}: {KINDS[top.kind]}{kappa}"

@@ -51,6 +51,7 @@ def save_scene(
     """
 
     def make(folder: Path) -> Scene:
+        """The scene for a file in that folder."""
         from importlib import import_module
 
         molecule = None if given is None or not given.text else molecule_of(given, request, folder, polarizability)
@@ -64,6 +65,7 @@ def save_made(make: Callable[[Path], Scene], outputs: Any, **others: Any) -> dic
     """The writer of --save-scene for a scene that is made for the folder that it will be in; outputs, others: as `save_scene`."""
 
     def write(path: Path) -> None:
+        """The scene as text."""
         import msgspec
 
         from rotor.scenes.scene_file import write_scene

@@ -80,6 +80,7 @@ def with_sources(
     from rotor.cli.shared.output import show_facts
 
     def show_all() -> None:
+        """The answer and what it was made from."""
         show()
         facts = ([] if top is None else source_facts(top, tables, whole)) + further()
         if facts:

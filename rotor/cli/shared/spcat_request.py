@@ -12,7 +12,6 @@ from rotor.cli.shared.output import note
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
-    from rotor.spectra.lines import Lines
     from rotor.spectra.request import SpectrumAnswer
 
 # what the .int and its parameter file say themselves: option of the verb -> field of the files
@@ -84,7 +83,7 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
     from rotor.quantum.effects.of_top import effects_of
 
     lines = prediction.lines
-    if has_named_constants(lines):
+    if lines.levels.of_named_constants:
         return prediction
     try:
         top = read_spcat_top(source)
@@ -93,11 +92,6 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
         return prediction
     levels = replace(lines.levels, effects=effects)
     return replace(prediction, lines=replace(lines, top=top, levels=levels))
-
-
-def has_named_constants(lines: Lines) -> bool:
-    """Whether the constants of the top make the levels; those of an .int file may have codes alone."""
-    return all(effect.name for effect in lines.levels.effects)
 
 
 def answer_of(prediction: Prediction, shape: dict[str, Any]) -> SpectrumAnswer:

@@ -199,6 +199,7 @@ def _start_of(options: Options, moments: Floats, unit: str) -> tuple[Three, str]
         return _momentum(options.angular_momentum or "", moments), GIVEN
 
     def parse(text: str) -> Three:
+        """The angular momentum of an angular velocity other than 0."""
         from rotor.classical.euler import checked_momentum
 
         momentum = _checked(text, lambda omega: checked_momentum(moments * omega, moments), unit)
@@ -238,6 +239,7 @@ def _momentum(text: str, moments: Floats) -> Three:
     from rotor.classical.euler import checked_momentum
 
     def parse(value: str) -> Three:
+        """An angular momentum other than 0."""
         momentum = _checked(value, lambda three: checked_momentum(three, moments))
         if not momentum.any():
             raise ValueError(f"{value!r}: a body at rest does not tumble; give a component that is not 0")

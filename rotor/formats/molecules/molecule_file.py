@@ -116,6 +116,7 @@ from rotor.formats.molecules.spin_table import spins_of_table
 from rotor.formats.molecules.state_table import states_of
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
+from rotor.tops.components import Tensor
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.magnetic import MagneticTensors
@@ -123,7 +124,6 @@ from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.level_table import LevelTable
 from rotor.tops.states.state_constants import StateConstants
-from rotor.tops.top import Tensor
 
 __all__ = ["GEOMETRY_KINDS", "MeasuredLines", "MoleculeFile", "Served", "parse_molecule_file", "read_molecule_file"]
 

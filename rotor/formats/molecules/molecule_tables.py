@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rotor.formats.molecules.level_table import read_level_table
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
+from rotor.tops.components import Tensor
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import kind_from_moments
@@ -22,7 +23,6 @@ from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.level_table import LevelTable
 from rotor.tops.states.state_constants import StateConstants
-from rotor.tops.top import Tensor
 from rotor.units import parse_quantity
 
 _RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}

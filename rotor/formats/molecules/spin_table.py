@@ -70,10 +70,11 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
 
 def _twice(part: TableReader, name: str) -> int:
     """Twice a spin, from the isotope it is called after or from what the table says."""
+    given = part.content.get("spin")
+    size = str(given) if isinstance(given, float | int) and not isinstance(given, bool) else None
+    size = part.text("spin") if given is not None and size is None else size
     try:
-        if "spin" in part.content:
-            return parse_spins(f"{name}={part.text('spin')}")[name]
-        return twice_of(name)
+        return twice_of(name) if size is None else parse_spins(f"{name}={size}")[name]
     except ValueError as reason:
         raise ValueError(f"{part.place}: {reason}") from None
 

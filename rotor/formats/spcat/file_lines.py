@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Indices, Ints, end_to_end, rising_order, rows_of
+from rotor.formats.spcat.block_numbers import Blocks, sub_blocks
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, quanta_of
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
@@ -306,31 +308,50 @@ _RANKS = 9999  # the largest number of four digits
 
 
 def as_level_list(
-    solved: list[tuple[Group, Levels]], form: Format, spreads: Sequence[Floats | None] | None = None
+    solved: list[tuple[Group, Levels]],
+    form: Format,
+    spreads: Sequence[Floats | None] | None = None,
+    blocks: Blocks | None = None,
 ) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart, with all quantum numbers, however many there are.
+    """The levels of all groups as an .egy file has them, ±K apart, by block and place in it, with all their quantum numbers.
 
-    Blocks count 9999 levels each, by F and energy, other than in the program.
-    spreads: (levels, k) of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
+    Parameters
+    ----------
+    solved : list of (Group, Levels)
+        The groups with their levels.
+    form : Format
+        Which quantum numbers there are.
+    spreads : sequence of (levels, k) array, optional
+        Of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
+    blocks : Blocks, optional
+        How the program numbers them; without it blocks count 9999 levels each, by F and energy.
+
+    Returns
+    -------
+    LevelList
     """
-    tables = []
+    tables: list[list[Any]] = []
     for (group, levels), spread in zip(solved, spreads or [None] * len(solved), strict=True):
         error = np.zeros(len(levels)) if spread is None else np.linalg.norm(spread, axis=1) / units.MHZ_PER_CM
+        mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
         for negative in (False, True) if (levels.components > 1).any() else (False,):
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
-            mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
             g = levels.multiplicity * (levels.weight // levels.components)
-            quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)[rows]
-            pattern = quanta_of(group, levels, form, negative)[rows, -2] if form.aggregate else quanta[:, 0]
-            tables.append(
-                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta, pattern)
-            )
-    energy, error, mixing, g, quanta, pattern = (np.concatenate([table[i] for table in tables]) for i in range(6))
-    order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
-    block, rank = np.divmod(np.arange(len(order), dtype=np.int32), _RANKS)
+            quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)
+            pattern = quanta_of(group, levels, form, negative)[:, -2] if form.aggregate else levels.rotational
+            energy = levels.energy_mhz / units.MHZ_PER_CM
+            numbers = _numbers(group, levels, blocks, negative, rows)
+            tables.append([*numbers, *(column[rows] for column in (energy, error, mixing, g, quanta, pattern))])
+    block, rank, energy, error, mixing, g, quanta, pattern = (
+        np.concatenate(parts) for parts in zip(*tables, strict=True)
+    )
+    order = np.lexsort((rank, block))
+    if blocks is None:
+        order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
+        block[order], rank[order] = (1 + number for number in np.divmod(np.arange(len(order)), _RANKS))
     return LevelList(
-        block=block + 1,
-        rank=rank + 1,
+        block=block[order].astype(np.int32),
+        rank=rank[order].astype(np.int32),
         energy_cm=energy[order],
         error_cm=error[order],
         mixing=mixing[order],
@@ -338,3 +359,12 @@ def as_level_list(
         quanta=quanta[order].astype(np.int16),
         pattern=pattern[order].astype(np.int16) if form.aggregate else None,
     )
+
+
+def _numbers(group: Group, levels: Levels, blocks: Blocks | None, negative: bool, rows: Ints) -> tuple[Ints, Ints]:
+    """Block and place of some rows of levels."""
+    if blocks is None:
+        return np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int64)
+    subs, k = sub_blocks(group, levels, negative)
+    twice_f = (levels.multiplicity - 1).astype(np.int64)
+    return blocks.numbers([subs[i] for i in rows], levels.rotational[rows], k[rows], twice_f[rows])

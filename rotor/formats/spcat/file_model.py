@@ -28,6 +28,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     halved_across,
     l_values,
     some_weights_agree,
+    species_pairs,
     symmetric_part,
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
@@ -153,7 +154,7 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     if not phases.odd and not others and not own:
         dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
-    _refuse_missing_spins(lines, states)
+    lines = _of_their_spins(lines, states, as_spcat)[0]
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
@@ -184,13 +185,14 @@ def _within_states(
     ]
 
 
-def left_out(file: ParameterFile) -> list[str]:
-    """A sentence for every parameter that the declared symmetry forbids."""
+def left_out(file: ParameterFile, *, as_spcat: bool = False) -> list[str]:
+    """A sentence for every parameter that the declared symmetry forbids, and with `as_spcat` for one of spins that are not there."""
     states, oblate = states_of(file), file.options[0].nvib < 0
     doubled = pairs_of(states)
     members = frozenset(v for pair in doubled for v in pair)
     lines, reasons = allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)
-    return reasons + real_ones(lines, phases_of(file, len(states), members).odd, members)[1]
+    lines, complex_ = real_ones(lines, phases_of(file, len(states), members).odd, members)
+    return reasons + complex_ + (_of_their_spins(lines, states, True)[1] if as_spcat else [])
 
 
 def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
@@ -280,19 +282,37 @@ def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
     return [[i for i in range(count) if group[i] == g] for g in sorted(set(group))]
 
 
-def _refuse_missing_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -> None:
+def _of_their_spins(
+    lines: list[CodedLine], states: tuple[StateOptions, ...], as_spcat: bool
+) -> tuple[list[CodedLine], list[str]]:
+    """The lines whose spins SPIND names, and with `as_spcat`, as SPCAT leaves the others out, why; else ValueError for one of those."""
+    found, reasons = list[CodedLine](), list[str]()
     for line in lines:
-        needed = max((*line.operator.spins, 1 if line.operator.ns else 0), default=0)
-        concerned = states if line.states is None else [states[v] for v in line.states]
-        have = (
-            max(len(state.spins) for state in concerned)
-            if line.states is None
-            else min(len(s.spins) for s in concerned)
+        why = _missing_spin(line, states)
+        if why and not as_spcat:
+            raise ValueError(f"parameter {line.name.partition('#')[0]}: {why}")
+        if why:
+            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why}")
+        else:
+            found.append(line)
+    return found, reasons
+
+
+def _missing_spin(line: CodedLine, states: tuple[StateOptions, ...]) -> str:
+    """Why a spin term can act on none of its states, empty where it can."""
+    spins = line.operator.spins
+    needed = max((*spins, 1 if line.operator.ns else 0), default=0)
+    concerned = states if line.states is None else [states[v] for v in line.states]
+    count = max if line.states is None else min
+    have = count(len(state.spins) for state in concerned)
+    if needed > have:
+        return f"spin {needed} is not among the {have} that SPIND names"
+    if len(spins) == 2 and spins[0] == spins[1]:
+        largest = count(state.spins[spins[0] - 1] if len(state.spins) >= spins[0] else 0 for state in concerned)
+        return (
+            "" if largest > 1 else f"spin {spins[0]} is {largest}/2, and a spin of 1/2 or less has no quadrupole moment"
         )
-        if needed > have:
-            raise ValueError(
-                f"parameter {line.name.partition('#')[0]}: spin {needed} is not among the {have} that SPIND names"
-            )
+    return ""
 
 
 def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedLine]:
@@ -357,7 +377,13 @@ def _group(
     if light.phases.odd:
         fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
         moments, beside = _turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
-    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned)
+    second = {pair.second for pair in pairs}
+    every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
+    found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
+    apart = {both: species for both, species in found.items() if species is not None}
+    effect = FileEffect(
+        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned, apart
+    )
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)

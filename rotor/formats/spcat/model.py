@@ -18,7 +18,9 @@ _EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
 FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
 
 
-NO_NAME = "cannot be said by the named constants of a top; predict from the files themselves"
+NO_NAME = (
+    "cannot be said by the named constants of a top; predict from the files themselves, with rotor spectrum FILE.int"
+)
 
 
 def weights_of(options: Options, symmetric: bool = True) -> SpinWeights:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,12 @@ from rotor.formats.spcat.hamiltonian.codes import is_linear
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.predict_states import levels_of_files, predicted
+from rotor.formats.spcat.predict_states import (
+    UNDIAGONALIZED_NOTE,
+    levels_of_files,
+    predicted,
+    refuse_undiagonalized,
+)
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -48,8 +55,7 @@ class Prediction:
     catalogue: as the program would list it, in cm⁻¹ where FLAGS says so, E″ from the Hamiltonian's zero, degeneracies with the
     weights as the file has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
     q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
-    request: line 2 of the .int file. notes: what the program would have passed over in silence. levels: as the program would list
-    them, where the file has spins or several states.
+    request: line 2 of the .int file. notes: what the program would have passed over in silence. listing: what makes `levels`.
     """
 
     catalogue: Catalogue
@@ -57,7 +63,12 @@ class Prediction:
     q: float
     request: Request
     notes: tuple[str, ...] = ()
-    levels: LevelList | None = None
+    listing: Callable[[], LevelList] | None = field(default=None, repr=False)
+
+    @cached_property
+    def levels(self) -> LevelList | None:
+        """The levels as the program would list them, where the file has spins or several states; made when they are asked for."""
+        return None if self.listing is None else self.listing()
 
 
 def predict_file(path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False) -> Prediction:
@@ -144,9 +155,11 @@ def predict(
     left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
     top = None if left_out or others_names else _named_top(parameters, intensities)
     if top is None:
-        made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
-        return Prediction(made, of_states, q, request, tuple(notes), levels)
+        made, of_states, q, listing, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
+        return Prediction(made, of_states, q, request, (*notes, *_not_written(request)), listing)
 
+    if as_spcat and top.kind == "asymmetric":
+        refuse_undiagonalized(options.diag)
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
@@ -156,7 +169,7 @@ def predict(
         lines=lines,
         q=q,
         request=request,
-        notes=tuple(_notes(parameters, top, request)),
+        notes=(*_notes(parameters, top, request), *_not_written(request)),
     )
 
 
@@ -259,6 +272,8 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
             f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "
             f"without a word; here every K to J is in it, so levels with K near {options.knmax} and above differ"
         )
+    if top.kind == "asymmetric" and options.diag < 0:
+        notes.append(UNDIAGONALIZED_NOTE)
     if top.kind == "asymmetric" and options.diag == 0:
         j = _diagonal_rolls_over(top, request.fend)
         if j is not None:
@@ -271,6 +286,16 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
             f"IAX = {options.iax} in a symmetric top: the two lines of a K doublet are listed as one, with |K|"
         )
     return notes
+
+
+def _not_written(request: Request) -> list[str]:
+    """What FLAGS ask for and is not made here: the tens say whether SPCAT writes a .str file."""
+    if request.flags // 10 % 10 == 0:
+        return []
+    return [
+        f"FLAGS = {request.flags} asks for a .str file, which is not written here: the signs of its transition dipoles follow from the "
+        "phases of SPCAT's diagonalization; strengths of lines are in --csv and --json"
+    ]
 
 
 def _diagonal_rolls_over(top: Top, jmax: int) -> int | None:

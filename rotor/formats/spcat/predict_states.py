@@ -6,14 +6,16 @@ The other files go through `predict`, with constants by their names.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
+from rotor.formats.spcat.block_numbers import blocks_of
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     as_catalogue,
@@ -45,7 +47,7 @@ _LAST = 2000
 
 def predicted(
     parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
-) -> tuple[Catalogue, Lines, float, LevelList, list[str]]:
+) -> tuple[Catalogue, Lines, float, Callable[[], LevelList], list[str]]:
     """The prediction of files with spins, several states or other operators; see `predict.predict`.
 
     Parameters
@@ -67,8 +69,8 @@ def predicted(
         The same lines before K doublets were parted.
     q : float
         As the file counts it.
-    levels : LevelList
-        As the program would list them.
+    levels : callable
+        What makes the list of levels as the program would write it.
     notes : list of str
         What the program passes over in silence.
 
@@ -79,6 +81,8 @@ def predicted(
     """
     request = intensities.request
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    if as_spcat and any(group.spins or group.top.kind == "asymmetric" for group in groups):
+        refuse_undiagonalized(parameters.options[0].diag)
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     groups = _with_levels(groups, request)
@@ -98,7 +102,32 @@ def predicted(
     with_spread = [one for one in spreads if one is not None]
     if with_spread:
         lines = replace(lines, given_spread=np.concatenate(with_spread))
-    return made, lines, q, as_level_list(solved, form, spreads), notes
+    plain = [(group, replace(levels, blocks=())) for group, levels in solved]
+    return made, lines, q, partial(_level_list, parameters, plain, form, spreads), notes
+
+
+def _level_list(
+    parameters: ParameterFile,
+    solved: list[tuple[Group, Levels]],
+    form: Format,
+    spreads: Sequence[Floats | None],
+) -> LevelList:
+    """The levels as the program lists them, with its numbers of blocks and places."""
+    return as_level_list(solved, form, spreads, blocks_of(parameters, [group for group, _ in solved]))
+
+
+UNDIAGONALIZED_NOTE = (
+    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
+)
+
+
+def refuse_undiagonalized(diag: int) -> None:
+    """ValueError for DIAG below 0, which asks for diagonal elements in place of eigenvalues."""
+    if diag < 0:
+        raise ValueError(
+            f"DIAG = {diag}: diagonal elements in place of eigenvalues, which is read but not computed; give DIAG = 0, or leave "
+            "--as-spcat out for eigenvalues"
+        )
 
 
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
@@ -127,7 +156,7 @@ def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)
     solved = _solved(_with_levels(groups, intensities.request), intensities.request, form)
-    return as_level_list(solved, form, _spreads(solved, parameters))
+    return _level_list(parameters, solved, form, _spreads(solved, parameters))
 
 
 def _spreads(solved: list[tuple[Group, Levels]], parameters: ParameterFile) -> list[Floats | None]:
@@ -295,7 +324,9 @@ def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_
     found, notes = len(parameters.parameters), []
     if parameters.header.npar > found:
         notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
-    notes += left_out(parameters)
+    notes += left_out(parameters, as_spcat=as_spcat)
+    if parameters.options[0].diag < 0 and not as_spcat:
+        notes.append(UNDIAGONALIZED_NOTE)
     for group in groups:
         highest = request.fend + sum(group.spins) // 2
         for state in group.states:

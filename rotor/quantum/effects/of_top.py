@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
     """Quadrupole, spin-rotation and spin-spin coupling of a top with constants of spins; none without them.
 
-    Raises ValueError for a name that no effect knows, and for like nuclei whose exchange the spin weights count already.
+    Raises ValueError for a name that no effect knows, for like nuclei whose exchange the spin weights count already, and for a tensor
+    that a linear molecule cannot have.
 
     >>> from rotor.tops.spins.spin_constants import SpinConstants
     >>> from rotor.tops.top import Top
@@ -32,6 +33,8 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
         return ()
     _refuse_like_nuclei(top)
     _refuse_unknown_states(top)
+    if top.kind == "linear":
+        _refuse_across_a_line(top)
     return _effects(top.spin_constants)
 
 
@@ -70,6 +73,28 @@ def _refuse_unknown_states(top: Top) -> None:
             raise ValueError(
                 f"{name}: there is no state {states[1]}; {top.name or 'this top'} has {count}, counted from 0"
             )
+
+
+def _refuse_across_a_line(top: Top) -> None:
+    """ValueError where the tensors of a linear molecule, whose axis is a, are not the same along b and c."""
+    from rotor.quantum.effects.spin_effect import parse_name
+
+    assert top.spin_constants is not None
+    values = {parse_name(name): value for name, value in top.spin_constants.values.items()}
+    for parts, value in values.items():
+        tensor, _, letters = parts.symbol.partition("_")
+        if value and len(set(letters) - {"-"}) > 1 and set(letters) <= set("abc-"):
+            raise ValueError(
+                f"{parts.text} = {value:g} MHz: a linear molecule has none, its tensors are alike along b and c; leave it out"
+            )
+        if tensor in ("C", "eps") and letters in ("bb", "cc"):
+            twin = parts._replace(symbol=f"{tensor}_{'cc' if letters == 'bb' else 'bb'}")
+            if values.get(twin, 0.0) != value:
+                scalar = parts._replace(symbol=f"{tensor}_iso").text
+                raise ValueError(
+                    f"{parts.text} = {value:g} MHz and {twin.text} = {values.get(twin, 0.0):g} MHz: alike in a linear molecule; give "
+                    f"both the same value, or {scalar} alone"
+                )
 
 
 def _refuse_like_nuclei(top: Top) -> None:

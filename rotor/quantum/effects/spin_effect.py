@@ -58,7 +58,8 @@ def parse_name(name: str) -> ParameterName:
     match = _NAME.fullmatch(name.strip())
     if not match:
         raise ValueError(
-            f"parameter {name!r}: a name has the form symbol_powers(spins)[states], such as chi_aa(14N), C_bb_J(H1) or G_c[0,1]"
+            f"parameter {name!r}: a name has the form symbol_powers(spins)[states], such as chi_aa(14N), C_bb_J(H1) or G_c[0,1], "
+            "with components along the principal axes: aa, bb-cc, ab, ac, bc, ..."
         )
     powers = match["powers"] or ""
     spins = tuple(part.strip() for part in (match["spins"] or "").split(",") if part.strip())

@@ -23,6 +23,7 @@ from rotor.arrays import Floats
 from rotor.quantum.coupled import CoupledBlock, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
+from rotor.quantum.spins.method import are_with_spins
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
@@ -76,7 +77,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
-    if "f" in levels.quanta or any(hasattr(block, "shared") for block in levels.blocks[:1]):  # solved as with spins
+    if "f" in levels.quanta or are_with_spins(levels):
         from rotor.quantum.spins.lines import derivatives
 
         return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))

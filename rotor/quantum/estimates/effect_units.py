@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 Units = dict[int, Elements]
-Functions = Callable[[CoupledBlock], tuple[Floats, Ints]]
+Functions = Callable[[CoupledBlock | SpinBlock], tuple[Floats, Ints]]
 
 
 def unit_levels(
@@ -68,8 +68,9 @@ def unit_levels(
     values_mhz : (parameters,) array
         At which the levels were solved.
     functions : callable, optional
-        Of coupled blocks: the functions (n, n) in rows by which the states are called, and their names v, Ka, Kc (n, 3), where these
-        are not the functions of the basis; the levels have these names.
+        Of blocks of several states: the functions (n, n) in rows by which the states are called, over those of the basis, and their
+        names v, Ka, Kc and with spins the doubled pattern (n, 3 + pattern), where these are not the functions of the basis; levels
+        without spins have these names.
     naming : callable, optional
         Of blocks without spins: how the states get their names, which the levels have; by overlaps where it is None.
 
@@ -96,7 +97,10 @@ def unit_levels(
         """Labels of the block by their names, which are those that the levels have."""
         block, own = blocks[place], inside[place]
         state_of = {tuple(name): state for state, name in enumerate(found.tolist())}
-        asked = _quanta(levels)[rows[own]] if functions or naming else _names(block)[rows[own] - block.start]
+        if functions and isinstance(block, SpinBlock):
+            asked = _names_by(block, *functions(block))[rows[own] - block.start]
+        else:
+            asked = _quanta(levels)[rows[own]] if functions or naming else _names(block)[rows[own] - block.start]
         return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
     return tracked_blocks(units, len(rows), find, values_mhz)
@@ -110,6 +114,18 @@ def _quanta(levels: Levels) -> Ints:
 def _names(block: Any) -> Ints:
     """What the states of a solved block are called; the rank alone where one Wang block is solved by itself."""
     return np.arange(len(block.energies_mhz))[:, None] if isinstance(block, SolvedBlock) else block.labels
+
+
+def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
+    """What the states of a block are called by functions over those of the basis."""
+    rows = [block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.parts]
+    over_basis = np.concatenate(
+        [
+            np.matmul(part.rotor.vectors, own).reshape(-1, block.vectors.shape[1])
+            for part, own in zip(block.parts, rows, strict=True)
+        ]
+    )
+    return np.asarray(names[assigned((functions @ over_basis) ** 2, np.ones(len(names), dtype=np.int64))])
 
 
 class _Makers:
@@ -127,12 +143,16 @@ class _Makers:
         self._functions, self._naming = functions, naming
         self._top, self._effects, self._names = top, levels.effects, tuple(names)
         self._representation = str(levels.representation)
-        self._spins = _SpinUnits(top, levels.effects, self._names, blocks) if isinstance(blocks[0], SpinBlock) else None
+        self._spins: _SpinUnits | None = None
+        if isinstance(blocks[0], SpinBlock):
+            self._spins = _SpinUnits(top, levels.effects, self._names, blocks, apart=functions is None)
 
     def unit(self, block: Any) -> UnitBlock:
         """The unit matrices of one block."""
         if isinstance(block, SpinBlock):
             assert self._spins is not None
+            if self._functions:
+                return _turned(self._spins.matrices(block), *self._functions(block))
             return self._spins.unit(block)
         return self._coupled(block) if isinstance(block, CoupledBlock) else self._single(block)
 
@@ -167,7 +187,7 @@ def _named(units: Units, named: NamedFunctions) -> UnitBlock:
 
 
 def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:
-    """The block over other functions, each of a state by itself: the sub-blocks are their v and the parity of Ka."""
+    """The block over other functions, each of a state by itself: the sub-blocks are their v, the parity of Ka and the pattern."""
     turned = {}
     for place, (places, values) in units.items():
         lower = np.zeros(functions.shape)
@@ -177,8 +197,8 @@ def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return np.asarray(names[assigned(vectors**2, np.ones(len(names), dtype=np.int64))])
 
-    members = 2 * names[:, 0] + names[:, 1] % 2
-    return unit_block(turned, np.unique(members, return_inverse=True)[1].reshape(-1), namer)
+    members = np.column_stack([names[:, 0], names[:, 1] % 2, names[:, 3:]])
+    return unit_block(turned, np.unique(members, axis=0, return_inverse=True)[1].reshape(-1), namer)
 
 
 def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -189,10 +209,17 @@ class _SpinUnits:
     """Unit matrices of blocks with spins."""
 
     def __init__(
-        self, top: Top, effects: tuple[QuantumEffect, ...], names: Sequence[str], blocks: Sequence[SpinBlock]
+        self,
+        top: Top,
+        effects: tuple[QuantumEffect, ...],
+        names: Sequence[str],
+        blocks: Sequence[SpinBlock],
+        *,
+        apart: bool,
     ) -> None:
+        """apart: whether the powers of N², Nz² and N± are made for all patterns at once."""
         self._shared = blocks[0].shared
-        rotation = _Rotation.of(top, effects, names, blocks)
+        rotation = _Rotation.of(top, effects, names, blocks) if apart else None
         self._rotation = rotation
         self._operators = {
             place: ParameterOperator(top, effects, name, self._shared)
@@ -201,14 +228,19 @@ class _SpinUnits:
         }
         self._coefficients: dict[tuple[Channel, int], Floats] = {}
 
-    def unit(self, block: SpinBlock) -> UnitBlock:
-        """The unit matrices of one block of an F, the functions of the basis in place of the states of the rotation."""
+    def matrices(self, block: SpinBlock) -> Units:
+        """The unit matrices that are made for every pattern, over the functions of the basis or those that exchange allows."""
         parts = tuple(_in_functions(part) for part in block.parts)
         units: Units = {}
         for place, operator in self._operators.items():
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
                 units[place] = elements_of(_of_allowed(matrix, block.allowed) if block.allowed else matrix)
+        return units
+
+    def unit(self, block: SpinBlock) -> UnitBlock:
+        """The unit matrices of one block of an F, the functions of the basis in place of the states of the rotation."""
+        parts, units = tuple(_in_functions(part) for part in block.parts), self.matrices(block)
         if block.allowed:
             return unit_block(units, block.allowed.sub_block, _namer_of_allowed(block.allowed))
         more = self._rotation.of_parts(parts) if self._rotation else None

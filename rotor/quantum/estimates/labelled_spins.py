@@ -67,7 +67,7 @@ def found_with_spins(
     """
     scheme, every = scheme_of(top, effects), distinct(twice_f)
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))
-    products = scheme.equivalent < 3  # functions of three equivalent nuclei are none
+    products = scheme.equivalent < 3 and functions is None  # functions of three equivalent nuclei are none
     if products and size * int(every.max() + 1) > _LARGE:
         from rotor.quantum.estimates.contracted import contracted_levels
 

@@ -21,7 +21,8 @@ from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
 from rotor.quantum.fields.wang_blocks import WangBlockInField
 from rotor.quantum.reduced import wang_amplitudes
-from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import BodyTensor, body_tensor
 
 
 class BlockPair(NamedTuple):

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.reduced import wang_amplitudes
-from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import BodyTensor, body_tensor
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock

@@ -25,7 +25,7 @@ from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, opera
 from rotor.quantum.spins.coupling import coefficients, for_every_f, n_dot_s
 from rotor.quantum.spins.families import families_of, links_of_pairs, links_of_stacks
 from rotor.quantum.spins.many_f import Group
-from rotor.quantum.spins.method import FIRST_ORDER, Used
+from rotor.quantum.spins.method import FIRST_ORDER, BlockWithSpins, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
 from rotor.quantum.spins.rotor import (
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 Exist = Callable[[Ints], NDArray[np.bool_]]
 Operators = dict[tuple[int, int], dict[Channel, Floats]]
@@ -64,7 +63,7 @@ class Shared:
 
 
 @dataclass(frozen=True)
-class SpinBlock:
+class SpinBlock(BlockWithSpins):
     """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
     patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
@@ -83,6 +82,11 @@ class SpinBlock:
     start: int = 0
     allowed: Allowed | None = None
     group: Group | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def used(self) -> Used | None:
+        """The method, the same for all blocks of a calculation."""
+        return self.shared.used
 
     @cached_property
     def single(self) -> bool:

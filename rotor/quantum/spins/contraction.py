@@ -16,7 +16,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, tensor_of
 from rotor.quantum.spins.rotor import Piece, RotorBlock, RotorPart, acts
-from rotor.quantum.tensors import BodyTensor, Tensors, closed_coupling, overlap, rank_of, tensor_between
+from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.tensors import BodyTensor, Tensors, overlap, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
 _SMALL = 16  # functions up to which blocks of all sizes share a stack; of larger ones the largest has half as many again at most

@@ -16,7 +16,6 @@ from rotor.quantum.spins.many_f_levels import solve_many_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
-from rotor.quantum.spins.three_equivalent import in_wang_functions, solve_three
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -88,6 +87,8 @@ def levels_of_f(
     plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
     solve = solve_f
     if plan.shared.scheme.equivalent == 3:
+        from rotor.quantum.spins.three_equivalent import in_wang_functions, solve_three
+
         plan, solve = in_wang_functions(plan), solve_three
     solved = solve_many_f(plan, every_f, exist)
     if solved is None:

@@ -22,13 +22,13 @@ MOST = 160  # functions of a block up to which many F are done at once: of large
 Tables = dict[tuple[int, int, int], Floats]
 """Elements (N, states', states) by the kinds of both blocks and N' - N, by the N of the second from the lowest on."""
 
-Cell = tuple[int, int]
-"""2(N - F) and class of patterns."""
-Key = tuple[tuple[Cell, int], ...]
-"""The cell and the kind of each slot."""
+NPattern = tuple[int, int]
+"""2(N - F) and the class of coupling patterns."""
+Layout = tuple[tuple[NPattern, int], ...]
+"""How the columns of a block follow one another: 2(N - F), class of patterns and kind of the rotation's blocks of each."""
 
 
-class Slot(NamedTuple):
+class RotationColumns(NamedTuple):
     """Columns of a group that belong to one kind of block of the rotation at one N: 2(N - F), the kind, patterns among those of the
     calculation, columns."""
 
@@ -45,7 +45,7 @@ class Group:
     states: the largest number of states of a block of the rotation; heights: that of each block. places: of a doubled F among the blocks.
     """
 
-    slots: tuple[Slot, ...]
+    rotations: tuple[RotationColumns, ...]
     twice_f: list[int]
     states: int
     heights: list[int]
@@ -55,14 +55,14 @@ class Group:
     @property
     def columns(self) -> int:
         """Number of columns."""
-        return int(self.slots[-1].columns.stop)
+        return int(self.rotations[-1].columns.stop)
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
     """What all groups of a calculation share: the doubled F, the lowest N, kinds and sizes of blocks of the rotation by number, their
     energies (N, states) by kind, for each F the numbers of its patterns among those of the highest F, counted by their distances
-    from F, and the cell of each of these."""
+    from F, and 2(N - F) with the class of each of these."""
 
     twice_f: list[int]
     lowest: int
@@ -70,16 +70,16 @@ class Frame:
     sizes: list[int]
     energies_mhz: dict[int, Floats]
     patterns: dict[int, list[int]]
-    cells: list[Cell]
+    n_patterns: list[NPattern]
 
     def of_f(self, twice_f: Sequence[int]) -> slice | list[int]:
         """The places of some rising F in tables by F."""
         return _places((twice_f[0] - self.twice_f[0]) // 2, twice_f, len(self.twice_f))
 
-    def of_n(self, twice_f: Sequence[int], slot: Slot) -> slice | list[int]:
-        """The places in tables by N of the N that a slot has at some rising F; any where that is beyond the table."""
-        count = len(self.energies_mhz[slot.kind])
-        return _places((twice_f[0] + slot.rise) // 2 - self.lowest, twice_f, count)
+    def of_n(self, twice_f: Sequence[int], rotation: RotationColumns) -> slice | list[int]:
+        """The places in tables by N of the N that some columns have at some rising F; any where that is beyond the table."""
+        count = len(self.energies_mhz[rotation.kind])
+        return _places((twice_f[0] + rotation.rise) // 2 - self.lowest, twice_f, count)
 
 
 def _places(first: int, twice_f: Sequence[int], count: int) -> slice | list[int]:
@@ -106,8 +106,8 @@ def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> F
             kinds[number], sizes[number] = stack.kind, size
             of_kind[n - lowest, :size] = own
     patterns = {f: own.tolist() for f, own in places.items()}
-    cells = [(rise, of) for rise, of in every[:, [0, -1]].tolist()]
-    return Frame(list(places), lowest, kinds, sizes, energies, patterns, cells)
+    n_patterns = [(rise, of) for rise, of in every[:, [0, -1]].tolist()]
+    return Frame(list(places), lowest, kinds, sizes, energies, patterns, n_patterns)
 
 
 def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
@@ -124,44 +124,44 @@ def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
 
 def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
     """Blocks, given by their doubled F and parts, in groups, each with the numbers of its blocks."""
-    keys = [_key(frame.patterns[f], parts, frame) for f, parts in members]
-    found: list[tuple[Key, dict[int, int]]] = []
+    layouts = [_layout(frame.patterns[f], parts, frame) for f, parts in members]
+    found: list[tuple[Layout, dict[int, int]]] = []
     for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
-        f, key = members[number][0], keys[number]
+        f, layout = members[number][0], layouts[number]
         for known, by_f in found:
-            if f not in by_f and (key == known or set(key) <= set(known)):
+            if f not in by_f and (layout == known or set(layout) <= set(known)):
                 by_f[f] = number
                 break
         else:
-            found.append((key, {f: number}))
+            found.append((layout, {f: number}))
     return [
         (
-            _group(key, [(f, members[by_f[f]][1], keys[by_f[f]]) for f in sorted(by_f)], frame),
+            _group(layout, [(f, members[by_f[f]][1], layouts[by_f[f]]) for f in sorted(by_f)], frame),
             [by_f[f] for f in sorted(by_f)],
         )
-        for key, by_f in found
+        for layout, by_f in found
     ]
 
 
-def _group(key: Key, members: Sequence[tuple[int, Sequence[SpinPart], Key]], frame: Frame) -> Group:
-    """The group of a key; members: doubled F, rising, parts and keys of its blocks."""
-    slots, start = list[Slot](), 0
-    for cell, kind in key:
-        first, count = frame.cells.index(cell), frame.cells.count(cell)
-        slots.append(Slot(cell[0], kind, slice(first, first + count), slice(start, start + count)))
+def _group(layout: Layout, members: Sequence[tuple[int, Sequence[SpinPart], Layout]], frame: Frame) -> Group:
+    """The group of a layout; members: doubled F, rising, parts and layouts of its blocks."""
+    rotations, start = list[RotationColumns](), 0
+    for n_pattern, kind in layout:
+        first, count = frame.n_patterns.index(n_pattern), frame.n_patterns.count(n_pattern)
+        rotations.append(RotationColumns(n_pattern[0], kind, slice(first, first + count), slice(start, start + count)))
         start += count
-    counts = [slot.columns.stop - slot.columns.start for slot in slots]
+    counts = [rotation.columns.stop - rotation.columns.start for rotation in rotations]
     columns, orders = np.zeros((len(members), start), dtype=np.int64), list[Any]()
-    for place, (f, parts, own_key) in enumerate(members):
+    for place, (f, parts, own_layout) in enumerate(members):
         own, sizes = frame.patterns[f], [frame.sizes[part.number] for part in parts]
-        if len(own) == len(frame.cells) and own_key == key:
+        if len(own) == len(frame.n_patterns) and own_layout == layout:
             columns[place] = np.repeat(sizes, counts)
             orders.append(slice(None))
             continue
         order = list[int]()
-        for part, size, of_slot in zip(parts, sizes, own_key, strict=True):
-            slot = slots[key.index(of_slot)]
-            at = [pattern + slot.columns.start - slot.patterns.start for pattern in own[part.patterns]]
+        for part, size, of_columns in zip(parts, sizes, own_layout, strict=True):
+            rotation = rotations[layout.index(of_columns)]
+            at = [pattern + rotation.columns.start - rotation.patterns.start for pattern in own[part.patterns]]
             columns[place, at] = size
             order += at
         orders.append(order)
@@ -170,18 +170,18 @@ def _group(key: Key, members: Sequence[tuple[int, Sequence[SpinPart], Key]], fra
     there = np.arange(states) < columns[:, :, None]
     functions = [every[order][there[place, order]] for place, order in enumerate(orders)]
     places = {f: place for place, f in enumerate(twice_f)}
-    return Group(tuple(slots), twice_f, states, columns.max(axis=1).tolist(), functions, places)
+    return Group(tuple(rotations), twice_f, states, columns.max(axis=1).tolist(), functions, places)
 
 
-def _key(own: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> Key:
-    """Where the columns of a block stand."""
-    return tuple((frame.cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+def _layout(own: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> Layout:
+    """The layout of one block."""
+    return tuple((frame.n_patterns[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
 
 
 def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bool:
     """Whether there are elements between two groups whose F differ by `step`, doubled."""
     up, low = of_both
-    return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.slots for b in low.slots)
+    return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.rotations for b in low.rotations)
 
 
 def between(
@@ -214,9 +214,9 @@ def between(
     out = space.array("elements", len(twice_f), up.columns, up.states, low.columns, low.states)
     out.fill(0.0)
     own = coefficients[frame.of_f(twice_f)]
-    for right in low.slots:
+    for right in low.rotations:
         places = frame.of_n(twice_f, right)
-        for left in up.slots:
+        for left in up.rotations:
             table = tables.get((left.kind, right.kind, (step + left.rise - right.rise) // 2))
             if table is not None:
                 element = table[places, : up.states, : low.states]

@@ -135,9 +135,9 @@ def _hamiltonians(
         for (tables, coefficients), own in zip(acting, spaces, strict=True)
     ]
     diagonal = np.zeros((len(zeros), group.columns, group.states))
-    for slot in group.slots:
-        own = frame.energies_mhz[slot.kind][frame.of_n(group.twice_f, slot), : group.states]
-        diagonal[:, slot.columns, : own.shape[1]] = (own - zeros[:, None])[:, None]
+    for rotation in group.rotations:
+        own = frame.energies_mhz[rotation.kind][frame.of_n(group.twice_f, rotation), : group.states]
+        diagonal[:, rotation.columns, : own.shape[1]] = (own - zeros[:, None])[:, None]
     for place, functions in enumerate(group.functions):
         chosen = functions[:, None], functions
         matrix = every[0][place][chosen] if every else np.zeros((len(functions), len(functions)))

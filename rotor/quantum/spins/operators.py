@@ -31,7 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, coupling, phase_exponent
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
 from rotor.quantum.wang.basis import WangBlock, character
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
@@ -214,7 +215,32 @@ class HalfTurned:
         return None if found is None else character(up, self.axis) * found
 
 
-Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned
+@dataclass(frozen=True)
+class BetweenSpecies:
+    """An operator without its elements between Wang blocks of other species than the pairs given."""
+
+    of: Cosines | CosinesWithN | ByElements | HalfTurned
+    pairs: frozenset[tuple[str, str]]
+
+    @property
+    def odd(self) -> bool:
+        """As of the operator."""
+        return self.of.odd
+
+    @property
+    def rank(self) -> int:
+        """That of the operator."""
+        return self.of.rank
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix between two blocks, None where it is zero."""
+        assert isinstance(up, WangBlock)
+        assert isinstance(low, WangBlock)
+        return self.of.elements(up, low, representation) if (up.species, low.species) in self.pairs else None
+
+
+Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned | BetweenSpecies
+_ALONE = Scalar | ByElements | HalfTurned | BetweenSpecies  # which are not added to others
 
 
 @lru_cache(maxsize=256)
@@ -238,7 +264,7 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
     >>> is_axial(Cosines(((1.0, 0, 0), (0, -0.5, 0), (0, 0, -0.5))), "a")
     True
     """
-    if isinstance(rotor, HalfTurned):
+    if isinstance(rotor, HalfTurned | BetweenSpecies):
         return False
     if isinstance(rotor, Scalar):
         return all(n == 0 for (_, _, n), _ in rotor.operators)
@@ -260,16 +286,16 @@ def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]
     """
     sums: dict[object, list[Floats]] = {}
     for value, rotor in weighted:
-        alone = isinstance(rotor, Scalar | ByElements | HalfTurned)
+        alone = isinstance(rotor, _ALONE)
         key: object = rotor if alone else (type(rotor), rotor.rank)
-        components = np.array(1.0 if isinstance(rotor, Scalar | ByElements | HalfTurned) else rotor.components)
+        components = np.array(1.0 if isinstance(rotor, _ALONE) else rotor.components)
         sums.setdefault(key, []).append(value * components)
     out: list[tuple[float, Rotor]] = []
     for key, parts in sums.items():
         total = np.sum(parts, axis=0)
         total = np.where(np.abs(total) > _CANCELS * np.abs(parts).sum(axis=0), total, 0.0)
         if total.any():
-            alone = isinstance(key, Scalar | ByElements | HalfTurned)
+            alone = isinstance(key, _ALONE)
             out.append((float(total), key) if alone else (1.0, key[0](_nested(total))))  # type: ignore[index,arg-type]
     return out
 

@@ -125,7 +125,10 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     axis = "a" if top.kind == "prolate" else "c"
     if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
         return False
-    channels = channels_of(terms, scheme_of(top, effects))  # C_bb and C_cc are axial together where they are equal
+    scheme = scheme_of(top, effects)
+    if scheme.equivalent == 3:  # their total needs functions with a sign
+        return False
+    channels = channels_of(terms, scheme)  # C_bb and C_cc are axial together where they are equal
     if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
     own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
@@ -159,11 +162,25 @@ def _names(v: int, basis: WangBlock, representation: str) -> Ints:
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
-    """Every spin term of the effects with the value of its parameter times its factor, zeros left out."""
+    """Every spin term of the effects with the value of its parameter times its factor, zeros left out.
+
+    Raises ValueError for a quadrupole coupling of a spin of 1/2.
+    """
     found = []
     for effect in effects:
-        values = effect.parameters(top)
-        found += [(values[term.name] * term.factor, term) for term in effect.spin_terms(top)]
+        values, twice = effect.parameters(top), {spin.name: spin.twice for spin in effect.spins(top)}
+        for term in effect.spin_terms(top):
+            if (
+                values[term.name]
+                and len(term.spins) == 2
+                and term.spins[0] == term.spins[1]
+                and twice[term.spins[0]] < 2
+            ):
+                raise ValueError(
+                    f"parameter {term.name.partition('#')[0]}: spin {term.spins[0]} of 1/2 has no quadrupole moment; that needs a spin of "
+                    "1 or more"
+                )
+            found.append((values[term.name] * term.factor, term))
     return [(value, term) for value, term in found if value]
 
 

@@ -19,7 +19,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.moments import Word, Written
 from rotor.quantum.spins.operators import Basis, functions_of
-from rotor.quantum.tensors import Complexes, spherical_components, symmetric_top_elements
+from rotor.quantum.symmetric_top_elements import symmetric_top_elements
+from rotor.quantum.tensors import Complexes, spherical_components
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import components
 

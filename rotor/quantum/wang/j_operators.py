@@ -11,7 +11,7 @@ J_m∓ raises and lowers k). In a left-handed representation the frame x, -y, z 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -136,6 +136,28 @@ def half_turn(j: int, representation: str, axis: str) -> JOperator:
         return JOperator(j, {0: (1.0 - 2.0 * (k % 2)).astype(np.complex128)})
     signs = 1.0 - 2.0 * ((j + along * k) % 2)  # |k⟩ becomes ±|-k⟩
     return JOperator(j, {-2 * int(each): np.where(k == each, signs, 0).astype(np.complex128) for each in k})
+
+
+def between_species(operator: JOperator, representation: str, pairs: Collection[tuple[str, str]]) -> JOperator:
+    """Σ P_s O P_t over pairs of species (s, t), P projecting on the functions with the characters of a species.
+
+    >>> whole = components(2, "Ir")["a"]
+    >>> float(abs(between_species(whole, "Ir", [("ee", "ee")]).matrix).max()), len(between_species(whole, "Ir", [("ee", "eo")]).bands)
+    (0.0, 9)
+    """
+    j, matrix = operator.j, operator.matrix
+    turns = {axis: half_turn(j, representation, axis).matrix for axis in "ac"}
+    unit, sign = np.eye(2 * j + 1), {"e": 1.0, "o": -1.0}
+    project = {
+        ka + kc: (unit + sign[ka] * turns["a"]) @ (unit + sign[kc] * turns["c"]) / 4 for ka in "eo" for kc in "eo"
+    }
+    total = sum((project[s] @ matrix @ project[t] for s, t in pairs), np.zeros_like(matrix))
+    bands = {}
+    for q in range(-2 * j, 2 * j + 1):
+        columns = np.arange(max(0, -q), min(2 * j + 1, 2 * j + 1 - q))
+        bands[q] = np.zeros(2 * j + 1, dtype=np.complex128)
+        bands[q][columns] = total[columns + q, columns]
+    return JOperator(j, bands)
 
 
 def phase(block: WangBlock) -> complex:

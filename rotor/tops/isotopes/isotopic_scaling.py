@@ -16,9 +16,10 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
+from rotor.tops.components import symmetric_tensor
 from rotor.tops.constants import Constants
 from rotor.tops.operators import distortion_terms, powers_of_spelled
-from rotor.tops.top import Top, symmetric_tensor
+from rotor.tops.top import Top
 
 TURNED_TOO_FAR_DEGREES = 5.0  # beyond it distortion constants are not carried over
 

@@ -127,10 +127,19 @@ class SpinConstants:
             if name in values:
                 raise ValueError(f"{text!r}: {name} is given twice; leave one out")
             values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
+        return cls.from_values(values, spins, source)
+
+    @classmethod
+    def from_values(cls, values_mhz: Mapping[str, float], spins: str | None = None, source: str = "") -> SpinConstants:
+        """From values in MHz by name; spins as for `parse`.
+
+        >>> dict(SpinConstants.from_values({"eps_aa(S)": 300.0, "b_F(S,1H)": 40.0}, "S=1/2").twice)
+        {'S': 1, '1H': 1}
+        """
         given, totals = parse_coupled(spins or "")
-        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values) if s not in given}}
+        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values_mhz) if s not in given}}
         ordered = {name: every[name] for name in sorted(every, key=lambda name: name in totals)}
-        return cls(values, ordered, source, totals=totals)
+        return cls(values_mhz, ordered, source, totals=totals)
 
 
 def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
@@ -246,14 +255,18 @@ def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
 def parse_spins(text: str) -> dict[str, int]:
     """Twice the spins by name from "S=1/2 14N=1", in that order.
 
-    >>> parse_spins("S=1/2, 14N=1")
-    {'S': 1, '14N': 2}
+    >>> parse_spins("S=1/2, 14N=1, X=1.5")
+    {'S': 1, '14N': 2, 'X': 3}
     """
     found: dict[str, int] = {}
     for part in text.replace(",", " ").split():
         name, equals, value = part.partition("=")
-        number, slash, half = value.partition("/")
-        if not (equals and name and number.isdigit() and (half == "2" or not slash)):
-            raise ValueError(f"{text!r}: expected spins such as S=1/2 14N=1; {part!r} is none")
-        found[name] = int(number) if slash else 2 * int(number)
+        whole, slash, half = value.partition("/")
+        number = float(whole) if re.fullmatch(r"\d+(\.\d+)?", whole) else -1.0
+        twice = number if slash else 2 * number
+        if not (equals and name) or twice < 0 or twice % 1 or (slash and half != "2"):
+            raise ValueError(
+                f"{text!r}: expected spins such as S=1/2 14N=1, each a multiple of 1/2 (1/2, 1, 3/2, ...); {part!r} is none"
+            )
+        found[name] = int(twice)
     return found

@@ -20,15 +20,18 @@ from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_of_l, named_by_l
+from rotor.formats.spcat.hamiltonian.l_spins import functions_with_spins, named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
+from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
 
@@ -215,6 +218,8 @@ def _of_spins(
     own = tuple(group.effect.parameters(group.top))
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
+        if group.effect.pairs:
+            levels = named_by_l_with_spins(levels, group.effect.pairs, str(levels.representation))
         return _rows_of(group, levels, form, labels[here[chosen]])
 
     functions = partial(_functions_of, group) if group.effect.pairs else None
@@ -256,7 +261,14 @@ def _of_blocks(
 
 def _functions_of(group: Group, levels: Levels) -> Functions:
     """The functions by which levels of l-doubled states are called."""
-    return partial(functions_of_l, pairs=group.effect.pairs, representation=str(levels.representation))
+    pairs, representation = group.effect.pairs, str(levels.representation)
+
+    def functions(block: CoupledBlock | SpinBlock) -> tuple[Floats, Ints]:
+        if isinstance(block, SpinBlock):
+            return functions_with_spins(block, pairs, representation)
+        return functions_of_l(block, pairs, representation)
+
+    return functions
 
 
 def _of_group(group: Group, form: Format, labels: Ints) -> Ints:

@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
 
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
@@ -24,13 +26,17 @@ from rotor.formats.spcat.hamiltonian.series import (
     symmetry_type,
     term_of,
 )
+from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.formats.spcat.text.par import Options, ParameterFile
+from rotor.quantum.coupled import NOTHING
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE, ByElements, Cosines, CosinesWithN, HalfTurned
+from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElements, Cosines, CosinesWithN, HalfTurned
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
+from rotor.quantum.wang.basis import wang_blocks
+from rotor.quantum.wang.j_operators import between_species
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -205,6 +211,7 @@ class FileEffect(QuantumEffect):
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
     ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here. axes: those at x, y, z.
     turned: the axis g of `phases` whose half turn goes with time reversal, where an operator within one state is odd under it.
+    apart: by pairs of states the species that have elements, where weights forbid others.
     """
 
     name: ClassVar[str] = ""
@@ -220,6 +227,7 @@ class FileEffect(QuantumEffect):
     pairs: tuple[Pair, ...] = ()
     axes: str = AXES["Ir"]
     turned: str = ""
+    apart: dict[tuple[int, int], SpeciesPairs] = field(default_factory=dict)
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -274,7 +282,23 @@ class FileEffect(QuantumEffect):
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(found)
+        return tuple(self._without_forbidden(coupling) for coupling in found)
+
+    def _without_forbidden(self, coupling: Coupling) -> Coupling:
+        """A coupling without elements between levels of unequal weights."""
+        pairs = self.apart.get((coupling.bra, coupling.ket))
+        if pairs is None:
+            return coupling
+        of, representation = coupling.operator, "IIIl" if self.axes[2] == "c" else "Ir"
+        whole, part = (
+            of(_LOOKED_AT, representation),
+            between_species(of(_LOOKED_AT, representation), representation, pairs),
+        )
+        if np.abs((whole - part).matrix).max() <= NOTHING * np.abs(whole.matrix).max():
+            return coupling
+        return replace(
+            coupling, operator=lambda j, representation: between_species(of(j, representation), representation, pairs)
+        )
 
     def _is_turned(self, line: CodedLine) -> bool:
         """Whether half a turn about the axis of the phases changes the sign of a line's operator."""
@@ -313,7 +337,23 @@ class FileEffect(QuantumEffect):
                 term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     found += self._at_pairs(line, states, part)
-        return tuple(found)
+        return tuple(self._term_apart(term) for term in found)
+
+    def _term_apart(self, term: SpinTerm) -> SpinTerm:
+        """The same of a term with spins."""
+        pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
+        if pairs is None or not isinstance(rotor, Cosines | CosinesWithN | HalfTurned):
+            return term
+        representation = "IIIl" if self.axes[2] == "c" else "Ir"
+        blocks = wang_blocks(_LOOKED_AT, representation)
+        beyond = (
+            rotor.elements(up, low, representation)
+            for up in blocks
+            for low in blocks
+            if (up.species, low.species) not in pairs
+        )
+        forbidden = any(found is not None and found.any() for found in beyond)
+        return replace(term, rotor=BetweenSpecies(rotor, pairs)) if forbidden else term
 
     def _by_exchange(self, term: SpinTerm, exchange: int) -> list[SpinTerm]:
         """The part of a term that is even, or odd, under the exchange of the last two spins."""
@@ -360,6 +400,9 @@ class FileEffect(QuantumEffect):
     def size_mhz(self, top: Top, j: int) -> float:
         """Not estimated: a file's Hamiltonian is one piece."""
         return 0.0
+
+
+_LOOKED_AT = 5  # J at which all elements of the operators of files are there
 
 
 def _turned_round(of: OperatorOfJ) -> OperatorOfJ:

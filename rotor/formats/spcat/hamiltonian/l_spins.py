@@ -136,6 +136,21 @@ def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation:
     return replace(levels, quanta=quanta, mixing=np.concatenate(mixing))
 
 
+def functions_with_spins(block: SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+    """The functions (n, n), in rows over those of the basis, by which the states of a block are called, and their names (n, 3 + pattern).
+
+    |K, l⟩ ± |-K, -l⟩ as in `l_doubled.functions_of_l`, with every coupling pattern; v, Ka, Kc and the doubled pattern.
+    """
+    functions = np.zeros((block.parts[-1].place.stop,) * 2)
+    names = list[Ints]()
+    for part in block.parts:
+        own, called = _functions(part.rotor, pairs, representation)
+        functions[part.place, part.place] = np.kron(np.eye(part.repeats), own)
+        for pattern in block.patterns[part.patterns]:
+            names.append(np.hstack([called, np.broadcast_to(pattern, (len(called), len(pattern)))]))
+    return functions, np.concatenate(names)
+
+
 def _names_of_block(block: SpinBlock, known: dict[int, tuple[Floats, Ints]]) -> tuple[Ints, Floats]:
     names, shares = list[Ints](), list[Floats]()
     for part in block.parts:

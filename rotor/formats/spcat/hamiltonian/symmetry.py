@@ -126,6 +126,26 @@ def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> list[
     return sorted({int(weight) for found in along.values() for weight in found})
 
 
+SpeciesPairs = frozenset[tuple[str, str]]
+
+
+def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]) -> SpeciesPairs | None:
+    """The species of Wang blocks of two states between which there are elements, those whose levels have the same weights; None for all.
+
+    turned: of each state, whether half a turn across the axis changes its sign: of l-doubled states the second component, y.
+    """
+    if low.equivalent or up.equivalent:
+        return None
+    own, other = (_by_species(state, flip) for state, flip in zip((up, low), turned, strict=True))
+    found = frozenset((s, t) for s in own for t in other if own[s] == other[t])
+    return found if len(found) < len(own) * len(other) else None
+
+
+def _by_species(state: StateOptions, turned: bool) -> dict[str, list[int]]:
+    swapped = replace(state, plus=state.minus, minus=state.plus) if turned else state
+    return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in _SPECIES}
+
+
 def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:
     """Of Nb² and Nc², with a spin or without, the part that an axis of more than two folds along z leaves: without ΔK = 2."""
     if operator.plain is not None:

@@ -63,14 +63,16 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         Naming the field or the parameter, for what has no name.
     """
     states, first = states_of(file), file.options[0]
-    _refuse(file, states, intensities)
+    _refuse(file, states)
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     odd = phases_of(file, len(states), frozenset()).odd
     left_out += real_ones(lines, odd, frozenset())[1]
     if odd and any(axis_of(line.typ) for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     if left_out:
-        raise ValueError(f"{left_out[0]}; leave it out of the file, or predict from the files themselves")
+        raise ValueError(
+            f"{left_out[0]}; leave it out of the file, or predict from the files themselves, with rotor spectrum FILE.int"
+        )
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
     letter, own = _letter(file, rows), _own_parameters(rows, len(states))
@@ -97,7 +99,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     )
 
 
-def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: IntensityFile | None) -> None:
+def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
     first = file.options[0]
     digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     reasons = {
@@ -111,7 +113,6 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
         "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
         "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
         "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,
-        "FLAGS: constants in cm⁻¹": intensities is not None and intensities.request.flags >= 1000,
     }
     for what, found in reasons.items():
         if found:
@@ -123,9 +124,7 @@ def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
     try:
         return constants_of(file, errors=errors)
     except AxisOrderError as reason:
-        raise ValueError(
-            f"state {v}: {reason.given}; axes in another order than A >= B >= C {NO_NAME} (.int)"
-        ) from None
+        raise ValueError(f"state {v}: {reason.given}; axes in another order than A >= B >= C {NO_NAME}") from None
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:

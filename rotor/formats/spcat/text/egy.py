@@ -34,9 +34,9 @@ class Level(NamedTuple):
 class LevelList:
     """Levels, columns of equal length n.
 
-    block, rank (n,): where in the program's Hamiltonian; of levels computed here they are not those of the program (`level_list`;
-    of an .int file block 1 and the rank by F and energy). energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the state that
-    gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
+    block, rank (n,): where in the program's Hamiltonian (of an .int file as `block_numbers` says). energy_cm, error_cm (n,): cm⁻¹.
+    mixing (n,): share of the state that gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where
+    there is none.
     pattern (n,): the number that stands for the coupling pattern in a .cat file of more than six quanta, in brackets before all of
     them here; -32768 where there is none.
     texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other

@@ -1,0 +1,238 @@
+"""Block and place of levels as SPCAT numbers them in the first two columns of its .egy file.
+
+Functions stand in sub-blocks of one state v, one species of the Wang functions and one coupling pattern of the spins, those of a
+species that has a weight. Sub-blocks that some parameter connects make a block of every F; blocks are numbered by their first
+sub-block, in order of v, species and pattern, and go on from F to F:
+
+    block = (number of blocks) · (F, rounded up) + place of the block,      place of a level = functions before it + 1
+
+In a block sub-blocks stand in order of pattern, v, species, each with its K rising; a level has the place of the function that it is
+called after. Species 0 to 3 are A, Bx, By, Bz, with x, y, z = c, b, a, or a, b, c where NVIB is negative. Found by comparison with the
+program's .out and .egy files.
+
+Not known here: l-doubled states and total spins of equivalent nuclei. Their levels count by F and energy, 9999 to a block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.hamiltonian.codes import Digits, split_code
+from rotor.formats.spcat.hamiltonian.series import is_constant
+from rotor.formats.spcat.hamiltonian.states import StateOptions
+from rotor.formats.spcat.pattern_numbers import pattern_numbers, pattern_steps
+from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.levels import Levels
+
+_SPECIES = np.array([[0, 3], [1, 2]])  # by Ka odd, Kc odd; Bx and Bz change places in an oblate basis
+_OF_TYP = {0: 0, 1: 3, 2: 2, 3: 1}  # of TYP 20, 40 and 60 on
+
+
+class SubBlock(NamedTuple):
+    """State, species and pattern, in the order in which the program makes sub-blocks."""
+
+    v: int
+    species: int
+    pattern: int
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The sub-blocks of every block; by state the range of K, the doubled spins, and 2(N - F), 2(J - F), ... of its patterns."""
+
+    members: tuple[tuple[SubBlock, ...], ...]
+    limits: dict[int, tuple[int, int]]
+    spins: dict[int, tuple[int, ...]]
+    rises: dict[int, Ints]
+
+    def numbers(self, levels: Sequence[SubBlock], n: Ints, k: Ints, twice_f: Ints) -> tuple[Ints, Ints]:
+        """Block and place of levels.
+
+        Parameters
+        ----------
+        levels : sequence of SubBlock
+            That of each of n levels.
+        n, k, twice_f : (n,) arrays of int
+            N, |K| and doubled F.
+
+        Returns
+        -------
+        block, rank : (n,) arrays of int
+            As in the first two columns of an .egy file.
+        """
+        starts = {f: self._starts(f) for f in sorted(set(twice_f.tolist()))}
+        block, rank = list[int](), list[int]()
+        for sub, own_n, own_k, f in zip(levels, n.tolist(), k.tolist(), twice_f.tolist(), strict=True):
+            place, before = starts[f][sub]
+            block.append(len(self.members) * ((f + 1) // 2) + place + 1)
+            rank.append(before + (own_k - self._least_k(sub, own_n)) // 2 + 1)
+        return np.array(block, dtype=np.int64), np.array(rank, dtype=np.int64)
+
+    def _starts(self, twice_f: int) -> dict[SubBlock, tuple[int, int]]:
+        """The block of every sub-block of one F, and how many functions stand before it there."""
+        found = {}
+        for place, block in enumerate(self.members):
+            before = 0
+            for sub in block:
+                found[sub] = place, before
+                before += self._size(sub, twice_f)
+        return found
+
+    def _size(self, sub: SubBlock, twice_f: int) -> int:
+        """Functions of a sub-block at one F; 0 where its pattern does not exist there."""
+        steps = self.rises[sub.v][sub.pattern]
+        sums = twice_f + steps
+        if (sums < 0).any() or (sums[:-1] + sums[1:] < self.spins[sub.v]).any():  # no triangle of two sums and the spin
+            return 0
+        n = int(sums[0]) // 2
+        return max((min(self.limits[sub.v][1], n) - self._least_k(sub, n)) // 2 + 1, 0)
+
+    def _least_k(self, sub: SubBlock, n: int) -> int:
+        return _least_k(sub.species if n % 2 == 0 else 3 - sub.species, self.limits[sub.v][0])
+
+
+def _least_k(species: int, first: int) -> int:
+    """The least K from `first` on that the functions of a species have at even N."""
+    least = (0, 1, 1, 2)[species]
+    return least if least >= first else first + (first - least) % 2
+
+
+def blocks_of(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
+    """The blocks of a file; None for what is not known here (see above)."""
+    states = sorted((state for group in groups for state in group.states), key=lambda state: state.number)
+    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
+    if any(state.equivalent or state.l_code for state in states):
+        return None
+    oblate = file.options[0].nvib < 0
+    rises = {state.number: _rises(state.spins) for state in states}
+    subs = [
+        SubBlock(state.number, species, pattern)
+        for state in states
+        for species in range(4)
+        if _exists(state, species, oblate)
+        for pattern in range(len(rises[state.number]))
+    ]
+    of_state = {state.number: state for state in states}
+    labels = _components(
+        subs, of_state, rises, [_reach(d, len(states), oblate) for d in digits if not is_constant(d)], file, oblate
+    )
+    members = [[sub for sub, own in zip(subs, labels, strict=True) if own == label] for label in sorted(set(labels))]
+    ordered = tuple(tuple(sorted(block, key=lambda s: (s.pattern, s.v, s.species))) for block in members)
+    limits = {state.number: (state.kmin, state.kmax) for state in states}
+    return Blocks(ordered, limits, {state.number: state.spins for state in states}, rises)
+
+
+def _rises(spins: tuple[int, ...]) -> Ints:
+    """2(N - F), 2(J - F), ... 0 of every coupling pattern, (patterns, spins + 1)."""
+    if not spins:
+        return np.zeros((1, 1), dtype=np.int64)
+    steps = pattern_steps(spins)
+    ups = 2 * steps[:, 1:] - np.array(spins)
+    return np.concatenate([steps[:, :1], steps[:, :1] + np.cumsum(ups, axis=1)], axis=1)
+
+
+def _exists(state: StateOptions, species: int, oblate: bool) -> bool:
+    """Whether the program makes sub-blocks of a species: K in its range for even N or odd, and a weight."""
+    least = min(_least_k(one, state.kmin) for one in (species, 3 - species))
+    return state.kmax >= least and _weight(state, species, oblate)[0] > 0
+
+
+def _weight(state: StateOptions, species: int, oblate: bool) -> tuple[int, ...]:
+    """What weights must agree between sub-blocks that are connected; the first is above 0 where one exists."""
+    own = species if not oblate else (0, 3, 2, 1)[species]
+    ka, kc = (np.array([one]) for one in np.argwhere(own == _SPECIES)[0])
+    along = kc if oblate else ka
+    if state.fold < 3:
+        return (int(state.weights(ka, kc, along)[0]),)
+    if state.fold == 3:
+        return int(state.class_weight(ka, kc)[0]), state.e_weight, state.fold
+    a, e = state.block_weights(ka, kc, along)[0].tolist()
+    return max(a, e), a, e, state.fold
+
+
+class _Reach(NamedTuple):
+    """What a parameter connects: states, species, and by how much each sum of angular momenta may change, doubled."""
+
+    states: tuple[int, int] | None
+    species: int
+    ranks: tuple[int, ...]
+
+
+def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
+    low, high = sorted((d.v1, d.v2))
+    kind = d.typ // 20 if 20 <= d.typ < 80 else 0
+    species = _OF_TYP[kind]
+    if oblate:
+        species = (0, 3, 2, 1)[species]
+    if d.ff and (d.ff - 1) // 10 % 2:  # a sine of K
+        species = 3 - species
+    spins = sorted(place for place in ((1,) if d.ns > 4 else (d.i1, d.i2)) if place)
+    return _Reach(None if low >= states else (low, high), species, _ranks(spins, d))
+
+
+def _ranks(spins: Sequence[int], d: Digits) -> tuple[int, ...]:
+    """Largest changes of N, J, F1, ..., doubled, up to the spin that is coupled last of those named."""
+    if not spins:
+        return ()
+    first, last = spins[0], spins[-1]
+    of_n = 0 if d.typ == 0 and d.ns < 5 else 1 if len(spins) == 1 else 2
+    return (*([2 * of_n] * first), *([2] * (last - first)))
+
+
+def _components(
+    subs: Sequence[SubBlock],
+    states: dict[int, StateOptions],
+    rises: dict[int, Ints],
+    reaches: Iterable[_Reach],
+    file: ParameterFile,
+    oblate: bool,
+) -> list[int]:
+    """The number of the first sub-block that each is connected with."""
+    labels, ixx = list(range(len(subs))), file.options[0].ixx
+    acting = list(dict.fromkeys(reaches))
+    for i, k in combinations(range(len(subs)), 2):
+        a, b = subs[i], subs[k]
+        if labels[i] == labels[k] or _weight(states[a.v], a.species, oblate) != _weight(states[b.v], b.species, oblate):
+            continue
+        one, other = rises[a.v][a.pattern], rises[b.v][b.pattern]
+        if len(one) != len(other):
+            continue
+        change = np.abs(one - other)
+        if any(ixx >> place & 1 and change[place] for place in range(len(change) - 1)):
+            continue
+        if any(_connects(reach, a, b, change) for reach in acting):
+            low, high = sorted((labels[i], labels[k]))
+            labels = [low if label == high else label for label in labels]
+    return labels
+
+
+def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
+    pair = (min(a.v, b.v), max(a.v, b.v))
+    if a.species ^ b.species != reach.species or (reach.states != pair if reach.states else a.v != b.v):
+        return False
+    ranks = [*reach.ranks, *[0] * (len(change) - len(reach.ranks))]
+    return bool((change <= ranks[: len(change)]).all())
+
+
+def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
+    """The sub-block of every level of a group and its |K|; negative: of a symmetric top the component with -K."""
+    quanta, n = levels.quanta, levels.rotational
+    v = np.array([state.number for state in group.states])[quanta.get("v", np.zeros(len(n), dtype=np.int64))]
+    if "kc" in quanta:
+        species = _SPECIES[quanta["ka"] % 2, quanta["kc"] % 2]
+        k = quanta["kc"] if group.oblate else quanta["ka"]
+        species = np.array([0, 3, 2, 1])[species] if group.oblate else species
+    else:
+        k = quanta.get("k", np.zeros(len(n), dtype=np.int64))
+        species = np.where(k % 2, 1 if negative else 2, 3 if negative else 0)
+        species = np.where(k == 0, 3 * (n % 2), species)
+    names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
+    pattern = pattern_numbers(group, levels, names) if names else np.zeros(len(n), dtype=np.int64)
+    return [SubBlock(*row) for row in zip(v.tolist(), species.tolist(), pattern.tolist(), strict=True)], k

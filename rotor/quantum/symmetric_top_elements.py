@@ -1,0 +1,164 @@
+"""Elements of a tensor between functions |J k⟩ of a symmetric top: closed forms up to rank 2, the plain form for any.
+
+Phases and normalisation are those of `tensors`, which puts Wang blocks together of these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats
+from rotor.quantum.wigner import three_j
+
+
+def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
+    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q: √(2J+1) ⟨J k K q|J' k'⟩.
+
+    Parameters
+    ----------
+    j_low, j_up : int
+        J and J'.
+    rank : int
+        K of the tensor.
+    q : int
+        Its component in the molecule.
+    k : (...) array
+        Projections of the lower function.
+
+    Returns
+    -------
+    (...) array
+        Pure numbers; 0 where k or k' do not exist.
+
+    Notes
+    -----
+    For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and G. W. King, J. Chem.
+    Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii, Quantum Theory
+    of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
+
+        c(J → J', q, k) = (-1)^(J'-J-q) c(J' → J, -q, k+q) = (-1)^(J'-J-K) c(J → J', -q, -k).
+
+    Examples
+    --------
+    >>> round(float(coupling(1, 3, 2, 0, 0)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
+    1.8
+    """
+    k = np.asarray(k, dtype=float)
+    exists = (np.abs(k) <= j_low) & (np.abs(k + q) <= j_up)
+    if not abs(j_up - j_low) <= rank <= j_up + j_low or abs(q) > rank:
+        return np.zeros(k.shape)
+    values = coupling_of_existing(j_low, j_up, rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
+    return np.where(exists, values, 0.0)
+
+
+def coupling_of_existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` for k and k + q that exist.
+
+    Parameters
+    ----------
+    j, j_up : int
+        J and J'.
+    rank, q : int
+        Rank and component along the axis of the body.
+    k : (n,) array
+        K of the lower function.
+
+    Returns
+    -------
+    (n,) array
+        Without units.
+    """
+    if rank <= 2:
+        return closed_coupling(j, j_up - j, rank, q, k)
+    root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
+    return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
+
+
+def closed_coupling(j: int | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist.
+
+    Parameters
+    ----------
+    j : int or (n,) array
+        J of the lower function, one for all k or one for each.
+    rise : int
+        J' - J.
+    rank, q : int
+        Rank and component along the axis of the body.
+    k : (n,) array
+        K of the lower function.
+
+    Returns
+    -------
+    (n,) array
+        Without units.
+    """
+    if rise < 0:
+        return sign_of(rise - q) * closed_coupling(j + rise, -rise, rank, -q, k + q)
+    if q < 0:
+        return sign_of(rise - rank) * closed_coupling(j, rise, rank, -q, -k)
+    if rank == 0:
+        return np.sqrt(2 * j + 1.0) + np.zeros(k.shape)
+    if rank == 1:
+        return _vector_up(j, k, q) if rise else _vector_level(j, k, q)
+    return (_tensor_level, _tensor_one_up, _tensor_two_up)[rise](j, k, q)
+
+
+def sign_of(power: int) -> float:
+    """(-1)^power."""
+    return -1.0 if power % 2 else 1.0
+
+
+def _vector_up(j: int | Floats, k: Floats, q: int) -> Floats:
+    if q == 0:
+        return np.asarray(np.sqrt((j - k + 1) * (j + k + 1) / (j + 1)))
+    return np.asarray(np.sqrt((j + k + 1) * (j + k + 2) / (2 * (j + 1))))
+
+
+def _vector_level(j: int | Floats, k: Floats, q: int) -> Floats:
+    if q == 0:
+        return np.asarray(k * np.sqrt((2 * j + 1) / (j * (j + 1))))
+    return np.asarray(-np.sqrt((j - k) * (j + k + 1) * ((2 * j + 1) / (2 * j * (j + 1)))))
+
+
+def _tensor_two_up(j: int | Floats, k: Floats, q: int) -> Floats:
+    if q == 0:
+        above = 1.5 * (j - k + 1) * (j - k + 2) * (j + k + 1) * (j + k + 2)
+    elif q == 1:
+        above = (j - k + 1) * (j + k + 1) * (j + k + 2) * (j + k + 3)
+    else:
+        above = 0.25 * (j + k + 1) * (j + k + 2) * (j + k + 3) * (j + k + 4)
+    return np.asarray(np.sqrt(above / ((j + 1.0) * (2 * j + 3) * (j + 2))))
+
+
+def _tensor_one_up(j: int | Floats, k: Floats, q: int) -> Floats:
+    norm = 2.0 * j * (j + 1) * (j + 2)
+    if q == 0:
+        return np.asarray(k * np.sqrt(6 * (j - k + 1) * (j + k + 1) / norm))
+    if q == 1:
+        return np.asarray((2 * k - j) * np.sqrt((j + k + 1) * (j + k + 2) / norm))
+    return np.asarray(-np.sqrt((j - k) * (j + k + 1) * (j + k + 2) * (j + k + 3) / norm))
+
+
+def _tensor_level(j: int | Floats, k: Floats, q: int) -> Floats:
+    norm = (2 * j - 1) * 2.0 * j * (j + 1) * (2 * j + 3) / (2 * j + 1)
+    if q == 0:
+        return np.asarray((3 * k * k - j * (j + 1)) * np.sqrt(2 / norm))
+    if q == 1:
+        return np.asarray(-(2 * k + 1) * np.sqrt(3 * (j - k) * (j + k + 1) / norm))
+    return np.asarray(np.sqrt(3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2) / norm))
+
+
+def symmetric_top_elements(j_up: int, j_low: int, components: ArrayLike) -> NDArray[np.complex128]:
+    """⟨J'k'‖T^K‖J k⟩ over all k' and k, rising from -J' and -J, (2J'+1, 2J+1): the plain form, for any T^K_q.
+
+    components: T^K_q, q = -K ... K.
+    """
+    parts = np.asarray(components, dtype=complex)
+    rank, k = len(parts) // 2, np.arange(-j_low, j_low + 1)
+    out = np.zeros((2 * j_up + 1, 2 * j_low + 1), dtype=complex)
+    for q, part in enumerate(parts, -rank):
+        reached = np.abs(k + q) <= j_up
+        out[k[reached] + q + j_up, k[reached] + j_low] = part * coupling(j_low, j_up, rank, q, k[reached])
+    return out

@@ -1,0 +1,61 @@
+"""Constants of a top, of its spins and of its further states, from one mapping or from texts.
+
+    {"A": "9.4 GHz", "B": 3100, "C": 2500, "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}
+
+A name with its spins in round brackets belongs to `SpinConstants`, one with states in square brackets alone to `StateConstants`, any other
+to `Constants`; numbers are MHz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.states.state_constants import StateConstants
+from rotor.units import parse_quantity
+
+
+def constants_of_names(values: Mapping[str, float | str], spins: str | None = None) -> tuple[Constants, dict[str, Any]]:
+    """The constants of a mapping, and `spin_constants` and `states` where it has any, as fields of a top.
+
+    spins: how large those are that are not called after isotopes, and which are coupled first, such as "S=1/2".
+
+    >>> own, others = constants_of_names({"A": 9400, "B": 3100, "C": 2500, "chi_aa(14N)": "-4.2 MHz"})
+    >>> own["A"], dict(others["spin_constants"].values)
+    (9400.0, {'chi_aa(14N)': -4.2})
+    """
+    kinds: dict[str, dict[str, float]] = {"": {}, "(": {}, "[": {}}
+    for name, value in values.items():
+        kinds[next((mark for mark in "([" if mark in name), "")][name] = parse_quantity(value, "MHz")
+    others: dict[str, Any] = {}
+    if kinds["("]:
+        others["spin_constants"] = SpinConstants.from_values(kinds["("], spins)
+    if kinds["["]:
+        others["states"] = StateConstants(kinds["["])
+    own: dict[str, Any] = dict(kinds[""])
+    return Constants(**own), others
+
+
+def fields_of_texts(fields: Mapping[str, Any], spins: str | None = None) -> dict[str, Any]:
+    """Fields of a top whose `spin_constants` and `states` may be texts, or mappings by name in MHz.
+
+    >>> fields_of_texts({"spin_constants": "chi_aa(14N)=-4.2 MHz"})["spin_constants"].of("14N")
+    {'chi_aa': -4.2}
+    """
+    found = dict(fields)
+    spin, states = found.get("spin_constants"), found.get("states")
+    if isinstance(spin, str):
+        found["spin_constants"] = SpinConstants.parse(spin, spins)
+    elif isinstance(spin, Mapping):
+        found["spin_constants"] = SpinConstants.from_values(_in_mhz(spin), spins)
+    if isinstance(states, str):
+        found["states"] = StateConstants.parse(states)
+    elif isinstance(states, Mapping):
+        found["states"] = StateConstants(_in_mhz(states))
+    return found
+
+
+def _in_mhz(values: Mapping[str, float | str]) -> dict[str, float]:
+    return {name: parse_quantity(value, "MHz") for name, value in values.items()}
