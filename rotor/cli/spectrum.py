@@ -29,6 +29,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
@@ -110,6 +111,7 @@ def command(
     picture: PlotOptions,
 ) -> None:
     """Rotational lines: frequencies, intensities, and what they were made from."""
+    one_thread_of_blas(options.jmax)
     require_whole("--top", options.top_lines, 0)
     require_whole("--tag", options.tag, 0, 999_999)
     files, shape = Files.of(outputs), _shape(options, layer)

@@ -27,7 +27,7 @@ from rotor.cli.shared.output import (
     sum_progress,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
-from rotor.cli.shared.report import model_facts
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -85,6 +85,9 @@ def command(
     picture: ViewOptions,
 ) -> None:
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
+    from rotor.cli.shared.report import model_facts
+
+    one_thread_of_blas()
     from rotor.thermo.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)

@@ -30,13 +30,17 @@ class Alone(NamedTuple):
 def coupling_alone(scheme: Scheme, channel: Channel, highest_n: int) -> Alone:
     """Bounds of the coefficients of a channel for all F and up to an N.
 
-    Half the sum or the difference of an operator and of that with two equivalent spins exchanged has no larger ones than each of both.
+    Half the sum or difference of an operator and of that with two equivalent spins exchanged has no larger norm than each of both;
+    eigenvalues of half the sum lie between the same two, those of half the difference reach half their distance at most.
     """
     places = sorted({*channel.acting, *([0] if channel.ns else [])})
     acting = tuple(places.index(place) for place in channel.acting)
-    return _alone(
-        tuple(scheme.twice[place] for place in places), channel._replace(acting=acting, exchange=0), highest_n
-    )
+    twice = tuple(scheme.twice[place] for place in places)
+    found = _alone(twice, channel._replace(acting=acting, exchange=0), highest_n)
+    if channel.exchange >= 0:
+        return found
+    half = (found.highest - found.lowest) / 2
+    return Alone(found.norm, -half, half)
 
 
 @lru_cache(maxsize=64)
