@@ -62,7 +62,7 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 |---|---|---|---|---|
 | equal | 490 | 591 | 569 | |
 | refused by name, or the program itself stops | 7 | 25 | 20 | |
-| levels of one block that coincide but for round-off: shares of strength, in two inputs names too | 7 | 12 | 29 | shown for the 12, see below |
+| levels of one block that coincide but for round-off: shares of strength, in a few names too | 7 | 12 | 29 | shown in part, see below |
 | the program's search for a free name takes a sub-block whose first place is taken for full | 1 | 8 | 5 | proved |
 | DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, and leaves a part of the exchanges unset | 2 | 6 | 1 | proved |
 | DIAG 0 where the diagonal stops rising with K ("roll-over"): it lists first-order energies, here are eigenvalues | 0 | 1 | 1 | proved |
@@ -76,7 +76,8 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 | rotational constants that are all 0 | 0 | 0 | 1 | not looked into |
 
 Proved means that the program was compiled again with that one place of its source set right (the search for a free place, the sort by
-⟨K²⟩) or without its list of first-order energies: the 9, 8 and 1 inputs are then equal in every line, each by the one change. Inferred
+⟨K²⟩) or without its list of first-order energies: the 9, 8 and 1 inputs are then equal in every line, each by the one change; of the last 641 five by the
+first and one by the third. Inferred
 means concluded from the parameters that these inputs have and the equal ones do not.
 
 Of the 656 at first 590 were equal and 41 differed. One of the 41 has spins and DIAG 3, where levels of both Wang blocks of one state are
@@ -105,13 +106,14 @@ levels or of more than six quanta, line 2 whose full columns abut, CHR in apostr
 3/2, chi_ab, N to 101; 79,032 lines) has 2,200 lines off between levels that coincide, the program in long double 1,516 and with fused
 multiply-add 1,602; all 34,480 levels are equal.
 
-Fits: 57 more with spins and states, lines made by the program, were given to SPFIT and to `rotor fit`, parameters that the lines do not
-determine held. 46 are equal (constants within 0.02 standard errors, most within 1e-5, errors within 2 %); eight do not converge here, seven of
-them not in SPFIT's 30 iterations either; one has a parameter twice, which is refused; one did not converge in SPFIT; one has an imaginary q.
+Fits: 57 more with spins and states, lines made by the program, were given to SPFIT and to `rotor fit`, parameters that the lines do
+not determine held. 46 are equal (constants within 0.02 standard errors, most within 1e-5, errors within 2 %); eight do not converge
+here, seven of them not in SPFIT's 30 iterations either; one has a parameter twice, which is refused; one did not converge in SPFIT; one
+has an imaginary q.
 
-By name: of 50 inputs 18 are refused, with the reason, by `rotor convert` to TOML (weights that have no name, dipoles and terms that the
-declared symmetry forbids). Of the others the lines predicted from the TOML are those of the .int file, and those written back as .var and .int and
-computed by SPCAT are equal too, but for one whose spin has no constants.
+By name: of 50 inputs 18 are refused, with the reason, by `rotor convert` to TOML (weights that have no name, dipoles and terms that
+the declared symmetry forbids). Of the others the lines predicted from the TOML are those of the .int file, and those written back as
+.var and .int and computed by SPCAT are equal too, but for one whose spin has no constants.
 
 The partition function that the program writes at the end of its .out file was compared for the 22 reference cases and 44 of these
 inputs, at its seven temperatures: it sums the levels from FBGN to FEND that have a weight and no v above MAXV, with hc/k = 1.43878 cm K,
@@ -288,7 +290,9 @@ def option_rows() -> list[str]:
         "| XOPT: PHASE 1 to 7, or odd operators within a state, beside l-doubled states | no: they have phases of their own |"
     )
     rows.append("| DIAG 0 to 5: the names of levels | yes |")
-    rows.append("| DIAG below 0: diagonal elements in place of eigenvalues | no: refused with --as-spcat, else eigenvalues and a note |")
+    rows.append(
+        "| DIAG below 0: diagonal elements in place of eigenvalues | no: refused with --as-spcat, else eigenvalues and a note |"
+    )
     return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 
 
