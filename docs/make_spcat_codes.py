@@ -77,8 +77,8 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 
 Proved means that the program was compiled again with that one place of its source set right (the search for a free place, the sort by
 ⟨K²⟩) or without its list of first-order energies: the 9, 8 and 1 inputs are then equal in every line, each by the one
-change; of the last 641 five by the first and one by the third. Inferred means concluded from the parameters that these inputs have and the equal ones do not.
-
+change; of the last 641 five by the first and one by the third. Inferred means concluded from the parameters that these inputs have and
+the equal ones do not.
 Of the 656 at first 590 were equal and 41 differed. One of the 41 has spins and DIAG 3, where levels of both Wang blocks of one state are
 named together, in another 148 of 2187 names by DIAG 5 depended on the order of equal diagonal elements: both are as in the program now, but
 for four names of the second, which the program in long double gives as here. The 218 inputs with DIAG 2 to 5 were computed again then.
