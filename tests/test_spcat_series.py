@@ -84,7 +84,7 @@ def test_sine_between_states(code, of_k):
     ("options", "code", "says"),
     [
         ("a 1 1 0 20 0 1 1 1 0 1 0 90\n", 100, "XOPT = 90"),
-        ("a 3 1 0 20 0 1 1 1 0 1 0\n", 1_010_010_000, "series with a spin"),
+        ("a 3 1 0 20 0 1 1 1 0 1 0\n", 10_920_000, "a spin with TYP 92"),
         ("a 1 1 0 20 0 1 1 1 0 1 0\n", 1_000_830_000, "one series alone"),
         ("a 1 1 0 20 0 1 1 1 0 1 0\n", 930000, "no constant of a series"),
         ("a 1 1 0 20 0 1 1 1 0 1 0\n", 100_000_000_000, "an energy has no EX"),

@@ -25,7 +25,9 @@ APART = 1500.0
 def _ours(spind: str, oblate: bool, code: int, value: float) -> list[tuple[int, np.ndarray]]:
     rigid = "10099 9400.0 1\n20099 3100.0 1\n30099 2500.0 1\n11 1500.0 1\n"
     option = f"a {spind} {'-' if oblate else ''}2 0 9 0 1 1 1 0 1 0"
-    par = read_par(f"two\n9 1 1 0 0.0 1e6 1.0 1.0\n{option}\n{rigid}200001 30.0 1\n{code} {value} 1\n".encode())
+    par = read_par(
+        f"two\n9 1 1 0 0.0 1e6 1.0 1.0\n{option}\n{rigid}200001 30.0 1\n910000 0.13 1\n910011 0.21 1\n{code} {value} 1\n".encode()
+    )
     asked = read_int(b"two\n0 999 1000.0 0 3 -30 -30 9999.99 300.0\n11 1.0\n")
     (group,) = groups_of(par, asked)
     total = sum(int(size) - 1 for size in spind)
@@ -125,3 +127,12 @@ def _compare(spind: str, oblate: bool, code: int, value: float, slow: np.ndarray
             assert (np.abs(slow - energy) < 1e-8).sum() >= f2 + 1  # 1e-14 of 1e5 MHz times some hundred sums
         moved = max(moved, np.abs(np.sort(energies) - np.sort(without)).max())
     assert moved > 1e-3  # the term counts
+
+
+def test_spin_rotation_times_a_fourier_term():
+    """Half the anticommutator of φ_b and N_b with S, each element from k'' to k' times cos(2π (ρ'k' + ρ''k'')/6)."""
+    of = _factors((1,), (1,))
+    plain = (of[1, "b"] @ of[0, "b"] + of[0, "b"] @ of[1, "b"]) / 2
+    k = np.repeat([s[1] for s in states_up_to(TOP + 1)], 2)
+    cosine = np.cos(2 * np.pi / 6 * (0.13 * k[:, None] + 0.21 * k[None, :]))
+    _compare("2", False, 1_010_020_001, 30.0, _direct((1,), False, plain * cosine, 30.0))

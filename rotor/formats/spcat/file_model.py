@@ -37,7 +37,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.spins.operators import is_axial
+from rotor.quantum.spins.operators import ByElements, is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -422,6 +422,11 @@ def _turned_moments(
 def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
     """A line with the factors that the program has for three equivalent spins."""
     touches = max(line.operator.spins, default=0) > spins - 3
+    if touches and isinstance(line.operator.rotor, ByElements):
+        code = line.name.partition("#")[0]
+        raise ValueError(
+            f"parameter {code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
+        )
     return line._replace(operator=halved_across(line.operator, axes)) if touches else line
 
 

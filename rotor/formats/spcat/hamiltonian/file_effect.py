@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, basis_axes, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
@@ -282,9 +282,9 @@ class FileEffect(QuantumEffect):
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(self._without_forbidden(coupling) for coupling in found)
+        return tuple(self._restricted(coupling) for coupling in found)
 
-    def _without_forbidden(self, coupling: Coupling) -> Coupling:
+    def _restricted(self, coupling: Coupling) -> Coupling:
         """A coupling without elements between levels of unequal weights."""
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
@@ -337,9 +337,9 @@ class FileEffect(QuantumEffect):
                 term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     found += self._at_pairs(line, states, part)
-        return tuple(self._term_apart(term) for term in found)
+        return tuple(self._restricted_term(term) for term in found)
 
-    def _term_apart(self, term: SpinTerm) -> SpinTerm:
+    def _restricted_term(self, term: SpinTerm) -> SpinTerm:
         """The same of a term with spins."""
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
         if pairs is None or not isinstance(rotor, Cosines | CosinesWithN | HalfTurned):
@@ -370,6 +370,11 @@ class FileEffect(QuantumEffect):
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
         if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
             return [term]
+        if isinstance(term.rotor, ByElements):
+            code = line.name.partition("#")[0]
+            raise ValueError(
+                f"parameter {code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
+            )
         try:
             return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
         except ValueError as error:

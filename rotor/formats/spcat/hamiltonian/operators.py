@@ -27,7 +27,13 @@ from functools import lru_cache
 import numpy as np
 
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits
-from rotor.formats.spcat.hamiltonian.spin_operators import factor_below, order_of, shape_of, tensor_with_spins
+from rotor.formats.spcat.hamiltonian.spin_operators import (
+    factor_below,
+    multiplied,
+    order_of,
+    shape_of,
+    tensor_with_spins,
+)
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -52,7 +58,7 @@ TYPES_BETWEEN = {  # of what connects two states without a spin, by name
 PAIRS = {letters: ("abc".index(letters[0]), "abc".index(letters[1])) for letters in sorted(CROSS.values())}
 REFUSED = {
     "commutator": "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)",
-    "own": "the energy of one K with a spin",
+    "own": "a power of N·S of one K",
     "series": "a term of a series without the constants of its file",
     "szsz": "N_z S_z together with another operator",
 }
@@ -86,6 +92,14 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     ns, typ = digits.ns, digits.typ
     if ns > 4:  # N_z S_z of the first spin: with TYP 0 the product of both projections on z
         spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
+    if spins and 80 <= typ < 90:
+        of_each = _with_spins(digits._replace(typ=0, ksq=0), spins, axes)
+        own = 10 * (typ - 80) + digits.ksq
+        assert of_each.rotor is not None
+        one = multiplied(
+            of_each.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == own) & (above == below)), 1.0, False
+        )
+        return replace(of_each, rotor=one)
     if spins or ns:
         return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
     if 80 <= typ < 90:
@@ -109,7 +123,7 @@ def energy_of_k(own: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
 def _refuse(d: Digits) -> None:
     found = {
         "commutator": d.i1 == 0 and d.i2 > 0,
-        "own": 80 <= d.typ < 90 and bool(d.i1 or d.i2 or d.ns),
+        "own": 80 <= d.typ < 90 and bool(d.ns),
         "series": bool(d.ff or d.ex) or d.typ >= 90,
         "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
     }
@@ -184,9 +198,10 @@ def plain_of_j(operators: Operators) -> OperatorOfJ:
 def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
     powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
     if not spins:
-        plain = _plain(d._replace(nsq=0, ksq=0), axes)
         if d.typ >= 12:
-            raise ValueError(f"N·S times an operator outside orthorhombic symmetry {NOT_YET}")
+            found = tensor_with_spins(d.typ, 0, axes)
+            return replace(powered, rotor=found, odd=found.odd)
+        plain = _plain(d._replace(nsq=0, ksq=0), axes)
         return replace(powered, rotor=Scalar(tuple(plain.items())))
     if len(spins) == 2 and d.typ == 0:
         if spins[0] == spins[1]:

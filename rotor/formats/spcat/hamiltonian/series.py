@@ -30,7 +30,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, plain_of_j
-from rotor.formats.spcat.hamiltonian.spin_operators import order_of
+from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, order_of
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -138,10 +138,10 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
     Raises
     ------
     ValueError
-        For a series with a spin, two series at once, and a base that is not known.
+        For two series at once, and a base that is not known.
     """
-    if d.i1 or d.i2 or d.ns:
-        raise ValueError(f"a term of a Fourier or Euler series with a spin {NOT_YET}")
+    if d.typ > 90 and (d.i1 or d.i2):
+        raise ValueError(f"a spin with TYP {d.typ}, which SPCAT passes over: EX with TYP 4 and above has one")
     if 80 <= d.typ < 90 or (d.ff and (d.ex or d.typ >= 90)) or (d.ex and d.typ >= 90):
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
     if d.ff:
@@ -224,13 +224,17 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
         plain = plain._replace(typ=3 + number if number else 0)
     else:
         number, ksq = d.ex - 1, d.ksq
-        extra = d.ex > 1 or d.typ > 0
+        extra = d.ex > 1 or d.typ > 0 or bool(d.i1 or d.ns)
         if not extra and not (d.ksq or d.nsq):
             raise ValueError("EX = 1 with TYP, KSQ and NSQ of 0 is a constant; an energy has no EX")
     if number > 4:
         raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
     base = operator_of(plain, axes)
+    if base.rotor is not None:
+        function = _of_each(a, b, d.nsq, ksq, extra)
+        mean = lambda m, n, above, below: (function(m, above) + function(n, below)) / 2  # noqa: E731
+        return replace(base, rotor=multiplied(base.rotor, mean, 1.0, base.odd))
     if base.of_j is not None:
         return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
     parts = [
@@ -242,14 +246,19 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
 
 def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
     """½(f' + f'') with NSQ, KSQ; over D once more where `extra`."""
-    a, b = constants
+    of_k = _of_each(*constants, n2, k2, extra)
+    return lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+
+
+def _of_each(a: float, b: float, n2: int, k2: int, extra: bool) -> Callable[[int, Floats], Floats]:
+    """f of J and K."""
 
     def of_k(j: int, k: Floats) -> Floats:
         square = j * (j + 1.0) - k**2
         below = 1 + a * k**2 + b * square
         return np.asarray((square / below) ** n2 * (k**2 / below) ** k2 / (below if extra else 1.0))
 
-    return lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+    return of_k
 
 
 def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
@@ -263,9 +272,12 @@ def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
 
 
 def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:
-    of = base.of_j or plain_of_j(base.plain or {})
     own = (1j if axes[2] == "a" else -1j) if sine else 1.0
     whole = 1.0 / own if base.odd else own
+    if base.rotor is not None:
+        alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
+        return replace(base, rotor=alike, odd=base.odd != sine)
+    of = base.of_j or plain_of_j(base.plain or {})
     return replace(base, plain=None, of_j=_by_elements(of, factor, whole), odd=base.odd != sine)
 
 
