@@ -62,7 +62,7 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 |---|---|---|---|---|
 | equal | 490 | 596 | 569 | |
 | refused by name, or the program itself stops | 7 | 25 | 20 | |
-| levels of one block that coincide but for round-off: shares of strength, in two inputs names too | 7 | 12 | 29 | shown for the 12, see below |
+| levels of one block that coincide but for round-off: shares of strength, in a few names too | 7 | 12 | 29 | shown in part, see below |
 | the program's search for a free name takes a sub-block whose first place is taken for full | 1 | 8 | 5 | proved |
 | DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, and leaves a part of the exchanges unset | 2 | 6 | 1 | proved |
 | DIAG 0 where the diagonal stops rising with K ("roll-over"): it lists first-order energies, here are eigenvalues | 0 | 1 | 1 | proved |
