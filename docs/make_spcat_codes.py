@@ -60,7 +60,7 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 
 | inputs | first 538 | later 656 | cause |
 |---|---|---|---|
-| equal | 490 | 591 | |
+| equal | 490 | 596 | |
 | refused by name | 7 | 25 | |
 | levels of one block that coincide but for round-off: shares of strength, in two inputs names too | 7 | 12 | shown for the 12, see below |
 | the program's search for a free name takes a sub-block whose first place is taken for full | 1 | 8 | proved |
@@ -70,8 +70,8 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 | [N², φ] (TYP 5) where its phase decides: the program computes φ without N' (N' + 1) - N (N + 1) | 5 | 3 | inferred |
 | degenerate states of IAX 7 with odd l: the program exchanges the weights of A and B species | 1 | 0 | inferred |
 | three equivalent nuclei: 8 with spins of 3/2, others of levels that coincide or are forbidden | 25 | 0 | in part, see below |
-| TYP 21 and 4 (with Δk = Δl = 2 both) between the states of one l-doubled pair, an imaginary q | 0 | 7 | inferred |
-| an operator that joins states of which some weights agree and others do not | 0 | 2 | inferred |
+| TYP 21 within one l-doubled pair where it mixes A1 and A2: names and shares; energies are equal | 0 | 3 | inferred |
+| an operator that joins states of which some weights agree and others do not, see below | 0 | 1 | inferred |
 
 Proved means that the program was compiled again with that one place of its source set right (the search for a free place, the sort by
 ⟨K²⟩) or without its list of first-order energies: the 9, 8 and 1 inputs are then equal in every line, each by the one change. Inferred
@@ -174,7 +174,9 @@ of a file fit some. SPCAT settles the phases along axes that no parameter concer
 in SPFIT, none is odd there. This can change operators between states.
 
 An operator that the declared symmetry forbids (Δk - Δl no multiple of the fold of the axis, levels of unequal weights, axes that differ) is
-left out, as the program does, with a note. Dipoles between states have the phase i where no state has a dipole of its own. In an
+left out, as the program does, with a note. So are, without one, its elements between Wang blocks whose levels have unlike weights,
+where other elements of it act: l-doubling of TYP 21 where A1 and A2 have unlike weights, states of which some weights agree (five
+of the later inputs differed before). Dipoles between states have the phase i where no state has a dipole of its own. In an
 oblate basis operators that time reversal turns around have the factor -i.
 """
 DIPOLES = """

@@ -133,7 +133,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("one.csv", "--constants", "B=57000 D=0.1 MHz", "--free", "B,D"), "one.csv: 2 free constants for 1 measured"),
         (("bad.csv", "--constants", "B=57000 MHz", "--free", "B"), "line 1 of the table: there is no level -1"),
         (("same.csv", *BD), "line 1, 1 - 1 at 0.0000 MHz: upper and lower state are one level"),
-        (("long.csv", *BD), "line 1 of the table: 1 values more"),
+        (("long.csv", *BD), "line 1 of the table: 1 value more"),
         (("negative.csv", *BD), "line 1 of the table: error_mhz = -0.1"),
         (
             ("water.csv", "--constants", "A=9 B=5 C=4 GHz", "--free", "B"),

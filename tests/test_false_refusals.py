@@ -113,7 +113,7 @@ def test_a_fit_says_which_defaults_it_took(call):
         + f"  1   {'':30} {2 * 6081.492:.4f}\n"
     )
     _, out, err = call("fit", "fit.par")
-    assert "1 lines lack quantum numbers or an error" in out + err
+    assert "1 line lacks quantum numbers or an error" in out + err
 
 
 def test_lists_of_lines_and_levels_are_read_by_their_suffix(tmp_path):

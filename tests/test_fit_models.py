@@ -201,14 +201,14 @@ def test_lines_that_nothing_parts_are_named():
     last = assignments(("j",), [[1], [2], [3], [4]], [[0], [1], [2], [3]], [200.0, 300.0, 100.0, 100.0], 0.1)
     assert not note_of_lin(last)  # nothing stands behind them that parts them, but before
     assert as_lin(last).frequency.tolist() == [100.0, 200.0, 300.0, 100.0]
-    assert note_of_lin(seen.take(np.array([0, 1])))[0].startswith("1 lines of the same frequency as the line before")
+    assert note_of_lin(seen.take(np.array([0, 1])))[0].startswith("1 line of the same frequency as the line before")
 
 
 def test_the_command_line_says_so(call, folder):
     (folder / "x.csv").write_text("j_upper,j_lower,frequency_mhz,error_mhz\n1,0,100,0.1\n1,0,100,0.1\n")
     code, _, err = call("fit", "x.csv", "--constants", "B=50 MHz", "--free", "B", "--save-lines", "x.lin")
     assert code == 0, err
-    assert "1 lines of the same frequency as the line before them are a blend with it in a .lin file" in err
+    assert "1 line of the same frequency as the line before it is a blend with it in a .lin file" in err
 
 
 # The examples of --help

@@ -187,3 +187,32 @@ def test_sines_of_internal_rotation():
     whole = _rigid(of) + np.diag(c * np.sin(2 * np.pi / 3 * rho * k))
     found = _energies(_file((*ABC, (910099, rho), (11_000_000_099, c))), j)
     assert found == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
+
+
+def test_weights_forbid_elements():
+    """Two states of weights 5, 3 and 3, 3 by the parity of Ka: i g Nb joins levels of weight 3 alone, of the first state Ka odd."""
+    j, g, energy = 5, 90.0, 300.0
+    lines = "".join(f"{code} {value!r} 0\n" for code, value in (*ABC, (11, energy), (400001, g)))
+    options = "a 1 2 0 40 0 1 5 3 -1 1 0\na 1 1 0 40 0 1 3 3 0 1 0\n"
+    file = read_par(f"a case\n 5 1 1 0 0 1e6 1 1\n{options}{lines}".encode())
+    of, size = momenta(j, "a"), 2 * j + 1
+    odd = np.diag((np.arange(-j, j + 1) % 2).astype(float))
+    between = 1j * g * odd @ of["b"]
+    whole = np.block([[_rigid(of), between], [between.conj().T, _rigid(of) + energy * np.eye(size)]])
+    assert _energies(file, j) == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
+
+
+@pytest.mark.parametrize(("weights", "acts"), [("1 1", True), ("5 3", False)])
+def test_imaginary_l_doubling(weights, acts):
+    """{Nb, Nc} with Δk = Δl = 2 is l-doubling with another phase of l: by itself it acts as N₊² + N₋² of half its size, where levels A1
+    and A2 may mix, and with unlike weights of these not at all."""
+    own = ((1099, 148900.0), (199, 9198.9), (200000, -277854.0))
+
+    def energies(*more):
+        lines = "".join(f"{code} {value!r} 0\n" for code, value in (*own, *more))
+        options = f"s -1 2 0 30 0 6 {weights} -1 101 0\ns -1 1 0 30 0 6 {weights} 0 201 0\n"
+        return _energies(read_par(f"a case\n {3 + len(more)} 1 1 0 0 1e6 1 1\n{options}{lines}".encode()), 5)
+
+    found, none, real = energies((210001, 40.0)), energies(), energies((40001, 20.0))
+    assert np.abs(real - none).max() > 1.0
+    assert found == pytest.approx(real if acts else none, abs=ROUND_OFF_MHZ)

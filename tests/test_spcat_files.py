@@ -205,7 +205,7 @@ def test_a_new_intensity_file_reads_back(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (b"title\n", "1 lines"),
+        (b"title\n", "1 line;"),
         (b"t\n0 1 x\n", r"line 2, column 5: 'x' is no number"),
         (b"t\n0 1.5\n", "TAG = 1.5: expected a whole number"),
         (b"t\n0 1\n1\n", r"line 3, column 2: the dipole's value is missing"),

@@ -14,6 +14,7 @@ import numpy as np
 
 from rotor.fit.assignment import Assignments
 from rotor.formats.spcat.text.lin import LineList, line_list
+from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
 
@@ -55,9 +56,10 @@ def note_of_lin(lines: Assignments) -> list[str]:
     pairs = _meetings(_in_order(lines))
     if not pairs:
         return []
+    them = "it is" if pairs == 1 else "them are"
     return [
-        f"{pairs} lines of the same frequency as the line before them are a blend with it in a .lin file, for want of others to put "
-        "between them; a .csv file has them apart"
+        f"{counted(pairs, 'line')} of the same frequency as the line before {them} a blend with it in a .lin file, for want of "
+        "others to put between them; a .csv file has them apart"
     ]
 
 

@@ -199,7 +199,9 @@ def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
     """ValueError for a row with more values than columns."""
     for i, row in enumerate(rows, 1):
         if None in row:
-            raise ValueError(f"{path}, line {i} of the table: {len(row[None])} values more than there are columns")
+            raise ValueError(
+                f"{path}, line {i} of the table: {counted(len(row[None]), 'value')} more than there are columns"
+            )
 
 
 def _refuse_columns(

@@ -282,9 +282,9 @@ class FileEffect(QuantumEffect):
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(self._without_forbidden(coupling) for coupling in found)
+        return tuple(self._restricted(coupling) for coupling in found)
 
-    def _without_forbidden(self, coupling: Coupling) -> Coupling:
+    def _restricted(self, coupling: Coupling) -> Coupling:
         """A coupling without elements between levels of unequal weights."""
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
@@ -337,9 +337,9 @@ class FileEffect(QuantumEffect):
                 term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     found += self._at_pairs(line, states, part)
-        return tuple(self._term_apart(term) for term in found)
+        return tuple(self._restricted_term(term) for term in found)
 
-    def _term_apart(self, term: SpinTerm) -> SpinTerm:
+    def _restricted_term(self, term: SpinTerm) -> SpinTerm:
         """The same of a term with spins."""
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
         if pairs is None or not isinstance(rotor, ByElements | Cosines | CosinesWithN | HalfTurned):

@@ -9,6 +9,7 @@ from typing import Any
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
+from rotor.table import counted
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
     if len(lines) < 2:
         name = lines[0].file if lines else name_of(source)
         raise ValueError(
-            f"{name}: {len(lines)} lines; expected a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles"
+            f"{name}: {counted(len(lines), 'line')}; expected a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles"
         )
     end = next((i for i, line in enumerate(lines) if i >= 2 and line.blank), len(lines))
     dipoles = tuple(_dipole(line) for line in lines[2:end])

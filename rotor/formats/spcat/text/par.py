@@ -11,6 +11,7 @@ from typing import Any
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
+from rotor.table import counted
 
 _LETTER = re.compile(r"[ \t]*(?:'([A-Za-z])'|([A-Za-z])?)")  # some write it in apostrophes
 _DIGIT = re.compile(r"[0-9]")
@@ -119,7 +120,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     lines = read_lines(source)
     if len(lines) < 3:
         name = lines[0].file if lines else name_of(source)
-        raise ValueError(f"{name}: {len(lines)} lines; expected a title, limits, options and parameters")
+        raise ValueError(f"{name}: {counted(len(lines), 'line')}; expected a title, limits, options and parameters")
     header = _header(lines[1])
     options = [_options(lines[2])]
     while options[-1].vsym < 0:
