@@ -64,7 +64,7 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 | refused by name, or the program itself stops | 7 | 25 | 20 | |
 | levels of one block that coincide but for round-off: shares of strength, in a few names too | 7 | 12 | 29 | shown in part, see below |
 | the program's search for a free name takes a sub-block whose first place is taken for full | 1 | 8 | 5 | proved |
-| DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, and leaves a part of the exchanges unset | 2 | 6 | 1 | proved |
+| DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, and leaves a part of the exchanges unset | 2 | 6 | 1 | proved, the last inferred |
 | DIAG 0 where the diagonal stops rising with K ("roll-over"): it lists first-order energies, here are eigenvalues | 0 | 1 | 1 | proved |
 | DIAG 3 with l-doubled states: names by the largest share here | 0 | 1 | 2 | inferred |
 | [N², φ] (TYP 5) where its phase decides: the program computes φ without N' (N' + 1) - N (N + 1) | 5 | 3 | 0 | inferred |
@@ -106,14 +106,16 @@ levels or of more than six quanta, line 2 whose full columns abut, CHR in apostr
 3/2, chi_ab, N to 101; 79,032 lines) has 2,200 lines off between levels that coincide, the program in long double 1,516 and with fused
 multiply-add 1,602; all 34,480 levels are equal.
 
-Fits: 57 more with spins and states, lines made by the program, were given to SPFIT and to `rotor fit`, parameters that the lines do
-not determine held. 46 are equal (constants within 0.02 standard errors, most within 1e-5, errors within 2 %); eight do not converge
-here, seven of them not in SPFIT's 30 iterations either; one has a parameter twice, which is refused; one did not converge in SPFIT; one
-has an imaginary q.
+Fits: 56 made inputs with spins and states, lines made by the program, were given to SPFIT and to `rotor fit`. With about 80 % of the
+parameters free 26 were equal, 19 differed and 11 were refused or did not converge; many of these had parameters that the lines do not
+determine. With what is called undetermined here held in both, and up to 100 iterations here (30 in SPFIT), 46 are equal (constants within
+0.02 standard errors, most within 1e-5, errors within 2 %), eight do not converge here (seven of them end SPFIT at its 30 iterations as
+well), one has a parameter twice, which is refused, and the rest differ: one did not converge in SPFIT, one has an imaginary q.
 
 By name: of 50 inputs 18 are refused, with the reason, by `rotor convert` to TOML (weights that have no name, dipoles and terms that
-the declared symmetry forbids). Of the others the lines predicted from the TOML are those of the .int file, and those written back as
-.var and .int and computed by SPCAT are equal too, but for one whose spin has no constants.
+the declared symmetry forbids). For most of the others the lines predicted from the TOML are those of the .int file, and about 20 written
+back as .var and .int give SPCAT the same lines; the rest differ in a few lines near the cut or of one frequency, one has a spin without
+constants, one another Q.
 
 The partition function that the program writes at the end of its .out file was compared for the 22 reference cases and 44 of these
 inputs, at its seven temperatures: it sums the levels from FBGN to FEND that have a weight and no v above MAXV, with hc/k = 1.43878 cm K,
@@ -130,8 +132,9 @@ titles, blank lines, other counts, commas, comments, text at the end): 129 were 
 title or a QROT below 1 (read here), a parameter without a value (where the program ends its list without a word) or of a state that
 does not exist: both are refused.
 
-Moments of every TYP and SYM were compared on 300 more inputs of one and two states in both bases, alone and beside dipoles, with and
-without spins. All are equal but those that the program computes in another way, which is not repeated here: commutators (TYP 5 and 11)
+Moments of every TYP and SYM were compared on some 300 runs (inputs were not counted once each) of one and two states in both bases, alone and beside dipoles, with and
+without spins. All are equal but TYP 7 with n = 0 and a ρ of the other sign, TYP 1, 2 and 5 beside a dipole of the same state with
+`--as-spcat` (in one input 60 of 324 strengths), and those that the program computes in another way, which is not repeated here: commutators (TYP 5 and 11)
 with the sign of the elements of falling K turned (its function dircos turns the sign of what follows the first kind of elements by the
 parity of the operator, which a commutator changes), and without the N that they give where no state has a dipole of its own; TYP 3, 5, 9,
 10 and 11 of molecules with spins with J or the first F in place of N; electric and magnetic moments of one line, which it adds in
@@ -153,7 +156,7 @@ other total. With that step set right the energies of CHCl3-like levels with F =
 levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
 Spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where they are odd), of one K, with powers of
-N·S, and times Fourier and Euler terms, were compared on 170 inputs in both bases. All are equal but for shares of levels that
+N·S, and times Fourier and Euler terms, were compared on some 150 inputs in both bases. All are equal but for shares of levels that
 nearly coincide. TYP 20, 40, 60 with two spins are I1·I2 times Na, Nb, Nc, as the program has them.
 TYP 12 to 19 were half of the program's before.
 
