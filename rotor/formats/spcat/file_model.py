@@ -458,6 +458,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     if (
         alone
         and states[0].linear
+        and not oblate  # there its axis is not z
         and all(q == n == 0 for _, q, n in plain)
         and not any(line.operator.of_j for line in lines)
     ):
