@@ -98,7 +98,7 @@ SPINS = [
     ("HCONH2", "chi_aa(14N)=1.9598 chi_bb-cc(14N)=5.7358 MHz", "nuclear quadrupole"),
     ("HCN", "chi_aa(14N)=-4.7 MHz", "nuclear quadrupole"),
     ("CH3Cl", "chi_aa(35Cl)=-74.7 MHz", "nuclear quadrupole"),
-    ("HCN", "C_bb(14N)=10 kHz", "spin-rotation"),
+    ("HCN", "C_iso(14N)=10 kHz", "spin-rotation"),
 ]  # sizes of these molecules, rounded
 
 
