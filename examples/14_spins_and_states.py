@@ -4,8 +4,8 @@
 # A nucleus of spin 1 or more splits every rotational line; a second state, of tunnelling or of vibration, brings lines of its own
 # and pushes the levels of the first. Five sections: Casimir's formula for HCN; measured components of formamide and vinyl
 # cyanide; what the cheaper methods leave out; ammonia's inversion and an avoided crossing; sum rules. Every claim is asserted.
-# Names of constants and options: [spins_and_states.md](../docs/spins_and_states.md); all molecules that were compared:
-# [measured_lines.md](../docs/measured_lines.md).
+# Names of constants and options: `docs/spins_and_states.md`; all molecules that were compared:
+# `docs/measured_lines.md`.
 
 # %%
 from dataclasses import replace
