@@ -4,8 +4,8 @@
 # A nucleus of spin 1 or more splits every rotational line; a second state, of tunnelling or of vibration, brings lines of its own
 # and pushes the levels of the first. Five sections: Casimir's formula for HCN; measured components of formamide and vinyl
 # cyanide; what the cheaper methods leave out; ammonia's inversion and an avoided crossing; sum rules. Every claim is asserted.
-# Names of constants and options: [spins_and_states.md](../docs/spins_and_states.md); all molecules that were compared:
-# [measured_lines.md](../docs/measured_lines.md).
+# Names of constants and options: `docs/spins_and_states.md`; all molecules that were compared:
+# `docs/measured_lines.md`.
 
 # %%
 from dataclasses import replace
@@ -118,7 +118,7 @@ assert abs(sum(share * shift for _, _, shift, _, _, share in rows)) < 1e-4  # th
 # %% [markdown]
 # ## Measured components: formamide 1₁₀ - 1₁₁ and vinyl cyanide 2₁₁ - 2₁₂
 #
-# Here nothing comes from the lines that are compared: χ of ¹⁴N is of other measurements, the centre of the constants in
+# No constant was fitted here to the lines that are compared: χ of ¹⁴N is as published, and the centre comes from the constants in
 # `data/molecules`. The frequencies are those of a list of rest frequencies for a radio telescope (sdhdfProc, G. Hobbs, 2019, 2020),
 # which gives neither errors nor F: two of its last digit, 2 kHz, are taken for the error, and each frequency has the F of the only
 # computed component within 20 kHz (`tests/oracles/hyperfine/README.md`).
@@ -312,6 +312,8 @@ for k, color in ((0, "tab:gray"), (1, "tab:blue"), (3, "tab:orange")):
     right.plot(js[:-1], lower, "o-", ms=3, lw=1, color=color, label=f"K = {k}")
 left.set(xlabel="J", ylabel="E - (E₀ + E₁)/2, MHz", title="Two states that meet near J = 15 (dotted: not coupled)")
 left.set_ylim(-500, 500)
+for axes in (left, right):
+    axes.set_xticks(range(6, highest + 1, 3))
 left.legend(frameon=False)
 right.set(xlabel="J", ylabel="ν(J + 1 - J) / 2(J + 1), MHz", title="Lines of the lower levels")
 right.ticklabel_format(useOffset=False)
