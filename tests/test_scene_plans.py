@@ -181,3 +181,11 @@ def test_the_command(call):
 def test_nothing_is_written_by_a_plan(call, folder):
     call("plan", str(FOLDER / "tennis_racket.toml"))
     assert not list(folder.iterdir())
+
+
+def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
+    top = rotor.read("HCN")
+    said = {one.name: one.basis for one in left_out.of_levels(top, 8, SEMI_RIGID)}
+    assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
+    with_spins = left_out.of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
+    assert not any("effects.hyperfine" in one.basis for one in with_spins)
