@@ -213,6 +213,8 @@ def test_packed_members_one_after_another_are_one_file(tmp_path):
         ({"n": 3, "ka": 1, "kc": 2, "f": 7}, ("f",), [3, 1, 2, 4], 314),  # F = 7/2, rounded up
         ({"n": 3, "ka": 1, "kc": 2, "f1": 7, "f": 4}, ("f1", "f"), [3, 1, 2, 4, 2], 325),
         ({"v": 2, "n": 3, "ka": 1, "kc": 2, "f": 6}, ("f",), [3, 1, 2, 2, 3], 1405),
+        ({"n": 3, "ka": 2, "kc": 1, "j": 5, "f": 7}, ("j", "f"), [3, 2, 1, 3, 4], 335),  # J = N + S, as SPCAT prints it
+        ({"n": 3, "j": 5}, ("j",), [3, 3], 112),
     ],
 )
 def test_quantum_numbers_as_a_catalogue_has_them(quanta, halves, printed, code):

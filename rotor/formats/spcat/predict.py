@@ -176,16 +176,22 @@ def predict(
 def _named_top(parameters: ParameterFile, intensities: IntensityFile) -> Top | None:
     """The top by the names of its constants, None where it has to be solved by the codes of the file.
 
-    That is so for spins, states and other operators, for constants that do not follow A >= B >= C, and where the sign of SPIND asks for
-    quantum numbers of the other kind: N and K of an asymmetric top, N, Ka and Kc of a symmetric or linear one.
+    That is so for spins, states and other operators, for constants that do not follow A >= B >= C, for a spherical top with a dipole,
+    and where the sign of SPIND asks for quantum numbers of the other kind: N and K of an asymmetric top, N, Ka and Kc of a symmetric
+    or linear one.
     """
-    if not is_plain(parameters, intensities):
+    first = parameters.options[0]
+    if not is_plain(parameters, intensities) or (is_linear(first) and first.nvib < 0):  # whose axis is not z
         return None
     try:
         top = top_of(parameters, intensities)
     except ValueError:  # without names; what no file may have is refused there too
         return None
-    return top if (top.kind in ("asymmetric", "spherical")) == (parameters.options[0].spind > 0) else None
+    if top.kind == "spherical" and any(
+        dipole.value for dipole in intensities.dipoles
+    ):  # which a top of that symmetry has none of
+        return None
+    return top if (top.kind in ("asymmetric", "spherical")) == (first.spind > 0) else None
 
 
 def summed_q(top: Top, options: Options, temperature_k: float) -> PartitionFunction:

@@ -342,7 +342,7 @@ class FileEffect(QuantumEffect):
     def _restricted_term(self, term: SpinTerm) -> SpinTerm:
         """The same of a term with spins."""
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
-        if pairs is None or not isinstance(rotor, Cosines | CosinesWithN | HalfTurned):
+        if pairs is None or not isinstance(rotor, ByElements | Cosines | CosinesWithN | HalfTurned):
             return term
         representation = "IIIl" if self.axes[2] == "c" else "Ir"
         blocks = wang_blocks(_LOOKED_AT, representation)
