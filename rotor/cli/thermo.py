@@ -85,9 +85,8 @@ def command(
     picture: ViewOptions,
 ) -> None:
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
-    from rotor.cli.shared.report import model_facts
-
     one_thread_of_blas()
+    from rotor.cli.shared.report import model_facts
     from rotor.thermo.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)
