@@ -92,7 +92,7 @@ def _casimir(f: int) -> float:
 def test_strengths_and_q_of_a_pattern_add_up_to_the_line_without_spins():
     with_spins = line_list(NITRILE, jmax=3, temperature_k=30.0, effects=effects_of(NITRILE, True), min_lgint=None)
     plain = line_list(NITRILE, jmax=3, temperature_k=30.0, min_lgint=None)
-    assert with_spins.q == pytest.approx(3 * plain.q, rel=1e-12)
+    assert with_spins.q == pytest.approx(3 * plain.q, rel=1e-9)  # second order: J = 0 is 5e-4 MHz lower
     n = with_spins.levels.quanta["n"]
     allowed = np.abs(n[with_spins.upper] - n[with_spins.lower]) == 1
     for row in range(len(plain)):

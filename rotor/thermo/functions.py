@@ -269,9 +269,10 @@ def _rotation(
     shares = np.array(list(fractions.values()) or [1.0])
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 
-    means = np.array([one.mean for one in parts.values()])
+    limit = classical_limit(top, next(iter(parts.values())) if len(parts) == 1 else None)
+    means = np.array([classical_limit(top, one).mean_weight for one in parts.values()])
     mean_weight = float(np.exp(shares @ np.log(means / shares)))
-    limit = replace(classical_limit(top), mean_weight=mean_weight * spin_functions(top, effects))
+    limit = replace(limit, mean_weight=mean_weight * spin_functions(top, effects))
     of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
     corrected_q, _, corrected_cv = limit.corrected(temperatures)
     symmetry_number = top.symmetry.symmetry_number if top.symmetry else implied_symmetry_number(top.spin_weights)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import populated_j
+from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo.level_sums import LevelSums, Progress, level_sums, lowest_level_k
 from rotor.thermo.spin_factor import without_spins
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -47,6 +49,9 @@ def spin_sums(
     relative_error: float,
     effects: Sequence[QuantumEffect],
     progress: Progress | None = None,
+    *,
+    energies: bool = True,
+    refuse: bool = True,
 ) -> SpinSums:
     """Q, U/RT and C_v/R of levels with spins for each of several sets of spin weights.
 
@@ -61,6 +66,8 @@ def spin_sums(
     effects : sequence of QuantumEffect
         What the Hamiltonian consists of, spins among it.
     progress : callable, optional
+    energies : bool
+    refuse : bool
         As in `level_sums`.
 
     Returns
@@ -74,20 +81,45 @@ def spin_sums(
     """
     spinless, functions = without_spins(top, effects)
     size = splitting_mhz(top, effects, float(temperatures_k.max()))
-    settings = {"progress": progress, "effects": effects}
+    plainly: dict[str, Any] = {"progress": progress, "energies": energies, "refuse": refuse}
+    settings = plainly | {"effects": effects}
     if functions == 1:
-        found = level_sums(top, weights, temperatures_k, relative_error, **settings)  # type: ignore[arg-type]
+        found = level_sums(top, weights, temperatures_k, relative_error, **settings)
         return SpinSums(found, size, np.ones(len(temperatures_k), dtype=np.bool_))
-    rotation = level_sums(top, weights, temperatures_k, relative_error, progress=progress, effects=spinless)
-    ground = lowest_level_k(top, weights, effects)
+    rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
+    ground = _lowest_split_k(top, weights, rotation, effects, size)
     product = [times_functions(one, functions, lowest, size) for one, lowest in zip(rotation, ground, strict=True)]
     split = np.any(
-        [_worst(one) > _worst(plain) + relative_error for one, plain in zip(product, rotation, strict=True)], axis=0
+        [
+            _worst(one, energies) > _worst(plain, energies) + relative_error
+            for one, plain in zip(product, rotation, strict=True)
+        ],
+        axis=0,
     )
     if not split.any():
         return SpinSums(product, size, split)
-    summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)  # type: ignore[arg-type]
+    summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)
     return SpinSums([_placed(one, split, own) for one, own in zip(product, summed, strict=True)], size, split)
+
+
+def _lowest_split_k(
+    top: Top,
+    weights: Sequence[SpinWeights],
+    rotation: list[LevelSums],
+    effects: Sequence[QuantumEffect],
+    size_mhz: float,
+) -> list[float]:
+    """E/k of the lowest split level by each set of weights.
+
+    Where no J above 1 has rigid levels within twice the size of the couplings of the ground level, J = 0 and 1 have it.
+    """
+    ground_k = max(one.ground_k for one in rotation)
+    second = 6 * min(top.rotational_constants_mhz)  # the rigid levels of J = 2 are above it
+    if top.states is not None or len(weights) > 1 or second < ground_k * units.MHZ_PER_K + 2 * size_mhz:
+        return lowest_level_k(top, weights, effects)
+    levels = solve_levels(top, 1, effects=tuple(effects), vectors=False)
+    exists = weights_of_levels(levels, weights[0]) > 0
+    return [float(levels.energy_mhz[exists].min()) / units.MHZ_PER_K]
 
 
 def splitting_mhz(top: Top, effects: Sequence[QuantumEffect], temperature_k: float) -> float:
@@ -137,8 +169,9 @@ def _over(x2: Floats, value: Floats) -> Floats:
     return np.asarray(np.divide(x2, value, out=np.zeros_like(x2), where=x2 > 0))
 
 
-def _worst(sums: LevelSums) -> Floats:
-    return np.asarray(np.max([sums.error_q, sums.error_energy, sums.error_cv], axis=0))
+def _worst(sums: LevelSums, energies: bool) -> Floats:
+    errors = [sums.error_q, sums.error_energy, sums.error_cv]
+    return np.asarray(np.max(errors if energies else errors[:1], axis=0))
 
 
 def _placed(whole: LevelSums, where: NDArray[np.bool_], some: LevelSums) -> LevelSums:

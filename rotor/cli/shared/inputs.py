@@ -68,7 +68,7 @@ class Input:
         None, metavar="TEXT", help='Dipoles in and between states, axes a, b, c: "[1] 0,0,1.3 [0,1] 0,0,1.47" (D).'
     )
     state_weights: str | None = option(
-        None, metavar="TEXT", help='Spin weights of states: "[0] even=1,odd=3 [1] even=3,odd=1"; none: all alike.'
+        None, metavar="TEXT", help='Spin weights of states: "[0] even=1,odd=3 [1] none"; none: all its levels alike.'
     )
     state_symmetry: str | None = option(
         None, metavar="GROUP", help="Group of the states, whose couplings are checked by it: C2v, Cs(ab), C2(c), ..."

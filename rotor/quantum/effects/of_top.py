@@ -97,11 +97,29 @@ def _refuse_across_a_line(top: Top) -> None:
                 )
 
 
+def _refuse_weights_of_the_geometry(top: Top) -> None:
+    """ValueError where the spin weights beside a total spin of two nuclei are those of all nuclei of the geometry, these two among them."""
+    from rotor.tops.spins.spin_statistics import weights_of
+
+    assert top.spin_constants is not None
+    weights = top.spin_weights
+    if weights.rule == "none" or top.molecule is None or weights != weights_of(top.molecule):
+        return
+    first = next(iter(top.spin_constants.totals))
+    spin = top.spin_constants.twice[first]
+    remedy = "1 and 0 in place of 1 and 3 of two protons"
+    raise ValueError(
+        f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
+        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone, of levels of even total spin, such as {remedy}"
+    )
+
+
 def _refuse_like_nuclei(top: Top) -> None:
     """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
     if len(top.spin_constants.totals) == 2:
+        _refuse_weights_of_the_geometry(top)
         top.spin_weights.exchanged()  # raises where an exchange of two nuclei does not tell the classes apart
         labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]

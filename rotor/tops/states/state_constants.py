@@ -171,7 +171,7 @@ class StateConstants:
             if kind != other:
                 raise ValueError(
                     f"{first} and {name}: two states of a molecule of {group} have one of them or the other; G about two axes and "
-                    "W exist together in C1 only"
+                    "W exist together in C1 and Ci only"
                 )
 
     @classmethod
