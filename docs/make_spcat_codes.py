@@ -155,6 +155,9 @@ and more elements between unequal totals are wrong in the program: a loop of its
 other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to
 levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
+With I_tot of two nuclei and two connected states of which some weights agree and others do not (WTPL, WTMN 3, 5 and 3, 7), SPCAT leaves
+out the elements between levels of unequal weights. Here they are there. Weights by exchange of one set of nuclei are equal or exchanged in two states; with those both agree.
+
 Spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where they are odd), of one K, with powers of
 N·S, and times Fourier and Euler terms, were compared on some 150 inputs in both bases. All are equal but for shares of levels that
 nearly coincide. TYP 20, 40, 60 with two spins are I1·I2 times Na, Nb, Nc, as the program has them.
@@ -283,6 +286,7 @@ def option_rows() -> list[str]:
     """Options that change the basis, the weights or the labels."""
     cases = [
         ("SPIND: up to nine spins, two digits each with a last 0", "a 3520 1 0 20 0 1 1 1 0 1 0"),
+        ("SPIND: a digit 1 before others, a spin of size 0", "a 161 1 0 20 0 1 1 1 0 1 0"),
         ("NVIB: states, each with an option line of its own where VSYM < 0", "a 1 3 0 20 0 1 1 1 0 1 0"),
         ("KNMIN, KNMAX; above KNMAX K is left out with --as-spcat alone", "a 1 1 1 1 0 1 1 1 0 1 0"),
         *((f"IAX {n}", f"a 1 1 0 20 0 {n} 1 1 0 1 0") for n in range(1, 12)),
