@@ -64,7 +64,7 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 | refused by name, or the program itself stops | 7 | 25 | 20 | |
 | levels of one block that coincide but for round-off: shares of strength, in a few names too | 7 | 12 | 29 | shown in part, see below |
 | the program's search for a free name takes a sub-block whose first place is taken for full | 1 | 8 | 5 | proved |
-| DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, some exchanges unset | 2 | 6 | 1 | proved, the last inferred |
+| DIAG 4: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩, leaving some unset | 2 | 6 | 1 | proved, last inferred |
 | DIAG 0 where the diagonal stops rising with K ("roll-over"): it lists first-order energies, here are eigenvalues | 0 | 1 | 1 | proved |
 | DIAG 3 with l-doubled states: names by the largest share here | 0 | 1 | 2 | inferred |
 | [N², φ] (TYP 5) where its phase decides: the program computes φ without N' (N' + 1) - N (N + 1) | 5 | 3 | 0 | inferred |
@@ -132,16 +132,15 @@ titles, blank lines, other counts, commas, comments, text at the end): 129 were 
 title or a QROT below 1 (read here), a parameter without a value (where the program ends its list without a word) or of a state that
 does not exist: both are refused.
 
-Moments of every TYP and SYM were compared on about 300 runs of one and two states in both bases, alone and beside dipoles, with and
-without spins. All are equal but TYP 7 with n = 0 and a ρ of the other sign, TYP 1, 2 and 5 beside a dipole of the same state with
-`--as-spcat` (in one input 60 of 324 strengths), and those that the program computes in another way, which is not repeated here:
-commutators (TYP 5 and 11) with the sign of the elements of falling K turned (its
-function dircos turns the sign of what follows the first kind of elements by the
-parity of the operator, which a commutator changes), and without the N that they give where no state has a dipole of its own; TYP 3, 5, 9,
-10 and 11 of molecules with spins with J or the first F in place of N; electric and magnetic moments of one line, which it adds in
-amplitude. A test writes each moment out in a direct product. With `--as-spcat` moments of N (below) and of TYP 1 and 2 of a spin are the
-program's, S ½(3 Nz² - N²) and S (Ny² - Nx²) in place of the documented tensors, SYM 0 with TYP 10 and 11 has no elements, and moments that
-time reversal would turn in one state are computed as they stand.
+Moments of every TYP and SYM were compared in some 300 runs (some of one input again) of one and two states in both bases, alone and
+beside dipoles, with and without spins. All are equal but TYP 7 with n = 0 and a ρ of the other sign, TYP 1, 2 and 5 beside a dipole of
+the same state with `--as-spcat` (in one input 60 of 324 strengths), and those that the program computes in another way, which is not
+repeated here: commutators (TYP 5 and 11) with the sign of the elements of falling K turned (its function dircos turns the sign of what
+follows the first kind of elements by the parity of the operator, which a commutator changes), and without the N that they give where no
+state has a dipole of its own; TYP 3, 5, 9, 10 and 11 of molecules with spins with J or the first F in place of N; electric and magnetic
+moments of one line, which it adds in amplitude. A test writes each moment out in a direct product. With `--as-spcat` moments of N (below)
+and of TYP 1 and 2 of a spin are the program's, S ½(3 Nz² - N²) and S (Ny² - Nx²) in place of the documented tensors, SYM 0 with TYP 10
+and 11 has no elements, and moments that time reversal would turn in one state are computed as they stand.
 
 A moment of N (SYM 0, I1 = 0) is N here, and with `--as-spcat` what the program has in its place, ½(2 φ_z N_z - φ_x N_x - φ_y N_y): g(N + S)
 of one g makes lines then, as J cannot.
@@ -201,16 +200,15 @@ in SPFIT, none is odd there. This can change operators between states.
 
 An operator that the declared symmetry forbids (Δk - Δl no multiple of the fold of the axis, levels of unequal weights, axes that differ) is
 left out, as the program does, with a note. So are, without one, its elements between Wang blocks whose levels have unlike weights,
-where other elements of it act: l-doubling of TYP 21 where A1 and A2 have unlike weights, states of which some
-weights agree. Dipoles between states have the phase i where no state has a dipole of its own. In an
+where other elements of it act: l-doubling of TYP 21 where A1 and A2 have unlike weights, states of which some weights agree (five
+of the later inputs differed before). Dipoles between states have the phase i where no state has a dipole of its own. In an
 oblate basis operators that time reversal turns around have the factor -i.
 """
 DIPOLES = """
 ## Dipoles: FC TYP I1 V2 V1 SYM
 
 SYM 1, 2, 3 are a, b, c in debye, SYM 0 magnetic moments in Bohr magnetons; TYP has FC as its second digit. What each stands for is said in
-`rotor/formats/spcat/hamiltonian/moment_words.py`; of TYP 7 and 8 I1 is a digit of the harmonic. A moment between two
-states leads from the one with the higher number.
+`moment_words.py`; of TYP 7 and 8 I1 is a digit of the harmonic. A moment between two states leads from the one with the higher number.
 
 | TYP | SYM 0, two states | SYM 1, 2, 3, two states | SYM 1, 2, 3, one state | SYM 0, a spin | SYM 1 (a), a spin | SYM 2, a spin |
 |---|---|---|---|---|---|---|

@@ -33,7 +33,7 @@ MADE = {
     "diag3_spins": 1150, "diag5_i_tot": 638, "diag3_states": 167, "euler_series": 218, "fourier_series": 288, "near_sphere_states": 235,
     "moments_between": 7674, "moments_between_oblate": 9426, "spin_orders": 625, "spin_series": 1264,
     "odd_and_phase": 1399, "weights_in_part": 602, "phase_with_spins": 3671, "odd_in_oblate": 1178, "states_up_to_maxv": 320,
-    "triplet_and_delta": 57, "wavenumbers": 437,
+    "triplet_and_delta": 57, "wavenumbers": 437, "spin_of_size_zero": 1810,
 }  # fmt: skip
 
 

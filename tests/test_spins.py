@@ -306,7 +306,7 @@ def test_a_scheme_names_its_sums():
         (lambda: SpinSpin({"D_aa(S)": 1.0}, (S,)), "no coupling with itself"),
         (lambda: quadrupole_of_tensor(N, np.diag([1.0, 1.0, 1.0])), "traceless"),
         (lambda: quadrupole_of_tensor(N, [[1.0, 0.5, 0], [0, -1, 0], [0, 0, 0]]), "symmetric"),
-        (lambda: Spin("X", 0), "twice a spin is a whole number, 1 or more"),
+        (lambda: Spin("X", -1), "twice a spin is a whole number, 0 or more"),
         (lambda: InteractingStates({"F_aa[0,1]": 1.0}), "interactions between states are"),
         (lambda: InteractingStates({"G_a[1,1]": 1.0}), "connects two states"),
         (lambda: InteractingStates({"A[0]": 1.0}), "states are numbered from 1"),

@@ -146,10 +146,7 @@ def command(
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
-        writers["--cat"] = _program_catalogue(prediction, content)
-    if prediction is not None and "--egy" in files.paths:
-        with answering():
-            writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
+        writers |= _program_files(prediction, content, str(given.source), options.as_spcat, files)
     deliver(
         files,
         writers,
@@ -236,6 +233,17 @@ def _why_none(answer: SpectrumAnswer, range_text: str | None = None) -> str:
     if range_text is None or inputs.has_unit(range_text):
         return reason
     return f"{reason}; --range {range_text} has no unit, so it is MHz: write {range_text}GHz for GHz"
+
+
+def _program_files(
+    prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool, files: Files
+) -> dict[str, Writer]:
+    """How the files are written that SPCAT writes itself: the catalogue, and the levels where they are asked for."""
+    writers = {"--cat": _program_catalogue(prediction, content)}
+    if "--egy" in files.paths:
+        with answering():
+            writers["--egy"] = _program_levels(prediction, content, source, as_spcat)
+    return writers
 
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
