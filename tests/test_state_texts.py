@@ -155,3 +155,10 @@ def test_what_is_given_of_states_is_named_in_sources_and_refusals(call):
     printed = call("spectrum", *STATE, *weights, "--dipole-abc", "0,1,0", "--jmax", "1", "--sources")[1]
     assert "given (--state-constants, --state-weights)" in printed
     assert "spin weights of 1" in call("thermo", *STATE, *weights, "--temperature", "30")[1]
+
+
+@pytest.mark.parametrize("names", [",", "0+,0+"])
+def test_names_of_states_tell_them_apart(call, names):
+    code, _, err = call("spectrum", *STATE, "--state-names", names, "--dipole-abc", "1,0,0")
+    assert code == 2
+    assert "expected each once, none of them empty" in err
