@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -268,3 +271,12 @@ def test_a_quadrupole_of_a_spin_of_a_half_in_a_file_is_named(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "parameter 110010000: spin" in error
     assert "has no quadrupole moment" in error
+
+
+def test_a_report_of_files_without_names_gives_no_dipole_of_its_own(capsys):
+    """PHASE puts moments beside the top's own dipole, which is 0 then."""
+    case = Path(__file__).parent / "oracles" / "kinds" / "odd_and_phase" / "odd_and_phase.int"
+    assert run(["spectrum", str(case), "--as-spcat"]) == 0
+    assert "the moments of the file" in capsys.readouterr().out
+    assert run(["spectrum", str(case), "--as-spcat", "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["dipole_abc_debye"] is None

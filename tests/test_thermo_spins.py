@@ -160,3 +160,15 @@ def test_a_total_spin_beside_weights_that_count_it_is_refused():
     assert partition_function(even, 300.0, effects=effects_of(even, True)).q == pytest.approx(
         plain, rel=2e-6
     )  # asked: 1e-6
+
+
+def test_the_corrected_limit_counts_from_the_lowest_level():
+    """Of a triplet whose lowest level is 0.65 K below the unsplit one; and of a molecule whose J = 0 does not exist."""
+    triplet = Top.from_constants(
+        "B=43.1 GHz", spin_constants=SpinConstants.parse("lambda(S)=59500 gamma(S)=-250 MHz", "S=1")
+    )
+    found = functions(triplet, [30.0, 300.0])
+    assert found.q_rot_corrected[1] == pytest.approx(found.q_rot[1], rel=1e-4)  # second order: (2λ/3kT)² = 4e-5
+    assert found.q_rot_corrected[0] == pytest.approx(found.q_rot[0], rel=5e-3)  # the same, 4e-3
+    odd = thermodynamic_functions(rod(spin_weights={"even": 0, "odd": 1}), [300.0])
+    assert odd.q_rot_corrected == pytest.approx(odd.q_rot, rel=1e-6)  # relative error asked of Q

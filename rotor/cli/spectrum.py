@@ -348,19 +348,17 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"
     own = content["spin_weights"]
     weights = "those of the file" if own is None else report.weights_text(own)
-    dipole = report.vector_text(top.dipole_abc_debye)
+    named = lines.levels.of_named_constants
     return [
         (
             "constants",
-            report.constants_text(top)
-            if lines.levels.of_named_constants
-            else "those of the file, which have no names here",
+            report.constants_text(top) if named else "those of the file, which have no names here",
         ),
-        ("dipole", dipole),
+        ("dipole", report.vector_text(top.dipole_abc_debye) if named else "the moments of the file"),
         ("spin weights", weights),
         *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", report.q_text(content["q"], classical=lines.levels.of_named_constants)),
+        ("Q", report.q_text(content["q"], classical=named)),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(content["hyperfine"]),

@@ -189,7 +189,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     return [
         ("constants", report.constants_text(top)),
         ("spin weights", weights),
-        *report.states_facts(top)[:1],
+        *(one for one in report.states_facts(top) if not one[1].startswith("dipole")),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),

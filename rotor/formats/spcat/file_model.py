@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, of_their_spins
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, basis_axes
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines, real_ones
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
@@ -340,7 +340,8 @@ def _in_phases(
     turned = turned_axis([axis_of(line.typ) for line in lines], light.phases.odd)
     if turned and doubled:
         raise ValueError(
-            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states: {NOT_YET}"
+            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states "
+            f"{PLURAL_NOT_YET}; leave one of them out"
         )
     if not light.phases.odd:
         return turned, moments, beside
@@ -356,7 +357,7 @@ def _turned_moments(
     if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
         raise ValueError(
             "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
-            f"state, or PHASE: {NOT_YET}"
+            f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
         )
     every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
     plain, others = dict[tuple[int, int], Vector](), list[Moment]()

@@ -184,8 +184,8 @@ def effects_of(
     found = spin_effects(top)
     if not found:
         raise ValueError(
-            f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them, such as "
-            "chi_aa(14N)=-4.2 MHz"
+            f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them as spin_constants "
+            "(--spin-constants), such as chi_aa(14N)=-4.2 MHz"
         )
     return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
 
