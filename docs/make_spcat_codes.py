@@ -156,7 +156,8 @@ other total. With that step set right the energies of CHCl3-like levels with F =
 levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
 With I_tot of two nuclei and two connected states of which some weights agree and others do not (WTPL, WTMN 3, 5 and 3, 7), SPCAT leaves
-out the elements between levels of unequal weights. Here they are there. Weights by exchange of one set of nuclei are equal or exchanged in two states; with those both agree.
+out the elements between levels of unequal weights. Here they are there. Weights by exchange of one set of nuclei are equal or exchanged
+in two states; with those both agree.
 
 Spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where they are odd), of one K, with powers of
 N·S, and times Fourier and Euler terms, were compared on some 150 inputs in both bases. All are equal but for shares of levels that
