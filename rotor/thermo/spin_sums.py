@@ -30,6 +30,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+_NONE_OF_J_0 = {
+    "nuclear quadrupole",
+    "spin-rotation",
+    "hyperfine method",
+}  # effects that shift J = 0 in second order alone
+
+
 @dataclass(frozen=True)
 class SpinSums:
     """Sums of each set of spin weights, and how they were made.
@@ -87,7 +94,7 @@ def spin_sums(
         found = level_sums(top, weights, temperatures_k, relative_error, **settings)
         return SpinSums(found, size, np.ones(len(temperatures_k), dtype=np.bool_))
     rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
-    ground = _lowest_split_k(top, weights, rotation, effects, size)
+    ground = _lowest_split_k(top, weights, rotation, effects, size, relative_error / 10)
     product = [times_functions(one, functions, lowest, size) for one, lowest in zip(rotation, ground, strict=True)]
     split = np.any(
         [
@@ -108,16 +115,23 @@ def _lowest_split_k(
     rotation: list[LevelSums],
     effects: Sequence[QuantumEffect],
     size_mhz: float,
+    share: float,
 ) -> list[float]:
     """E/k of the lowest split level by each set of weights.
 
-    Where no J above 1 has rigid levels within twice the size of the couplings of the ground level, J = 0 and 1 have it.
+    That of J = 0 and 1 where no rigid level of J = 2 is within twice the size of the couplings of the ground level; of J = 0 alone
+    where it exists and none of J = 1 is. J = 0 has a shift of second order in χ and C alone, V²/ΔE; below `share` of kT it is left out.
     """
-    ground_k = max(one.ground_k for one in rotation)
-    second = 6 * min(top.rotational_constants_mhz)  # the rigid levels of J = 2 are above it
-    if top.states is not None or len(weights) > 1 or second < ground_k * units.MHZ_PER_K + 2 * size_mhz:
+    ground_mhz, least = max(one.ground_k for one in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
+    reach = ground_mhz + 2 * size_mhz
+    if top.states is not None or len(weights) > 1 or 6 * least < reach:
         return lowest_level_k(top, weights, effects)
-    levels = solve_levels(top, 1, effects=tuple(effects), vectors=False)
+    alone = 2 * least > max(reach, 2 * ground_mhz)
+    coldest_mhz = rotation[0].temperatures_k.min() * units.MHZ_PER_K
+    second_order = {effect.name for effect in effects if effect.spins(top)} <= _NONE_OF_J_0
+    if alone and second_order and size_mhz**2 / (2 * least) < share * coldest_mhz:
+        return [rotation[0].ground_k]
+    levels = solve_levels(top, 0 if alone else 1, effects=tuple(effects), vectors=False)
     exists = weights_of_levels(levels, weights[0]) > 0
     return [float(levels.energy_mhz[exists].min()) / units.MHZ_PER_K]
 
