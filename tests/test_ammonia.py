@@ -20,12 +20,13 @@ from rotor.formats.molecules.level_table import read_level_table, write_level_ta
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.thermo import partition_function
+from rotor.thermo import partition_function, thermodynamic_functions
 from rotor.tops.isotopes.isotopologues import isotopologue
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_statistics import weights_of
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
+from rotor.tops.states.state_texts import with_state_texts
 from rotor.tops.top import Top
 
 AMMONIA = rotor.read("NH3")
@@ -284,3 +285,25 @@ def test_k_3_of_nd3_lies_between_its_halves():
         assert _splitting(levels, j, 3) == pytest.approx(
             (one + other) / 2, abs=tolerance
         )  # 10 kHz of each; constants not fitted to them
+
+
+STATES_WITH_WEIGHTS = {
+    "state_constants": "E[1]=5GHz A[1]=9GHz B[1]=8GHz C[1]=7GHz",
+    "state_weights": "[0] ee=1,eo=3,oe=3,oo=1 [1] ee=3,eo=1,oe=1,oo=3",
+}
+
+
+@pytest.mark.parametrize("case", ["NH3", "ND3", "given"])
+def test_classical_q_counts_states_as_the_sum_does(case):
+    """Weights of the top that are sums of those of its states, as of ND3 (11, 8, 8), count once."""
+    if case == "given":
+        top = with_state_texts(Top.from_constants("A=9 B=8 C=7 GHz"), STATES_WITH_WEIGHTS, "given")
+    else:
+        top = rotor.read(case)
+        species = {name: thermodynamic_functions(top, [300.0], species=name) for name in ("para", "ortho")}
+        for one in species.values():
+            assert one.q_rot_classical[0] == pytest.approx(one.q_rot[0], rel=0.02)  # quantum corrections and distortion
+    found = thermodynamic_functions(top, [300.0])
+    assert found.q_rot_corrected[0] == pytest.approx(found.q_rot[0], rel=1e-4)  # distortion of state 0 serves both
+    factors = {"NH3": 8, "ND3": 27}  # (2I+1)³
+    assert found.spin_factor == pytest.approx(factors.get(case, found.spin_factor), rel=1e-12)  # rounding

@@ -130,3 +130,24 @@ def test_wrong_input_is_one_line_and_exit_code_2(call, words, why):
     (line,) = [row for row in err.splitlines() if not row.startswith("note:")]
     assert line.startswith("error: ")
     assert why in line
+
+
+def test_isotopologues_have_the_constants_of_spins_that_their_nuclei_have(call):
+    """Of bare geometry and given constants: 14N stays, turned with the axes; 15N has no quadrupole moment."""
+    words = ("isotopologues", "HCN", "--spin-constants", "chi_aa(14N)=-4.7 MHz", "--each", "C=13C", "--each", "N=15N")
+    found = {
+        one["substituted"].popitem()[1]: one["spin_constants_mhz"] for one in content(call, *words)["isotopologues"]
+    }
+    assert found["13C"] == pytest.approx({"chi_aa(14N)": -4.7}, rel=1e-12)  # rounding: the axis stays
+    assert found["15N"] is None
+    printed = call("isotopologues", "HCN", "--each", "C=13C")[1]
+    assert "constants of spins (MHz)" in printed
+    assert "chi_aa(14N)" in printed
+
+
+@pytest.mark.parametrize("verb", ["gas", "tumble"])
+@pytest.mark.parametrize("option", ["--spin-constants", "--spins"])
+def test_classical_verbs_have_no_options_of_spins(call, verb, option):
+    code, _, err = call(verb, "HCN", option, "chi_aa(14N)=-4.7 MHz")
+    assert code == 2
+    assert f"No such option: {option}" in err

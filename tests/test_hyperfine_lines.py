@@ -22,7 +22,6 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import Lines, line_list
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
-from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 SAMPLES = Path(__file__).parent / "oracles" / "hyperfine"
@@ -212,8 +211,8 @@ def _formaldehyde_khz(constants: np.ndarray) -> np.ndarray:
     *c, d = (float(value) for value in constants)
     text = " ".join(f"C_{k}{k}(1H_{i})={v!r}" for i in (1, 2) for k, v in zip("abc", c, strict=True))
     spins = SpinConstants.parse(f"{text} T_aa(1H_1,1H_2)={d!r} T_bb(1H_1,1H_2)={-2 * d!r} kHz", "1H_1+1H_2")
-    even = SpinWeights.from_mapping({"ee": 1, "eo": 1, "oe": 0, "oo": 0})  # of levels of even total spin
-    top = replace(rotor.read("H2CO"), spin_constants=spins, spin_weights=even)
+    top = rotor.read("H2CO").with_weights({"ee": 1, "eo": 1, "oe": 0, "oo": 0}, "of even total spin")
+    top = replace(top, spin_constants=spins)
     levels = solve_levels(top, 2, effects=effects_of(top, True))
     energy = {
         (j, f, side): levels.energy_mhz[levels.find(n=j, ka=1, kc=j - 1 + side, i_tot=1, f=f)]

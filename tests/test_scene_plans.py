@@ -98,7 +98,7 @@ SPINS = [
     ("HCONH2", "chi_aa(14N)=1.9598 chi_bb-cc(14N)=5.7358 MHz", "nuclear quadrupole"),
     ("HCN", "chi_aa(14N)=-4.7 MHz", "nuclear quadrupole"),
     ("CH3Cl", "chi_aa(35Cl)=-74.7 MHz", "nuclear quadrupole"),
-    ("HCN", "C_bb(14N)=10 kHz", "spin-rotation"),
+    ("HCN", "C_iso(14N)=10 kHz", "spin-rotation"),
 ]  # sizes of these molecules, rounded
 
 
@@ -181,3 +181,11 @@ def test_the_command(call):
 def test_nothing_is_written_by_a_plan(call, folder):
     call("plan", str(FOLDER / "tennis_racket.toml"))
     assert not list(folder.iterdir())
+
+
+def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
+    top = rotor.read("HCN")
+    said = {one.name: one.basis for one in left_out.of_levels(top, 8, SEMI_RIGID)}
+    assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
+    with_spins = left_out.of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
+    assert not any("effects.hyperfine" in one.basis for one in with_spins)

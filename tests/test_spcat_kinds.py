@@ -33,7 +33,8 @@ MADE = {
     "diag3_spins": 1150, "diag5_i_tot": 638, "diag3_states": 167, "euler_series": 218, "fourier_series": 288, "near_sphere_states": 235,
     "moments_between": 7674, "moments_between_oblate": 9426, "moments_alone": 398, "spin_orders": 625, "spin_series": 1264,
     "odd_and_phase": 1399, "weights_in_part": 602, "phase_with_spins": 3671, "odd_in_oblate": 1178, "states_up_to_maxv": 320,
-    "triplet_and_delta": 57, "wavenumbers": 437,
+    "triplet_and_delta": 57, "wavenumbers": 437, "spin_of_size_zero": 1810,
+    "spin_of_size_zero_beside_three": 2701,
 }  # fmt: skip
 
 
@@ -88,6 +89,16 @@ def test_levels_hold_the_lower_states_of_all_lines(name):
     for quanta, energy in zip(lines.quanta_lower.tolist(), lines.energy_lower_cm, strict=True):
         near = found[tuple(q for q in quanta if q >= -99)]
         assert min(abs(energy - one) for one in near) < 5.1e-5  # half a digit
+
+
+def test_a_state_with_quantum_numbers_of_its_own_has_no_number_of_a_pattern():
+    """Beside states of more spins; the program lists -1 there."""
+    name = "spin_of_size_zero_beside_three"
+    levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
+    assert levels.pattern is not None
+    own = levels.quanta[:, 3] == 0
+    assert set(levels.pattern[own].tolist()) == {-1}
+    assert set(levels.pattern[~own].tolist()) == set(range(24))  # 2 * 6 * 2 couplings
 
 
 @pytest.mark.slow

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotor.formats.spcat.block_numbers import blocks_of
 from rotor.formats.spcat.file_lines import as_level_list
 from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.file_quanta import format_of
-from rotor.formats.spcat.predict import Prediction, levels_of_file, predict
+from rotor.formats.spcat.predict import Prediction, predict
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.egy import format_egy, format_level, read_egy
 from rotor.formats.spcat.text.int_file import read_int
@@ -127,14 +128,20 @@ def test_levels_with_more_than_six_quanta_have_all_of_them():
     assert (again.quanta == levels.quanta).all()
 
 
-def test_a_list_of_many_levels_fits_its_columns(tmp_path):
-    """SPCAT's columns hold ranks to 9999; there are more levels."""
-    (tmp_path / "t.int").write_bytes(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
-    (tmp_path / "t.var").write_bytes(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
-    levels = levels_of_file(tmp_path / "t.int")
-    assert len(levels) == 105**2
-    assert levels.rank.max() <= 9999
-    assert len(format_egy(levels).splitlines()) == len(levels)
+def test_a_list_of_many_levels_fits_its_columns():
+    """The program's list of this file has four blocks for every N; where its numbers are not known here, ranks go to 9999."""
+    file = read_par(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
+    asked = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
+    group = groups_of(file, asked)[0]
+    solved, form = [(group, group.levels((0, 208)))], format_of(file, [group])
+    levels = as_level_list(solved, form, blocks=blocks_of(file, [group]))
+    assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 4 * 105, 53)
+    others = as_level_list(solved, form)
+    assert (len(others), others.block.max(), others.rank.max()) == (105**2, 2, 9999)
+    last = format_level(others.level(int(others.rank.argmax())))
+    assert len(last) == len(format_level(others.level(0)))
+    again = read_egy((last + "\n").encode())
+    assert (again.block[0], again.rank[0]) == (1, 9999)
 
 
 @pytest.mark.parametrize("option", ["s 1 1", "s -1 1"])

@@ -10,6 +10,7 @@ import pytest
 from full_matrix_codes import case_of
 from full_matrix_levels import solve, strengths
 
+from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole, quadrupole_of_tensor
@@ -306,7 +307,7 @@ def test_a_scheme_names_its_sums():
         (lambda: SpinSpin({"D_aa(S)": 1.0}, (S,)), "no coupling with itself"),
         (lambda: quadrupole_of_tensor(N, np.diag([1.0, 1.0, 1.0])), "traceless"),
         (lambda: quadrupole_of_tensor(N, [[1.0, 0.5, 0], [0, -1, 0], [0, 0, 0]]), "symmetric"),
-        (lambda: Spin("X", 0), "twice a spin is a whole number, 1 or more"),
+        (lambda: Spin("X", -1), "twice a spin is a whole number, 0 or more"),
         (lambda: InteractingStates({"F_aa[0,1]": 1.0}), "interactions between states are"),
         (lambda: InteractingStates({"G_a[1,1]": 1.0}), "connects two states"),
         (lambda: InteractingStates({"A[0]": 1.0}), "states are numbered from 1"),
@@ -327,3 +328,26 @@ def test_effects_survive_a_copy():
     effect = pickle.loads(pickle.dumps(NuclearQuadrupole(_named(CHI, "Cl"), (CL,))))
     assert effect.values == NuclearQuadrupole(_named(CHI, "Cl"), (CL,)).values
     assert pickle.loads(pickle.dumps(STATES)).moments == STATES.moments
+
+
+@pytest.mark.parametrize("value", [-40.0, 700.0])
+def test_the_scalar_between_two_states_mixes_them(value):
+    """value N·I of states D apart: B N(N + 1) + (A - B) K² + D/2 ± √(D²/4 + c²), c = value ½[F(F + 1) - N(N + 1) - I(I + 1)]."""
+    par = read_par(
+        f"two\n4 1 1 0 0 1e6 1 1\na 3 2 0 9 0 1 1 1 0 1 0\n199 3000 1\n1099 500 1\n11 1500 1\n10000010 {value} 1\n".encode()
+    )
+    asked = read_int(b"two\n0 999 1000.0 0 6 -30 -30 9999.99 300.0\n1 1.0\n12 1.0\n")
+    (group,) = groups_of(par, asked)
+    levels = group.levels((0, 10))
+    for f in range(6):
+        of_f = levels.energy_mhz[levels.multiplicity == 2 * f + 1]
+        every_n = {n for n in range(max(abs(f - 1), 0), f + 2) if abs(n - 1) <= f <= n + 1}
+        c = {n: value * (f * (f + 1) - n * (n + 1) - 2) / 2 for n in every_n}
+        apart = {n: np.hypot(750.0, c[n]) for n in every_n}
+        expected = [
+            3000.0 * n * (n + 1) + 500.0 * k**2 + 750 + sign * apart[n]
+            for n in every_n
+            for k in range(-n, n + 1)
+            for sign in (-1, 1)
+        ]
+        assert np.sort(of_f) == pytest.approx(np.sort(expected), abs=1e-8)  # of 1e5 MHz, round-off

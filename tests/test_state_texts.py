@@ -142,3 +142,23 @@ def test_wrong_input_is_one_line_and_exit_code_2(call, words, why):
     option = next(word for word in words[::-1] if word.startswith("--state-"))
     assert line.startswith(f"error: {option}: ")
     assert why in line
+
+
+def test_what_is_given_of_states_is_named_in_sources_and_refusals(call):
+    """Also where the source has the states already: its source stays, and what is given is added."""
+    top = with_state_texts(Top.from_constants("A=20 B=10 C=8 GHz"), {"state_constants": STATE[3]}, "of a file")
+    assert with_state_texts(top, {"state_dipoles": "[0,1] 0,0,1"}, "given").states.source == "of a file; dipoles given"
+    weights = ("--state-weights", "[0] ee=1,eo=3,oe=3,oo=1 [1] ee=3,eo=1,oe=1,oo=3")
+    code, _, err = call("spectrum", *STATE, *weights, "--dipole-abc", "1,0,0")
+    assert code == 2
+    assert "--state-weights: dipole μa = 1 D in state 0" in err
+    printed = call("spectrum", *STATE, *weights, "--dipole-abc", "0,1,0", "--jmax", "1", "--sources")[1]
+    assert "given (--state-constants, --state-weights)" in printed
+    assert "spin weights of 1" in call("thermo", *STATE, *weights, "--temperature", "30")[1]
+
+
+@pytest.mark.parametrize("names", [",", "0+,0+"])
+def test_names_of_states_tell_them_apart(call, names):
+    code, _, err = call("spectrum", *STATE, "--state-names", names, "--dipole-abc", "1,0,0")
+    assert code == 2
+    assert "expected each once, none of them empty" in err

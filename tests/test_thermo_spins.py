@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rotor
 from rotor import units
 from rotor.quantum.effects.of_top import effects_of
+from rotor.spectra.lines import line_list
+from rotor.thermo import partition_function
 from rotor.thermo.functions import ThermoFunctions, thermodynamic_functions
 from rotor.thermo.level_sums import level_sums, lowest_level_k
 from rotor.thermo.request import ThermoRequest, answer_thermo
@@ -127,3 +130,45 @@ def test_constants_of_zero_leave_the_rotation_times_the_functions():
     assert found.hyperfine is not None
     assert found.hyperfine["summed_up_to_k"] is None
     assert np.isfinite(found.relative_error).all()
+
+
+@pytest.mark.parametrize("temperature", [0.05, 1.0, 20.0])
+def test_q_of_lines_counts_from_the_lowest_level_that_spins_split(temperature):
+    """Σ g e^(-E/kT) over levels whose energies count from the lowest F; the lowest that exists, 1_01, is split by 100 MHz."""
+    top = Top.from_constants(
+        "A=60 B=44 C=36 GHz", spin_weights={"ee": 0, "eo": 1, "oe": 1, "oo": 0}, dipole_abc_debye=(0, 1.0, 0),
+        spin_constants=SpinConstants.parse("chi_aa(14N)=-150 chi_bb-cc(14N)=20 MHz"),
+    )  # fmt: skip
+    effects = effects_of(top, True)
+    lines = line_list(top, temperature_k=temperature, jmax=25, effects=effects)
+    levels = lines.levels
+    above = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
+    here = levels.quanta["n"] <= 24
+    expected = (levels.degeneracy * np.exp(-above / temperature))[here].sum()
+    assert lines.partition.q == pytest.approx(expected, rel=2e-6)  # asked of Q: 1e-6, and rounding
+    assert lines.partition.q == pytest.approx(functions(top, [temperature]).q_rot[0], rel=2e-6)
+
+
+def test_a_total_spin_beside_weights_that_count_it_is_refused():
+    """Of water 1:3 of its geometry are the functions of both protons; 1:0, those of even I, are what a total spin needs."""
+    protons = SpinConstants.parse("C_iso(1H_1)=-0.03 C_iso(1H_2)=-0.03 MHz", "1H_1+1H_2")
+    top = replace(rotor.read("water"), spin_constants=protons)
+    with pytest.raises(ValueError, match="spin weights of water count their 4 functions already"):
+        effects_of(top, True)
+    even = top.with_weights({"ee": 1, "eo": 0, "oe": 0, "oo": 1}, "given")
+    plain = partition_function(top, 300.0).q
+    assert partition_function(even, 300.0, effects=effects_of(even, True)).q == pytest.approx(
+        plain, rel=2e-6
+    )  # asked: 1e-6
+
+
+def test_the_corrected_limit_counts_from_the_lowest_level():
+    """Of a triplet whose lowest level is 0.65 K below the unsplit one; and of a molecule whose J = 0 does not exist."""
+    triplet = Top.from_constants(
+        "B=43.1 GHz", spin_constants=SpinConstants.parse("lambda(S)=59500 gamma(S)=-250 MHz", "S=1")
+    )
+    found = functions(triplet, [30.0, 300.0])
+    assert found.q_rot_corrected[1] == pytest.approx(found.q_rot[1], rel=1e-4)  # second order: (2λ/3kT)² = 4e-5
+    assert found.q_rot_corrected[0] == pytest.approx(found.q_rot[0], rel=5e-3)  # the same, 4e-3
+    odd = thermodynamic_functions(rod(spin_weights={"even": 0, "odd": 1}), [300.0])
+    assert odd.q_rot_corrected == pytest.approx(odd.q_rot, rel=1e-6)  # relative error asked of Q

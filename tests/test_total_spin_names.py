@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import rotor
 from rotor.fit.top_constants import TopConstants
 from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
@@ -167,22 +165,4 @@ def test_weights_beside_a_total_are_those_of_half_a_turn():
     weights = {"ee": 1, "eo": 2, "oe": 0, "oo": 0}
     top = Top.from_constants("A=9 B=3 C=2.5 GHz", spin_weights=weights, spin_constants=TOPS["two"].spin_constants)
     with pytest.raises(ValueError, match="expected those of half a turn about one axis"):
-        effects_of(top, True)
-
-
-@pytest.mark.parametrize(
-    ("molecule", "isotope", "right"), [("water", "1H", "ee=1,eo=0,oe=0,oo=1"), ("D2O", "2H", "ee=1,eo=0,oe=0,oo=1")]
-)
-def test_weights_of_a_geometry_that_count_the_pair_are_refused(call, molecule, isotope, right):
-    """In python and on the command line; with the weights that the message names it computes."""
-    pair = (f"{isotope}_1", f"{isotope}_2")
-    text = " ".join(f"C_iso({one})=-30kHz" for one in pair)
-    words = ("spectrum", molecule, "--spin-constants", text, "--spins", "+".join(pair), "--jmax", "1", "--q", "1e3")
-    code, out, err = call(*words)
-    assert (code, out) == (2, "")
-    assert "count their exchange already" in err
-    assert right in err
-    assert call(*words, "--spin-weights", right)[0] == 0
-    top = replace(rotor.read(molecule), spin_constants=SpinConstants.parse(text, "+".join(pair)))
-    with pytest.raises(ValueError, match="count their exchange already"):
         effects_of(top, True)

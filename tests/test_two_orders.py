@@ -61,6 +61,10 @@ def test_two_orders_become_mean_and_difference():
     [
         ({"chi_ab(D)": 1.0, "chi_ba(D)": 2.0}, "chi_ab(D) and chi_ba(D) are one constant"),
         ({"C_ab(D)": 1.0, "C_ba(D)": 2.0, "C_ab-ba(D)": 1.0}, "C_ab-ba(D) beside C_ab(D) and C_ba(D)"),
+        (
+            {"C_ba(D)": 1.0, "C_ab-ba(D)": 2.0},
+            "C_ba(D) beside C_ab-ba(D): give C_ab(D) and C_ab-ba(D), or C_ab(D) and C_ba(D)",
+        ),
     ],
 )
 def test_what_is_given_twice_is_refused(values, says):

@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
 
 if TYPE_CHECKING:
@@ -106,6 +107,7 @@ def command(
     context: typer.Context, options: Options, spins: HyperfineOptions, outputs: Outputs, picture: PlotOptions
 ) -> None:
     """Brightness temperature of a source in local thermodynamic equilibrium."""
+    one_thread_of_blas()
     require_whole("--top", options.top_lines, 0)
     if not options.sources:
         raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")

@@ -64,7 +64,10 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", *inputs.STATES, "calculator", "hessian", "symmetry_tolerance"), picture=("plot_scale",))
+@grouped(
+    given=("spin_weights", "spin_constants", "spins", *inputs.STATES, "calculator", "hessian", "symmetry_tolerance"),
+    picture=("plot_scale",),
+)
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """A classical gas of free molecules: equipartition, correlation functions."""
     from rotor.thermo.classical_gas import GasRequest, settling_times_ps

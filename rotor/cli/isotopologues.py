@@ -51,7 +51,7 @@ class Options:
     )
 )  # fmt: skip
 def command(context: typer.Context, given: Input, options: Options) -> None:
-    """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
+    """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each, and constants of spins if known."""
     files = Files.of(options)
     parent = inputs.read_top(given)
     family = _family(parent, options.min_abundance, options.each or [], options.site or [])
@@ -63,7 +63,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
         "name": parent.name or None,
         "isotopologues": [record(one) for one in family],
     }
-    deliver(files, {}, lambda: json_text(content), lambda: show_table(_table(parent, family)))
+    deliver(files, {}, lambda: json_text(content), lambda: _show(parent, family))
 
 
 def _family(
@@ -122,9 +122,31 @@ def record(one: Isotopologue) -> dict[str, Any]:
         "turned_degrees": one.turned_degrees,
         "dipole_abc_debye": top.dipole_abc_debye,
         "spin_weights": top.spin_weights.to_mapping(),
+        "spin_constants_mhz": dict(top.spin_constants.values) if top.spin_constants else None,
         "source": top.source or None,
         "notes": list(top.notes),
     }
+
+
+def _show(parent: Top, family: Sequence[Isotopologue]) -> None:
+    show_table(_table(parent, family))
+    rows = [[one.label, _constants_text(one.top)] for one in family if one.top.spin_constants]
+    if rows:
+        print()
+        show_table(
+            Table(
+                "",
+                ("isotopologue", "constants of spins (MHz)"),
+                rows,
+                frozenset({"isotopologue", "constants of spins (MHz)"}),
+            )
+        )
+
+
+def _constants_text(top: Top) -> str:
+    """The constants of spins of a top by name, in MHz."""
+    known = top.spin_constants.values if top.spin_constants else {}
+    return ", ".join(f"{name} {value:.6g}" for name, value in known.items())
 
 
 def _table(parent: Top, family: Sequence[Isotopologue]) -> Table:

@@ -27,6 +27,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
@@ -85,6 +86,7 @@ def command(
     picture: ViewOptions,
 ) -> None:
     """Energy levels: quantum numbers, energies, degeneracies, term diagram."""
+    one_thread_of_blas(options.jmax)
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     require_whole("--top", options.top_levels, 0)

@@ -28,6 +28,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
@@ -85,6 +86,7 @@ def command(
     picture: ViewOptions,
 ) -> None:
     """Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections."""
+    one_thread_of_blas(options.jmax)
     from rotor.spectra.raman_request import RamanRequest, answer_raman
 
     require_whole("--top", options.top_lines, 0)

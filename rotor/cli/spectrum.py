@@ -29,6 +29,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
@@ -110,6 +111,7 @@ def command(
     picture: PlotOptions,
 ) -> None:
     """Rotational lines: frequencies, intensities, and what they were made from."""
+    one_thread_of_blas(options.jmax)
     require_whole("--top", options.top_lines, 0)
     require_whole("--tag", options.tag, 0, 999_999)
     files, shape = Files.of(outputs), _shape(options, layer)
@@ -146,10 +148,7 @@ def command(
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
-        writers["--cat"] = _program_catalogue(prediction, content)
-    if prediction is not None and "--egy" in files.paths:
-        with answering():
-            writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
+        writers |= _program_files(prediction, content, str(given.source), options.as_spcat, files)
     deliver(
         files,
         writers,
@@ -236,6 +235,17 @@ def _why_none(answer: SpectrumAnswer, range_text: str | None = None) -> str:
     if range_text is None or inputs.has_unit(range_text):
         return reason
     return f"{reason}; --range {range_text} has no unit, so it is MHz: write {range_text}GHz for GHz"
+
+
+def _program_files(
+    prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool, files: Files
+) -> dict[str, Writer]:
+    """How the files are written that SPCAT writes itself: the catalogue, and the levels where they are asked for."""
+    writers = {"--cat": _program_catalogue(prediction, content)}
+    if "--egy" in files.paths:
+        with answering():
+            writers["--egy"] = _program_levels(prediction, content, source, as_spcat)
+    return writers
 
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
@@ -338,19 +348,17 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"
     own = content["spin_weights"]
     weights = "those of the file" if own is None else report.weights_text(own)
-    dipole = report.vector_text(top.dipole_abc_debye)
+    named = lines.levels.of_named_constants
     return [
         (
             "constants",
-            report.constants_text(top)
-            if lines.levels.of_named_constants
-            else "those of the file, which have no names here",
+            report.constants_text(top) if named else "those of the file, which have no names here",
         ),
-        ("dipole", dipole),
+        ("dipole", report.vector_text(top.dipole_abc_debye) if named else "the moments of the file"),
         ("spin weights", weights),
         *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", report.q_text(content["q"], classical=lines.levels.of_named_constants)),
+        ("Q", report.q_text(content["q"], classical=named)),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(content["hyperfine"]),

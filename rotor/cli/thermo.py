@@ -27,7 +27,7 @@ from rotor.cli.shared.output import (
     sum_progress,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
-from rotor.cli.shared.report import model_facts
+from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -85,6 +85,8 @@ def command(
     picture: ViewOptions,
 ) -> None:
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
+    one_thread_of_blas()
+    from rotor.cli.shared.report import model_facts
     from rotor.thermo.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)
@@ -187,7 +189,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     return [
         ("constants", report.constants_text(top)),
         ("spin weights", weights),
-        *report.states_facts(top)[:1],
+        *(one for one in report.states_facts(top) if not one[1].startswith("dipole")),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),

@@ -50,7 +50,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "spin_weights", *inputs.STATES, "calculator", "hessian", "symmetry_tolerance"))
+@grouped(
+    given=(
+        "dipole", "dipole_abc", "spin_weights", "spin_constants", "spins", *inputs.STATES, "calculator", "hessian",
+        "symmetry_tolerance",
+    )
+)  # fmt: skip
 def command(context: typer.Context, given: Input, options: Options, driven: Driven, outputs: Outputs) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable; with --effect a motion under torques."""
     if driven.effect:

@@ -36,6 +36,11 @@ COLLISION_M = 4e-10  # a diameter of small molecules
 HBAR_J_S = units.PLANCK_J_S / (2 * math.pi)
 
 
+HYPERFINE_KEY = (
+    "its constants are known, effects.hyperfine = true adds them"  # of scenes; no other text names their keys
+)
+
+
 @dataclass(frozen=True)
 class LeftOut:
     """Something that a scene leaves out. size: in `unit`; None: not estimated. basis: how the size was found, and for what."""
@@ -48,10 +53,14 @@ class LeftOut:
 
 def of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[LeftOut]:
     """What levels and lines of one J leave out, largest first, in MHz; what is not estimated comes last."""
+    from rotor.quantum.estimates.beyond import COMPUTE
     from rotor.quantum.estimates.limits import every_limit
 
     limits = every_limit(top, j, effects)
-    found = [LeftOut(one.name, one.size_mhz, "MHz", f"at J = {j}: {one.text}") for one in limits]
+    found = [
+        LeftOut(one.name, one.size_mhz, "MHz", f"at J = {j}: {one.text.replace(COMPUTE, HYPERFINE_KEY)}")
+        for one in limits
+    ]
     field = stray_field(top)
     return largest_first(found if field is None else [*found, field])
 

@@ -64,9 +64,9 @@ class QuantumEffects(Section, frozen=True):
 
     distortion: Annotated[bool, said("centrifugal distortion, as far as constants are there")] = True
     hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
-    hyperfine_method: Annotated[str, said("exact, first-order, or auto: the cheapest that keeps the tolerance")] = (
-        "exact"
-    )
+    hyperfine_method: Annotated[
+        str, said("exact, N-diagonal, first-order, or auto: the cheapest that keeps the tolerance")
+    ] = "exact"
     hyperfine_tolerance: Annotated[Quantity, said("how far auto may be off exact lines (MHz)")] = "0.1 kHz"
 
 

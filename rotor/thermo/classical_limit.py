@@ -42,6 +42,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
+from rotor.thermo.species import of_species
 from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -67,7 +68,7 @@ class ClassicalLimit:
 
     degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d, e, f: in K, K², 1/K, 1/K², 1/K³; see
     the module. theta_k: the largest finite and the middle rotational temperature. period: of the spin weights. states: of each
-    further state how much it counts beside the first, and its energy over k in K.
+    state how much it counts beside the one of `mean_weight`, and its energy over k in K.
     """
 
     degrees: int
@@ -80,7 +81,7 @@ class ClassicalLimit:
     f: float = 0.0
     theta_k: tuple[float, float] = (0.0, 0.0)
     period: int = 1
-    states: tuple[tuple[float, float], ...] = ()
+    states: tuple[tuple[float, float], ...] = ((1.0, 0.0),)
 
     def q(self, temperatures_k: ArrayLike) -> Floats:
         """Q in the classical limit, (n,)."""
@@ -89,7 +90,7 @@ class ClassicalLimit:
 
     def state_sums(self, t: Floats) -> tuple[Floats, Floats, Floats]:
         """Σ w e⁻ˣ over the states with x = E/kT, and mean and variance of x, (n,) each; 1, 0, 0 of one state."""
-        share, energy = np.array([(1.0, 0.0), *self.states]).T
+        share, energy = np.array(self.states).T
         x = energy / np.asarray(t)[..., None]
         terms = share * np.exp(-x)
         total = terms.sum(axis=-1)
@@ -140,40 +141,48 @@ class ClassicalLimit:
 
 
 def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLimit:
-    """The classical limit of a top, with the mean of its spin weights (those of its first state, beside which others count) or of others.
+    """The classical limit of a top: of all its levels, or of those that a species has, whose weights are given.
 
     >>> from rotor.tops.top import Top
     >>> limit = classical_limit(Top.from_constants("B=57635.968 MHz"))
     >>> round(3 * limit.a, 4), round(float(limit.q([300.0])[0]), 2)  # Θ in K
     (2.7661, 108.46)
     """
-    of = weights or _first_weights(top)
+    by_state = _weights_by_state(top, weights)
+    of = next((one for one in by_state if one.mean), by_state[0])
     a, b, c = rotational_temperatures_k(top)
     period = max(int(name) for name in of.classes if name.isdecimal()) + 1 if of.rule == "K" else _PERIODS[of.rule]
+    states = _shares(top, by_state, of.mean)
     if top.kind == "linear":
-        return ClassicalLimit(2, of.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), period)
+        return ClassicalLimit(2, of.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), period, states)
     scale = math.sqrt(math.pi / (a * b * c))
     corrections = (*_stripp_kirkwood(a, b, c), *_distortion(top))
-    return ClassicalLimit(3, of.mean, scale, *corrections, (a, b), period, _other_states(top))
+    return ClassicalLimit(3, of.mean, scale, *corrections, (a, b), period, states)
 
 
-def _first_weights(top: Top) -> SpinWeights:
-    """The spin weights of the first state, or of all."""
-    return top.spin_weights if top.states is None else top.states.weights.get(0, top.spin_weights)
+def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights]:
+    """The spin weights of each state, its own where it has some, without the classes that a species has not."""
+    whole = weights or top.spin_weights
+    if top.states is None:
+        return [whole]
+    own = [top.states.weights.get(v) for v in range(top.states.count)]
+    return [whole if one is None else one if weights is None else of_species(one, weights) for one in own]
 
 
-def _other_states(top: Top) -> tuple[tuple[float, float], ...]:
-    """How much each further state counts beside the first, by its mean weight and its A, B, C, and its energy over k in K."""
-    states = top.states
-    if states is None:
-        return ()
-    volume, mean = math.prod(top.rotational_constants_mhz), _first_weights(top).mean
-    found = []
-    for v in range(1, states.count):
-        own = states.of_state(v)
-        axes = [own.get(name, own["B"]) for name in ("A", "B", "C")]
-        weight = states.weights.get(v, top.spin_weights).mean / mean
-        found.append((weight * math.sqrt(volume / math.prod(axes)), own.get("E", 0.0) / units.MHZ_PER_K))
+def _shares(top: Top, by_state: list[SpinWeights], mean: float) -> tuple[tuple[float, float], ...]:
+    """How much each state counts beside one of this mean weight, by its own and its A, B, C, and its energy over k in K."""
+    if top.states is None:
+        return ((1.0, 0.0),)
+    names = ("B", "B") if top.kind == "linear" else ("A", "B", "C")
+    first = top.rotational_constants_mhz
+    volume = math.prod(first["ABC".index(name)] for name in names)
+    found = [(by_state[0].mean / mean, 0.0)]
+    for v in range(1, top.states.count):
+        own = top.states.of_state(v)
+        axes = [own.get(name, own["B"]) for name in names]
+        found.append(
+            (by_state[v].mean / mean * math.sqrt(volume / math.prod(axes)), own.get("E", 0.0) / units.MHZ_PER_K)
+        )
     return tuple(found)
 
 

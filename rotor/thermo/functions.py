@@ -67,7 +67,8 @@ class ThermoFunctions(Table):
     many rotations and how many nuclear-spin functions the classical q = spin_factor/symmetry_number · ... counts; the second
     is of weights divided by their common divisor. q_rot, energy_j_per_mol, entropy_j_per_mol_k, cv_over_r: the quantum
     sum. q_rot_classical, cv_over_r_classical: the classical limit. q_rot_corrected, cv_over_r_corrected: that with its
-    first quantum corrections and distortion, NaN where these are large. jmax, relative_error: of the sums (-1 where the
+    first quantum corrections and distortion, from the lowest level as q_rot, NaN where these are large.
+    jmax, relative_error: of the sums (-1 where the
     classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
     vibrational states are given. gas: with translation. hyperfine: how
     spins were counted, by the keys of docs/command_line.md; None without spins.
@@ -269,11 +270,13 @@ def _rotation(
     shares = np.array(list(fractions.values()) or [1.0])
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 
-    means = np.array([one.mean for one in parts.values()])
+    limit = classical_limit(top, next(iter(parts.values())) if len(parts) == 1 else None)
+    means = np.array([classical_limit(top, one).mean_weight for one in parts.values()])
     mean_weight = float(np.exp(shares @ np.log(means / shares)))
-    limit = replace(classical_limit(top), mean_weight=mean_weight * spin_functions(top, effects))
+    limit = replace(limit, mean_weight=mean_weight * spin_functions(top, effects))
     of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
     corrected_q, _, corrected_cv = limit.corrected(temperatures)
+    above = np.where(np.isfinite(corrected_q), ground_k / temperatures, 0.0)
     symmetry_number = top.symmetry.symmetry_number if top.symmetry else implied_symmetry_number(top.spin_weights)
     return ThermoFunctions(
         top=top,
@@ -284,7 +287,7 @@ def _rotation(
         temperature_k=temperatures,
         q_rot=np.exp(ln_q),
         q_rot_classical=limit.q(temperatures),
-        q_rot_corrected=corrected_q,
+        q_rot_corrected=corrected_q * np.exp(above),  # from the lowest level, as Q
         energy_j_per_mol=GAS_CONSTANT * temperatures * mean,
         entropy_j_per_mol_k=GAS_CONSTANT * (ln_q + mean),
         cv_over_r=cv,

@@ -173,10 +173,14 @@ def partition_functions(
     temperatures = checked_temperatures(temperatures_k)
     weights = [top.spin_weights]
     spinless, factor = without_spins(top, effects)
-    sums = level_sums(
-        top, weights, temperatures, relative_error, energies=False, refuse=refuse, progress=progress, effects=spinless
-    )[0]
-    return PartitionFunctions(temperatures, factor * sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+    settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
+    if factor == 1:
+        sums = level_sums(top, weights, temperatures, relative_error, effects=spinless, **settings)[0]
+    else:  # from the lowest level that spins split, as energies of levels count
+        from rotor.thermo.spin_sums import spin_sums
+
+        sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]
+    return PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
 
 
 def _sources(sums: LevelSums, relative_error: float) -> tuple[str, ...]:

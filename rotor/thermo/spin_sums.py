@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,21 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import populated_j
+from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo.level_sums import LevelSums, Progress, level_sums, lowest_level_k
 from rotor.thermo.spin_factor import without_spins
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+
+_NONE_OF_J_0 = {
+    "nuclear quadrupole",
+    "spin-rotation",
+    "hyperfine method",
+}  # effects that shift J = 0 in second order alone
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,9 @@ def spin_sums(
     relative_error: float,
     effects: Sequence[QuantumEffect],
     progress: Progress | None = None,
+    *,
+    energies: bool = True,
+    refuse: bool = True,
 ) -> SpinSums:
     """Q, U/RT and C_v/R of levels with spins for each of several sets of spin weights.
 
@@ -61,6 +73,8 @@ def spin_sums(
     effects : sequence of QuantumEffect
         What the Hamiltonian consists of, spins among it.
     progress : callable, optional
+    energies : bool
+    refuse : bool
         As in `level_sums`.
 
     Returns
@@ -74,20 +88,52 @@ def spin_sums(
     """
     spinless, functions = without_spins(top, effects)
     size = splitting_mhz(top, effects, float(temperatures_k.max()))
-    settings = {"progress": progress, "effects": effects}
+    plainly: dict[str, Any] = {"progress": progress, "energies": energies, "refuse": refuse}
+    settings = plainly | {"effects": effects}
     if functions == 1:
-        found = level_sums(top, weights, temperatures_k, relative_error, **settings)  # type: ignore[arg-type]
+        found = level_sums(top, weights, temperatures_k, relative_error, **settings)
         return SpinSums(found, size, np.ones(len(temperatures_k), dtype=np.bool_))
-    rotation = level_sums(top, weights, temperatures_k, relative_error, progress=progress, effects=spinless)
-    ground = lowest_level_k(top, weights, effects)
+    rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
+    ground = _lowest_split_k(top, weights, rotation, effects, size, relative_error / 10)
     product = [times_functions(one, functions, lowest, size) for one, lowest in zip(rotation, ground, strict=True)]
     split = np.any(
-        [_worst(one) > _worst(plain) + relative_error for one, plain in zip(product, rotation, strict=True)], axis=0
+        [
+            _worst(one, energies) > _worst(plain, energies) + relative_error
+            for one, plain in zip(product, rotation, strict=True)
+        ],
+        axis=0,
     )
     if not split.any():
         return SpinSums(product, size, split)
-    summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)  # type: ignore[arg-type]
+    summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)
     return SpinSums([_placed(one, split, own) for one, own in zip(product, summed, strict=True)], size, split)
+
+
+def _lowest_split_k(
+    top: Top,
+    weights: Sequence[SpinWeights],
+    rotation: list[LevelSums],
+    effects: Sequence[QuantumEffect],
+    size_mhz: float,
+    share: float,
+) -> list[float]:
+    """E/k of the lowest split level by each set of weights.
+
+    That of J = 0 and 1 where no rigid level of J = 2 is within twice the size of the couplings of the ground level; of J = 0 alone
+    where it exists and none of J = 1 is. J = 0 has a shift of second order in χ and C alone, V²/ΔE; below `share` of kT it is left out.
+    """
+    ground_mhz, least = max(one.ground_k for one in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
+    reach = ground_mhz + 2 * size_mhz
+    if top.states is not None or len(weights) > 1 or 6 * least < reach:
+        return lowest_level_k(top, weights, effects)
+    alone = 2 * least > max(reach, 2 * ground_mhz)
+    coldest_mhz = rotation[0].temperatures_k.min() * units.MHZ_PER_K
+    second_order = {effect.name for effect in effects if effect.spins(top)} <= _NONE_OF_J_0
+    if alone and second_order and size_mhz**2 / (2 * least) < share * coldest_mhz:
+        return [rotation[0].ground_k]
+    levels = solve_levels(top, 0 if alone else 1, effects=tuple(effects), vectors=False)
+    exists = weights_of_levels(levels, weights[0]) > 0
+    return [float(levels.energy_mhz[exists].min()) / units.MHZ_PER_K]
 
 
 def splitting_mhz(top: Top, effects: Sequence[QuantumEffect], temperature_k: float) -> float:
@@ -137,8 +183,9 @@ def _over(x2: Floats, value: Floats) -> Floats:
     return np.asarray(np.divide(x2, value, out=np.zeros_like(x2), where=x2 > 0))
 
 
-def _worst(sums: LevelSums) -> Floats:
-    return np.asarray(np.max([sums.error_q, sums.error_energy, sums.error_cv], axis=0))
+def _worst(sums: LevelSums, energies: bool) -> Floats:
+    errors = [sums.error_q, sums.error_energy, sums.error_cv]
+    return np.asarray(np.max(errors if energies else errors[:1], axis=0))
 
 
 def _placed(whole: LevelSums, where: NDArray[np.bool_], some: LevelSums) -> LevelSums:

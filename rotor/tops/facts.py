@@ -62,6 +62,7 @@ def top_facts(top: Top) -> dict[str, Any]:
 _OF_CONSTANTS = (
     "kind", "constants_mhz", "uncertainties_mhz", "reduction", "rotational_constants_mhz", "rotational_constants_cm", "kappa",
     "moments_u_angstrom2", "planar_moments_u_angstrom2", "inertial_defect_u_angstrom2", "spin_weights", "constants",
+    "dipole_abc_debye",
 )  # fmt: skip
 NO_CONSTANTS = "the parameters of the file have no names here; the levels are those of its own codes"
 

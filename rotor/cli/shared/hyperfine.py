@@ -29,7 +29,9 @@ class HyperfineOptions:
         metavar="NAME",
         help="exact, N-diagonal, first-order, or auto: the cheapest that keeps --hyperfine-tolerance.",
     )
-    hyperfine_tolerance: str = option("0.1kHz", metavar="D", help="How far auto may be off exact levels (MHz).")
+    hyperfine_tolerance: str = option(
+        "0.1kHz", metavar="D", help="With auto: how far it may be off exact levels (MHz)."
+    )
 
 
 def hyperfine_asked(options: HyperfineOptions, spin_constants: str | None) -> bool:

@@ -68,7 +68,7 @@ class Input:
         None, metavar="TEXT", help='Dipoles in and between states, axes a, b, c: "[1] 0,0,1.3 [0,1] 0,0,1.47" (D).'
     )
     state_weights: str | None = option(
-        None, metavar="TEXT", help='Spin weights of states: "[0] even=1,odd=3 [1] even=3,odd=1"; none: all alike.'
+        None, metavar="TEXT", help='Spin weights of states: "[0] even=1,odd=3 [1] none"; none: all its levels alike.'
     )
     state_symmetry: str | None = option(
         None, metavar="GROUP", help="Group of the states, whose couplings are checked by it: C2v, Cs(ab), C2(c), ..."
@@ -282,11 +282,12 @@ def read_top(given: Input) -> Top:
 
 def _with_states(top: Top, given: Input) -> Top:
     """The top with the states of the options, and what is to be said of their couplings among its notes."""
-    if any(getattr(given, name) is not None for name in STATES):
+    texts = {name: text for name in STATES if (text := getattr(given, name)) is not None}
+    if texts:
         from rotor.tops.states.state_texts import with_state_texts
 
         with fields_as_options(**STATES):
-            top = with_state_texts(top, {name: getattr(given, name) for name in STATES}, "given (--state-constants)")
+            top = with_state_texts(top, texts, f"given ({', '.join(STATES[name] for name in texts)})")
     notes = () if top.states is None else tuple(text for text in top.states.notes if text not in top.notes)
     return replace(top, notes=(*top.notes, *notes)) if notes else top
 

@@ -51,3 +51,16 @@ def leave_compiler_out() -> None:
     """
     if _OWN and "numba" not in sys.modules:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
+
+
+_ONE_THREAD_TO = 100  # the highest J up to which it was measured that one thread takes no longer
+
+
+def one_thread_of_blas(jmax: int | None = None) -> None:
+    """For small blocks: OpenBLAS takes one thread, as several only wait for each other, on a busy machine for ten times as long.
+
+    OpenBLAS reads its variable when numpy is loaded; where it is already there, the user has set the variable, J goes beyond 100, or the
+    process is another program's, nothing changes.
+    """
+    if _OWN and "numpy" not in sys.modules and (jmax is None or jmax <= _ONE_THREAD_TO):
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -338,7 +338,8 @@ def as_level_list(
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             g = levels.multiplicity * (levels.weight // levels.components)
             quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)
-            pattern = quanta_of(group, levels, form, negative)[:, -2] if form.aggregate else levels.rotational
+            numbered = form.aggregates(len(group.spins))
+            pattern = quanta_of(group, levels, form, negative)[:, -2] if numbered else np.full(len(levels), -1)
             energy = levels.energy_mhz / units.MHZ_PER_CM
             numbers = _numbers(group, levels, blocks, negative, rows)
             tables.append([*numbers, *(column[rows] for column in (energy, error, mixing, g, quanta, pattern))])

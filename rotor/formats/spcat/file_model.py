@@ -5,7 +5,7 @@ Each group of connected states has a top that stands for its symmetry, and the f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,20 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, basis_axes
+from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, of_their_spins
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, coded_lines, real_ones
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
-from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
+from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
-    exchange_of,
     forbidden,
-    halved_across,
     l_values,
     some_weights_agree,
     species_pairs,
@@ -37,8 +36,7 @@ from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.spins.operators import ByElements, is_axial
-from rotor.quantum.spins.terms import Spin
+from rotor.quantum.spins.operators import is_axial
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -151,7 +149,7 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
-    lines = _of_their_spins(lines, states, as_spcat)[0]
+    lines = of_their_spins(lines, states, as_spcat)[0]
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
@@ -195,7 +193,7 @@ def left_out(file: ParameterFile, *, as_spcat: bool = False) -> list[str]:
     members = frozenset(v for pair in doubled for v in pair)
     lines, reasons = allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)
     lines, complex_ = real_ones(lines, phases_of(file, len(states), members).odd, members)
-    return reasons + complex_ + (_of_their_spins(lines, states, True)[1] if as_spcat else [])
+    return reasons + complex_ + (of_their_spins(lines, states, True)[1] if as_spcat else [])
 
 
 def allowed(
@@ -276,51 +274,6 @@ def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
     return [[i for i in range(count) if group[i] == g] for g in sorted(set(group))]
 
 
-def _of_their_spins(
-    lines: list[CodedLine], states: tuple[StateOptions, ...], as_spcat: bool
-) -> tuple[list[CodedLine], list[str]]:
-    """The lines whose spins SPIND names, and with `as_spcat`, as SPCAT leaves the others out, why; else ValueError for one of those."""
-    found, reasons = list[CodedLine](), list[str]()
-    for line in lines:
-        why = _missing_spin(line, states)
-        if why and not as_spcat:
-            raise ValueError(f"parameter {line.name.partition('#')[0]}: {why}")
-        if why:
-            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why}")
-        else:
-            found.append(line)
-    return found, reasons
-
-
-def _missing_spin(line: CodedLine, states: tuple[StateOptions, ...]) -> str:
-    """Why a spin term can act on none of its states, empty where it can."""
-    spins = line.operator.spins
-    needed = max((*spins, 1 if line.operator.ns else 0), default=0)
-    concerned = states if line.states is None else [states[v] for v in line.states]
-    count = max if line.states is None else min
-    have = count(len(state.spins) for state in concerned)
-    if needed > have:
-        return f"spin {needed} is not among the {have} that SPIND names"
-    if len(spins) == 2 and spins[0] == spins[1]:
-        largest = count(state.spins[spins[0] - 1] if len(state.spins) >= spins[0] else 0 for state in concerned)
-        return (
-            "" if largest > 1 else f"spin {spins[0]} is {largest}/2, and a spin of 1/2 or less has no quadrupole moment"
-        )
-    return ""
-
-
-def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedLine]:
-    """A line with the part of it that joins levels of one weight; one of all states, which differ in it, is one for each state."""
-    if not line.operator.spins:
-        return [line]
-    if line.states:
-        return [line._replace(exchange=exchange_of(line.typ, *(of[v] for v in line.states)))]
-    found = {v: exchange_of(line.typ, state, state) for v, state in of.items()}
-    if len(set(found.values())) == 1:
-        return [line._replace(exchange=next(iter(found.values())))]
-    return [line._replace(states=(v, v), exchange=part) for v, part in found.items()]
-
-
 def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
@@ -344,35 +297,21 @@ def _group(
         )
         for dipole, code in acting
     )
-    own = tuple(line for line in lines if line.states is None or set(line.states) <= set(here))
-    usable = tuple(
-        line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
-    )
-    if states[0].equivalent == 2 and not doubled:
-        of = {state.number: state for state in states}
-        usable = tuple(part for line in usable for part in _by_exchange(line, of))
-    if states[0].equivalent == 3:
-        usable = tuple(_of_three(line, len(spins), basis_axes(oblate)) for line in usable)
+    own = [line for line in lines if line.states is None or set(line.states) <= set(here)]
+    usable = of_coupled_spins(own, states, not doubled, basis_axes(oblate))
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
         kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
-    others = len(spins) - states[0].equivalent  # which are not coupled to a total
-    coupled = tuple(
-        Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(spins, 1)
-    )
-    _check_three(states[0], others, first)
-    turned = turned_axis([axis_of(line.typ) for line in usable], light.phases.odd)
-    if turned and doubled:
-        raise ValueError(
-            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states: {NOT_YET}"
-        )
-    if not light.phases.odd and light.phases.between_i:
-        moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
-    elif light.phases.odd:
+    coupled = coupled_spins(states[0], first)
+    reverse = [as_spcat and code.typ in EVEN_ORDER for _, code in acting]
+    turned = _turned(usable, light, doubled)
+    if light.phases.odd:
         fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
         moments, beside = turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
+    elif light.phases.between_i:
+        moments, beside = by_order(moments, beside, reverse)
     second = {pair.second for pair in pairs}
     every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
     found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
@@ -388,25 +327,15 @@ def _group(
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
 
 
-def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
-    """A line with the factors that the program has for three equivalent spins."""
-    touches = max(line.operator.spins, default=0) > spins - 3
-    if touches and isinstance(line.operator.rotor, ByElements):
-        code = line.name.partition("#")[0]
+def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
+    """The axis whose half turn goes with time reversal where operators within one state are odd, "" where none does."""
+    turned = turned_axis([axis_of(line.typ) for line in lines], light.phases.odd)
+    if turned and doubled:
         raise ValueError(
-            f"parameter {code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
+            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states "
+            f"{PLURAL_NOT_YET}; leave one of them out"
         )
-    return line._replace(operator=halved_across(line.operator, axes)) if touches else line
-
-
-def _check_three(state: StateOptions, others: int, first: Options) -> None:
-    """ValueError for options that are not computed with a total spin of three."""
-    if state.equivalent < 3:
-        return
-    if first.diag in BY_DIAG:
-        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
-    if first.ixx >> (others + 1):
-        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")
+    return turned
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian

@@ -43,6 +43,10 @@ class Format:
         """Whether one number stands for the coupling pattern."""
         return self.before_spins + self.spins > self.most
 
+    def aggregates(self, spins: int) -> bool:
+        """Whether it stands for that of states with so many spins: not where their own quantum numbers fill no more columns."""
+        return self.aggregate and spins > self.width - self.before_spins
+
     @property
     def width(self) -> int:
         """Number of columns."""
@@ -55,16 +59,17 @@ class Format:
         (1405, 325, 101)
         """
         code = 1000 * self.states + 100 * self.before_spins + self.width
-        code += {0: 0, 2: 2000, 3: 6000}[0 if self.aggregate else self.equivalent]
+        aggregated = self.aggregates(len(spins))
+        code += {0: 0, 2: 2000, 3: 6000}[0 if aggregated else self.equivalent]
         odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
         if self.equivalent == 2 and len(odd) > 1:
             odd[-2] = 0
         if self.equivalent == 3 and len(odd) > 2:
             odd[-3:-1] = 0, sum(spins[-3:]) % 2
         total = int(odd[-1]) if len(odd) else 0
-        if self.aggregate:
+        if aggregated:
             return code + 4000 + 10 * total
-        halves = [int(odd[i]) if i < len(odd) else total for i in range(self.spins)]
+        halves = [int(odd[i]) if i < len(odd) else total for i in range(self.width - self.before_spins)]
         h = 0
         for bit in halves:
             h = 2 * h + bit
@@ -107,10 +112,10 @@ def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False
         columns.append(np.array([state.number for state in group.states])[v])
     names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
     totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
-    if form.aggregate:
+    if form.aggregates(len(group.spins)):
         columns += [pattern_numbers(group, levels, names), totals[-1]]
     elif form.spins:
-        columns += totals + [totals[-1]] * (form.spins - len(totals))
+        columns += totals + [totals[-1]] * (form.width - form.before_spins - len(totals))
     return np.stack(columns, axis=1)
 
 

@@ -6,7 +6,14 @@ from collections.abc import Mapping
 from functools import reduce
 from math import gcd
 
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, constants_of, is_linear, parameters_of, state_digits
+from rotor.formats.spcat.hamiltonian.codes import (
+    NOT_YET,
+    PLURAL_NOT_YET,
+    constants_of,
+    is_linear,
+    parameters_of,
+    state_digits,
+)
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Header, Options, ParameterFile
 from rotor.tops.constants import Constants
@@ -56,7 +63,7 @@ def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> S
     fold = FOLD[options.iax]
     factor = 100 if options.ewt >= 0 else 1000
     if abs(options.ewt) >= factor - 1:
-        raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {_plural(NOT_YET)}")
+        raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {PLURAL_NOT_YET}")
     if plus == minus:
         return SpinWeights.from_mapping({str(k): abs(options.ewt) if k else plus for k in range(fold)})
     if not symmetric:
@@ -84,10 +91,6 @@ def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
         0even, 0odd, 1, ..., n - 1.
     """
     return [2 * plus, 2 * minus, *[2 * e_weight if min(plus, minus) > 0 else e_weight] * (fold - 1)]
-
-
-def _plural(text: str) -> str:
-    return text.replace("is read", "are read")
 
 
 def options_of(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
@@ -160,7 +163,7 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
     """
     constants = constants_of(parameters)
     if intensities is not None and intensities.request.flags >= 1000:
-        raise ValueError(f"FLAGS = {intensities.request.flags}: constants in cm⁻¹ {_plural(NOT_YET)}")
+        raise ValueError(f"FLAGS = {intensities.request.flags}: constants in cm⁻¹ {PLURAL_NOT_YET}")
     dipole = dipole_of(intensities) if intensities else None
     oblate_basis = parameters.options[0].nvib < 0
     if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):

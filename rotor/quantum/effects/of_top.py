@@ -97,13 +97,30 @@ def _refuse_across_a_line(top: Top) -> None:
                 )
 
 
+def _refuse_weights_of_the_geometry(top: Top) -> None:
+    """ValueError where the spin weights beside a total spin of two nuclei are those of all nuclei of the geometry, these two among them."""
+    from rotor.tops.spins.spin_statistics import weights_of
+
+    assert top.spin_constants is not None
+    weights = top.spin_weights
+    if weights.rule == "none" or top.molecule is None or weights != weights_of(top.molecule):
+        return
+    first = next(iter(top.spin_constants.totals))
+    spin = top.spin_constants.twice[first]
+    remedy = "1 and 0 in place of 1 and 3 of two protons"
+    raise ValueError(
+        f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
+        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone, of levels of even total spin, such as {remedy}"
+    )
+
+
 def _refuse_like_nuclei(top: Top) -> None:
     """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
     if len(top.spin_constants.totals) == 2:
+        _refuse_weights_of_the_geometry(top)
         top.spin_weights.exchanged()  # raises where an exchange of two nuclei does not tell the classes apart
-        _refuse_counted_pair(top)
         labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
     if like and top.spin_weights.rule != "none":
@@ -111,31 +128,6 @@ def _refuse_like_nuclei(top: Top) -> None:
             f"spins of several {like[0]}: the spin weights of {top.name or 'this top'} count their exchange already; give the "
             "weights without them, or an .int and .var file with equivalent nuclei"
         )
-
-
-def _refuse_counted_pair(top: Top) -> None:
-    """ValueError where the weights are those of a geometry, which count the exchange of the two nuclei of a total spin too.
-
-    Of two nuclei of spin I alone they are (I + 1) : I, the larger one of the levels whose total spins are 2I, 2I - 2, ...
-    """
-    if top.molecule is None or top.symmetry is None or top.spin_weights.rule == "none":
-        return
-    from rotor.tops.spins.spin_statistics import spin_weights
-
-    assert top.spin_constants is not None
-    counted = spin_weights(top.symmetry, [one.spin for one in top.molecule.nuclei], top.molecule.electronic)
-    if top.spin_weights != counted:
-        return
-    twice = top.spin_constants.twice[next(iter(top.spin_constants.totals))]
-    given = counted.to_mapping()
-    even = (max if twice % 2 == 0 else min)(given.values())
-    of_the_pair = {2 * weight for weight in given.values()} in ({twice, twice + 2}, {2 * twice, 2 * twice + 4})
-    alone = ",".join(f"{name}={int(weight == even)}" for name, weight in given.items())
-    raise ValueError(
-        f"total spin of {'+'.join(top.spin_constants.totals)}: the spin weights of {top.name or 'this top'} "
-        f"({', '.join(f'{name} {weight}' for name, weight in given.items())}) count their exchange already; give those of levels of "
-        + (f"even total spin alone, {alone}" if of_the_pair else "even total spin that the other nuclei leave")
-    )
 
 
 def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
@@ -192,8 +184,8 @@ def effects_of(
     found = spin_effects(top)
     if not found:
         raise ValueError(
-            f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them, such as "
-            "chi_aa(14N)=-4.2 MHz"
+            f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them as spin_constants "
+            "(--spin-constants), such as chi_aa(14N)=-4.2 MHz"
         )
     return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
 

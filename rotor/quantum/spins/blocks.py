@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
-from rotor.quantum.spins.coupling import coefficients, for_every_f, n_dot_s
+from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_pairs, links_of_stacks
 from rotor.quantum.spins.many_f import Group
 from rotor.quantum.spins.method import FIRST_ORDER, BlockWithSpins, Used
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 Exist = Callable[[Ints], NDArray[np.bool_]]
 Operators = dict[tuple[int, int], dict[Channel, Floats]]
+InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ class Plan:
     shared: Shared
     blocks: list[RotorBlock]
     families: list[list[tuple[int, int]]]
-    contracted: list[tuple[list[Contracted], list[Channel]]] | None = field(default=None, repr=False)
+    contracted: InStacks | None = field(default=None, repr=False)
     given: Operators | None = field(default=None, repr=False)
 
     @cached_property
@@ -126,13 +127,15 @@ class Plan:
         """Each matrix between two blocks once, with the channels that share it."""
         return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
-    def with_method(self, used: Used, operators: Operators | None = None) -> Plan:
-        """The same rotation with some of the operators, all by default, and what that is called."""
-        shared = replace(self.shared, used=used)
+    def with_method(self, used: Used, operators: Operators | InStacks | None = None) -> Plan:
+        """The same rotation with some of the operators, by pairs or in stacks, all by default, and what that is called."""
+        shared, classes = replace(self.shared, used=used), max(self.shared.scheme.equivalent, 1)
         if operators is None:
             return replace(self, shared=shared)
-        families = families_of(len(self.blocks), links_of_pairs(operators), max(self.shared.scheme.equivalent, 1))
-        return Plan(shared, self.blocks, families, given=operators)
+        if isinstance(operators, dict):
+            families = families_of(len(self.blocks), links_of_pairs(operators), classes)
+            return Plan(shared, self.blocks, families, given=operators)
+        return Plan(shared, self.blocks, families_of(len(self.blocks), links_of_stacks(operators), classes), operators)
 
 
 def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
@@ -185,7 +188,7 @@ def _are_axial(blocks: list[RotorBlock]) -> bool:
     return isinstance(blocks[0].parts[0].basis, AxialState)
 
 
-def _by_pairs(contracted: list[tuple[list[Contracted], list[Channel]]]) -> Operators:
+def _by_pairs(contracted: InStacks) -> Operators:
     """Operators in stacks by pairs of blocks."""
     out: Operators = {}
     for found, channels in contracted:
@@ -412,15 +415,8 @@ def _between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
 def _with_conserved_and_powers(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints, found: Floats) -> Floats:
     for column in scheme.conserved_columns:
         found = np.where(bra[..., :, None, column] == ket[..., None, :, column], found, 0.0)
-    if not channel.ns:
-        return found
-    left, right = (_powers_of(scheme, channel, patterns) for patterns in (bra, ket))
-    return np.asarray(found * (left[..., :, None] + right[..., None, :]) / 2)
-
-
-def _powers_of(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
-    n = patterns[..., 0] / 2.0
-    return np.asarray((n * (n + 1)) ** channel.n2 * n_dot_s(patterns, scheme.twice[0]) ** channel.ns)
+    powers = channel.ns, channel.n2
+    return np.asarray(found * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else found
 
 
 def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:

@@ -335,7 +335,7 @@ def _of_cosines_with_n(
     found = [(factor, _of_tensor(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
     acting = [factor * matrix for factor, matrix in found if matrix is not None]
     scalar = float(np.trace(np.array(rotor.components))) / 3
-    if scalar and not rise and (left.v, up.first_k, up.sign) == (right.v, low.first_k, low.sign):
+    if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
         acting.append(scalar * np.sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(up.size, low.size))
     return np.asarray(sum(acting)) if acting else None
 

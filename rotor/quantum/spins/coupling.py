@@ -262,3 +262,28 @@ def n_dot_s(pattern: Ints, spin: int) -> Floats:
     """N·S of the first spin, (...,): ½[J(J+1) - N(N+1) - S(S+1)]."""
     n, j = pattern[..., 0], pattern[..., 1]
     return np.asarray((j * (j + 2) - n * (n + 2) - spin * (spin + 2)) / 8)
+
+
+def powers_between(spin: int, powers: tuple[int, int], bra: Ints, ket: Ints) -> Floats:
+    """½(bra + ket) of (N·S)^r N^2p of the first spin.
+
+    Parameters
+    ----------
+    spin : int
+        The first spin, doubled.
+    powers : (int, int)
+        r and p.
+    bra, ket : (..., n, columns) array of int
+        Patterns, doubled.
+
+    Returns
+    -------
+    (..., n', n) array
+    """
+    left, right = (_of_n_dot_s(spin, powers, patterns) for patterns in (bra, ket))
+    return np.asarray((left[..., :, None] + right[..., None, :]) / 2)
+
+
+def _of_n_dot_s(spin: int, powers: tuple[int, int], pattern: Ints) -> Floats:
+    n = pattern[..., 0] / 2.0
+    return np.asarray((n * (n + 1)) ** powers[1] * n_dot_s(pattern, spin) ** powers[0])

@@ -49,8 +49,7 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     list of SpinBlock or None
     """
     shared = plan.shared
-    alone = shared.used is not None and shared.used.method == FIRST_ORDER
-    if shared.stacks is None or plan.contracted is None or alone or shared.scheme.equivalent == 3:
+    if shared.stacks is None or plan.contracted is None or shared.scheme.equivalent == 3:
         return None
     table = pattern_table(shared.scheme, every_f[0], every_f[-1])
     if not 0 < len(table.every) <= _FEW:
@@ -58,6 +57,9 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     members = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
     if not members or max(parts[-1].place.stop for _, parts in members) > MOST:
         return None
+    alone = shared.used is not None and shared.used.method == FIRST_ORDER
+    if alone and any(part.repeats > 1 for _, parts in members for part in parts):
+        return None  # state by state the matrices are smaller
     members, names, sizes = _existing(members, table.patterns, exist)
     frame = frame_of(shared.stacks, table.places, table.every)
     shared.cache.update(frame=frame, patterns=table.patterns)

@@ -15,6 +15,7 @@ import numpy as np
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.blocks import Operators, Plan
+from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
 from rotor.quantum.spins.neglected import largest_shifts
 
@@ -30,21 +31,32 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
         )
     if asked.method == EXACT or plan.shared.scheme.equivalent == 3:
         return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz))
-    other_n, same_n = largest_shifts(plan, every_f)
+    other_n, same_n = largest_shifts(plan)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
     chosen = asked.method
     if chosen == "auto":
         chosen = next(name for name, size in estimates.items() if size <= asked.tolerance_mhz)
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
-    return plan.with_method(used, _remaining(plan, chosen))
+    if chosen == EXACT:
+        return plan.with_method(used)
+    if plan.contracted is None:
+        return plan.with_method(used, _remaining(plan, chosen))
+    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted])
 
 
-def _remaining(plan: Plan, method: str) -> Operators | None:
-    """The operators that a method has; None for all of them."""
+def _remaining(plan: Plan, method: str) -> Operators:
+    """The operators that a method has."""
     blocks = plan.blocks
     if method == N_DIAGONAL:
         return {pair: found for pair, found in plan.operators.items() if blocks[pair[0]].n == blocks[pair[1]].n}
-    if method == FIRST_ORDER:
-        alone = {pair: found for pair, found in plan.operators.items() if pair[0] == pair[1]}
-        return {pair: {c: np.diag(np.diag(x)) for c, x in found.items()} for pair, found in alone.items()}
-    return None
+    alone = {pair: found for pair, found in plan.operators.items() if pair[0] == pair[1]}
+    return {pair: {c: np.diag(np.diag(x)) for c, x in found.items()} for pair, found in alone.items()}
+
+
+def _of_one_n(every: Sequence[Contracted], method: str) -> list[Contracted]:
+    """The same of operators in stacks."""
+    found = [one for one in every if not one.pairs.rise]
+    if method == N_DIAGONAL:
+        return found
+    alone = [one for one in found if one.up is one.low]
+    return [one._replace(matrices=one.matrices * np.eye(one.matrices.shape[1])) for one in alone]

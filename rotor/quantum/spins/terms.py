@@ -14,6 +14,8 @@ from rotor.quantum.spins.operators import (
 class Spin:
     """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
 
+    One of size 0 holds a place in the order of coupling: it has a quantum number and splits nothing.
+
     Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two or three nuclei
     that have one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest. Of three, on
     a threefold axis, the terms name the first alone, or the first and the second (see `three_equivalent`).
@@ -25,8 +27,8 @@ class Spin:
     total: str = ""
 
     def __post_init__(self) -> None:
-        if self.twice < 1 or self.twice != int(self.twice):
-            raise ValueError(f"spin {self.name}: 2I = {self.twice}; twice a spin is a whole number, 1 or more")
+        if self.twice < 0 or self.twice != int(self.twice):
+            raise ValueError(f"spin {self.name}: 2I = {self.twice}; twice a spin is a whole number, 0 or more")
 
 
 @dataclass(frozen=True)

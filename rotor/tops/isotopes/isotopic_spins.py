@@ -21,6 +21,7 @@ from rotor.molecules.nuclei import Isotope
 from rotor.tops.spins.spin_constants import SpinConstants, spins_of
 
 if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
     from rotor.tops.top import Top
 
 LETTERS = ("aa", "bb", "cc", "ab", "ac", "bc")
@@ -61,7 +62,7 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
     atoms: dict[str, int] = {}
     notes = _of_pairs(constants)
     for spin in constants.twice:
-        atom = constants.atoms.get(spin)
+        atom = constants.atoms.get(spin) or _only_atom(parent.molecule, spin)
         if atom is None:
             notes.append(f"constants of {spin} are left out: which nucleus of the geometry it is, is not said")
             continue
@@ -79,6 +80,12 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
         f"from those of {parent.name or 'the parent'} ({constants.source}), turned with the axes and scaled by Q and g"
     )
     return SpinConstants(values, twice, source, atoms=atoms), tuple(notes)
+
+
+def _only_atom(molecule: Molecule, spin: str) -> int | None:
+    """The number of the atom that a spin named by its isotope must be: that of the only nucleus of it, counted from 1."""
+    found = [number for number, nucleus in enumerate(molecule.nuclei, 1) if nucleus.label == spin]
+    return found[0] if len(found) == 1 else None
 
 
 def _of_pairs(constants: SpinConstants) -> list[str]:

@@ -92,6 +92,8 @@ def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[
         other = f"{tensor}_{axes[::-1]}{rest}"
         difference = f"{tensor}_{axes[::-1]}-{axes}{rest}"
         if other not in values:
+            if difference in values:
+                raise ValueError(f"{name} beside {difference}: give {other} and {difference}, or {other} and {name}")
             out = {(other if key == name else key): value for key, value in out.items()}
             left = {(other if key == name else key): value for key, value in left.items()}
             continue

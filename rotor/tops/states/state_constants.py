@@ -158,6 +158,10 @@ class StateConstants:
                 )
         if self.names and len(self.names) != self.count:
             raise ValueError(f"names of states {', '.join(self.names)}: expected {self.count}, one for each state")
+        if self.names and (not all(self.names) or len(set(self.names)) < self.count):
+            raise ValueError(
+                f"names of states {', '.join(map(repr, self.names))}: expected each once, none of them empty"
+            )
 
     def refuse_couplings(self, group: str, even: str) -> None:
         """ValueError for two couplings of one pair of states of which the group takes only one for allowed.
@@ -171,7 +175,7 @@ class StateConstants:
             if kind != other:
                 raise ValueError(
                     f"{first} and {name}: two states of a molecule of {group} have one of them or the other; G about two axes and "
-                    "W exist together in C1 only"
+                    "W exist together in C1 and Ci only"
                 )
 
     @classmethod

@@ -101,7 +101,8 @@ def refuse_forbidden_state_dipoles(
                 where = f"in state {states.name_of(upper)}" if upper == lower else "between states "
                 where += "" if upper == lower else f"{states.name_of(lower)} and {states.name_of(upper)}"
                 raise ValueError(
-                    f"dipole μ{'abc'[axis]} = {value:g} D {where}: it would join levels of different nuclear-spin weight; give 0"
+                    f"dipole μ{'abc'[axis]} = {value:g} D {where}: it would join levels of different nuclear-spin weight; give 0, "
+                    "or other spin weights of the states"
                 )
 
 

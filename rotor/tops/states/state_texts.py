@@ -23,7 +23,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 T = TypeVar("T")
-KEYS = ("state_constants", "state_names", "state_symmetry", "state_weights", "state_dipoles")
+WORDS = {
+    "state_names": "names",
+    "state_symmetry": "symmetry",
+    "state_weights": "spin weights",
+    "state_dipoles": "dipoles",
+}
+KEYS = ("state_constants", *WORDS)
 _ITEM = re.compile(r"\[(?P<states>[^\[\]]*)\]\s*=?\s*(?P<text>[^\[\]]+)")
 
 
@@ -38,7 +44,7 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     texts : mapping of str to str or None
         By `KEYS`; what is None or missing is not given.
     source : str
-        Where the constants are from, where they are given here.
+        Where what is given here is from; of what it replaces the source of the top's states stays.
 
     Returns
     -------
@@ -68,8 +74,16 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     for key, text in given.items():
         if key != "state_constants":
             states = _of(key, partial(_changed, states, key, text, top))
-    whole = states
-    return _of(first, lambda: replace(top, states=whole))
+    changed = [WORDS[key] for key in given if key in WORDS and "state_constants" not in given]
+    said = [states.source, f"{', '.join(changed)} {source}" if changed else ""]
+    whole = replace(states, source="; ".join(filter(None, said)))
+    try:
+        return replace(top, states=whole)
+    except ValueError as error:
+        of_dipole = [
+            key for key in ("state_dipoles", "state_weights") if key in given and str(error).startswith("dipole")
+        ]
+        raise ValueError(f"{[*of_dipole, first][0]}: {error}") from None
 
 
 def _changed(states: StateConstants, key: str, text: str, top: Top) -> StateConstants:

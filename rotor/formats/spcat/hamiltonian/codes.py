@@ -26,6 +26,7 @@ from rotor.tops.kind_of_constants import RIGID
 from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
 
 NOT_YET = "is read but not computed yet"
+PLURAL_NOT_YET = "are read but not computed yet"
 
 AXES = {basis: axes_of(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
 

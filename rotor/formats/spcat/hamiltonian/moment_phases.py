@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET
+from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
 from rotor.formats.spcat.hamiltonian.phases import Phases
 from rotor.quantum.moments import Moment, Vector
 
@@ -61,7 +61,7 @@ def turned_moments(
     if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
         raise ValueError(
             "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
-            f"state, or PHASE: {NOT_YET}"
+            f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
         )
     every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
     plain, others = dict[tuple[int, int], Vector](), list[Moment]()

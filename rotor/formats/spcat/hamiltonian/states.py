@@ -129,8 +129,10 @@ class StateOptions:
 def doubled_spins(spind: int) -> tuple[int, ...]:
     """2I of every spin that SPIND names, the one coupled first at its end; with a last digit 0 two digits a spin.
 
-    >>> doubled_spins(44), doubled_spins(-32), doubled_spins(1), doubled_spins(-1080)
-    ((3, 3), (1, 2), (), (7,))
+    A digit 1 before others holds the place of a spin of size 0, which has its quantum number and splits nothing.
+
+    >>> doubled_spins(44), doubled_spins(-32), doubled_spins(1), doubled_spins(-1080), doubled_spins(61), doubled_spins(161)
+    ((3, 3), (1, 2), (), (7,), (0, 5), (0, 5))
     """
     digits, width = str(abs(spind)), 1
     if digits.endswith("0") and len(digits) > 1:

@@ -1,0 +1,29 @@
+"""One thread of BLAS for small blocks: in a process of the command alone, to J = 100, where the user has not chosen."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import pytest
+
+from rotor.cli.shared import process
+
+
+@pytest.mark.parametrize(
+    ("own", "loaded", "jmax", "before", "after"),
+    [
+        (True, False, None, None, "1"),
+        (True, False, 100, None, "1"),
+        (True, False, 101, None, None),
+        (True, False, 10, "4", "4"),
+        (True, True, 10, None, None),
+        (False, False, 10, None, None),
+    ],
+)
+def test_one_thread_is_set_before_numpy_is_loaded(monkeypatch, own, loaded, jmax, before, after):
+    monkeypatch.setattr(process, "_OWN", own)
+    monkeypatch.setattr(sys, "modules", {"numpy": sys.modules["numpy"]} if loaded else {})
+    monkeypatch.setattr(os, "environ", {"OPENBLAS_NUM_THREADS": before} if before else {})
+    process.one_thread_of_blas(jmax)
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == after
