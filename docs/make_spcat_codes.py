@@ -205,7 +205,10 @@ in SPFIT, none is odd there. This can change operators between states.
 An operator that the declared symmetry forbids (Δk - Δl no multiple of the fold of the axis, levels of unequal weights, axes that differ) is
 left out, as the program does, with a note. So are, without one, its elements between Wang blocks whose levels have unlike weights,
 where other elements of it act: l-doubling of TYP 21 where A1 and A2 have unlike weights, states of which some weights agree (five
-of the later inputs differed before). Dipoles between states have the phase i where no state has a dipole of its own. In an
+of the later inputs differed before). Electric moments between states, whatever their TYP, have the phase i where no more moments within
+states are of odd order (a dipole, TYP 3, 4, 6, 7, ...) than of even order (TYP 1, 2, 5, 8), as in the program. With `--as-spcat` those
+of even order themselves have -i, as there: without it the sign between them and a dipole is the documented one.
+So `103 1.` alone has other strengths than beside a dipole of a state, however small, where states mix. In an
 oblate basis operators that time reversal turns around have the factor -i.
 """
 DIPOLES = """

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -210,3 +211,20 @@ def test_a_spin_with_a_moment_and_n(oblate):
 def test_a_moment_that_time_reversal_turns_is_none_of_one_state(code):
     with pytest.raises(ValueError, match="time reversal would change the sign"):
         moment_of(Dipole(code, 1.0), split_dipole(code, 1), (0, 0), 1)
+
+
+@pytest.mark.parametrize("as_spcat", [False, True])
+@pytest.mark.parametrize("beside", ["", "1 0.001\n"])
+def test_a_cosine_without_an_angle_is_the_plain_dipole(beside, as_spcat):
+    """TYP 7 with n = 0 is TYP 0, between states that a coupling mixes too, alone and beside a dipole of a state."""
+    found = []
+    for code in (103, 70103):
+        par, asked = _files("1", False, f"{code} 1.0\n{beside}")
+        coupling = replace(par.parameters[-1], code=20010, value=100.0)
+        (group,) = groups_of(replace(par, parameters=(*par.parameters, coupling)), asked, as_spcat=as_spcat)
+        levels = group.levels((0, 8))
+        lines = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
+        found.append(dict(zip(zip(lines.upper, lines.lower, strict=True), lines.strength_debye2, strict=True)))
+    plain, cosine = ({lines: value for lines, value in one.items() if value > 1e-12} for one in found)  # of 1 D²
+    assert len(plain) > 100
+    assert cosine == pytest.approx(plain, rel=1e-6)  # 1e-12 of 1 D² where amplitudes cancel

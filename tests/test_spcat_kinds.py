@@ -31,7 +31,7 @@ MADE = {
     "moment_of_n": 92, "weights_of_states_i_tot": 583, "unequal_weights_i_tot": 361, "fourier_l_doubled": 588,
     "fourier_two_states": 7206, "euler_water": 273, "sampled_k": 1603,
     "diag3_spins": 1150, "diag5_i_tot": 638, "diag3_states": 167, "euler_series": 218, "fourier_series": 288, "near_sphere_states": 235,
-    "moments_between": 7674, "moments_between_oblate": 9426, "spin_orders": 625, "spin_series": 1264,
+    "moments_between": 7674, "moments_between_oblate": 9426, "moments_alone": 398, "spin_orders": 625, "spin_series": 1264,
     "odd_and_phase": 1399, "weights_in_part": 602, "phase_with_spins": 3671, "odd_in_oblate": 1178, "states_up_to_maxv": 320,
     "triplet_and_delta": 57, "wavenumbers": 437, "spin_of_size_zero": 1810,
     "spin_of_size_zero_beside_three": 2701,

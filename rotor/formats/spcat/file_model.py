@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, of_their_spins
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
-from rotor.formats.spcat.hamiltonian.dipole_codes import DipoleCode, Dipoles, dipoles_of, moment_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines, real_ones
+from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, coded_lines, real_ones
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import named_by
+from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
@@ -33,7 +34,6 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
-from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial
@@ -144,13 +144,10 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     phases = phases_of(file, len(states), members)
     own_axes = _within_states(dipoles, others, states, members)
-    phases = with_dipoles(phases, own_axes, oblate, as_spcat) if phases.odd else phases
+    phases = with_dipoles(phases, own_axes, oblate, as_spcat and bool(phases.odd))
     lines = coded_lines(file, len(states), doubled)
     lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
-    own = any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items())
-    if not phases.odd and not others and not own:
-        dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     lines = of_their_spins(lines, states, as_spcat)[0]
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
@@ -161,7 +158,11 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
 
 
 class Light(NamedTuple):
-    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `_within_states`."""
+    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `_within_states`.
+
+    Where no more electric moments within states are of odd order (a dipole, with TYP 0, 3, 4, ...) than of even order, the program
+    takes each between two states times i.
+    """
 
     dipoles: Dipoles
     others: list[tuple[Dipole, DipoleCode]]
@@ -173,10 +174,12 @@ class Light(NamedTuple):
 def _within_states(
     dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], states: tuple[StateOptions, ...], members: frozenset[int]
 ) -> list[tuple[int, bool]]:
-    """The axes of the electric moments within one state that join levels of one weight, and whether they are commutators."""
+    """The axes of the electric moments within one state that join levels of one weight, and whether they are of even order."""
     plain = [(v, axis, False) for (v, w), mu in dipoles.items() for axis, value in enumerate(mu, 1) if v == w and value]
     plain += [
-        (code.states[0], code.axis, code.typ == 5) for _, code in others if code.axis and len(set(code.states)) == 1
+        (code.states[0], code.axis, code.typ in EVEN_ORDER)
+        for _, code in others
+        if code.axis and len(set(code.states)) == 1
     ]
     return [
         (axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])
@@ -191,15 +194,6 @@ def left_out(file: ParameterFile, *, as_spcat: bool = False) -> list[str]:
     lines, reasons = allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)
     lines, complex_ = real_ones(lines, phases_of(file, len(states), members).odd, members)
     return reasons + complex_ + (of_their_spins(lines, states, True)[1] if as_spcat else [])
-
-
-def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
-    """Whether a dipole is of one state and joins levels of one weight. Without such a dipole the program takes those between
-    states times i, so that they change their sign with the order of the states."""
-    low, high = pair
-    if low != high or low in {v for both in doubled for v in both}:
-        return low == high
-    return any(value and some_weights_agree(20 * axis, states[low], states[low]) for axis, value in enumerate(mu, 1))
 
 
 def allowed(
@@ -296,12 +290,12 @@ def _group(
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
+    acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
     beside = tuple(
         moment_of(
             dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series
         )
-        for dipole, code in light.others
-        if set(code.states) <= set(here)
+        for dipole, code in acting
     )
     own = [line for line in lines if line.states is None or set(line.states) <= set(here)]
     usable = of_coupled_spins(own, states, not doubled, basis_axes(oblate))
@@ -311,7 +305,13 @@ def _group(
         kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     coupled = coupled_spins(states[0], first)
-    turned, moments, beside = _in_phases(moments, beside, usable, light, doubled, oblate)
+    reverse = [as_spcat and code.typ in EVEN_ORDER for _, code in acting]
+    turned = _turned(usable, light, doubled)
+    if light.phases.odd:
+        fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
+        moments, beside = turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
+    elif light.phases.between_i:
+        moments, beside = by_order(moments, beside, reverse)
     second = {pair.second for pair in pairs}
     every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
     found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
@@ -327,53 +327,15 @@ def _group(
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
 
 
-def _in_phases(
-    moments: dict[tuple[int, int], Vector],
-    beside: tuple[Moment, ...],
-    lines: Iterable[CodedLine],
-    light: Light,
-    doubled: list[Pair],
-    oblate: bool,
-) -> tuple[str, dict[tuple[int, int], Vector], tuple[Moment, ...]]:
-    """The axis whose half turn goes with time reversal where operators within one state are odd, "" where none does, and the moments
-    in the functions that both together leave as they are."""
+def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
+    """The axis whose half turn goes with time reversal where operators within one state are odd, "" where none does."""
     turned = turned_axis([axis_of(line.typ) for line in lines], light.phases.odd)
     if turned and doubled:
         raise ValueError(
             f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states "
             f"{PLURAL_NOT_YET}; leave one of them out"
         )
-    if not light.phases.odd:
-        return turned, moments, beside
-    fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
-    return turned, *_turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
-
-
-def _turned_moments(
-    moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], turned: str, phases: Phases
-) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
-    """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
-    apart, each component by itself."""
-    if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
-        raise ValueError(
-            "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
-            f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
-        )
-    every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
-    plain, others = dict[tuple[int, int], Vector](), list[Moment]()
-    for moment in every:
-        if moment.along_abc is None:
-            others.append(moment)
-            continue
-        for axis, value in enumerate(moment.along_abc, 1):
-            along = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
-            by_order = moment.states[0] != moment.states[1] and phases.has_i(axis)
-            across = "" if "abc"[axis - 1] == turned else turned
-            if value and not across and not by_order and moment in every[: len(moments)]:
-                plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
-            elif value:
-                others.append(moment._replace(along_abc=along, turned=across, by_order=by_order))
-    return plain, tuple(others)
+    return turned
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian

@@ -98,7 +98,8 @@ class SpinMoments:
                     continue
                 found = self._between(moment, left, right)
                 if found is not None and found.any():
-                    moved = up.vectors[left.place].T @ (moment.value_debye * found) @ low.vectors[right.place]
+                    value = moment.value_debye * _order(moment, left, right)
+                    moved = up.vectors[left.place].T @ (value * found) @ low.vectors[right.place]
                     total = moved if total is None else total + moved
         first, second = up.parts[0].basis, low.parts[0].basis
         if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
@@ -108,8 +109,8 @@ class SpinMoments:
     def _between(self, moment: Moment, left: RotorPart, right: RotorPart) -> Floats | None:
         up, low = left.basis, right.basis
         if moment.written is not None:
-            turned = left.v != right.v and (left.v, right.v) != moment.states
-            found = written_elements(moment.written, up, low, self.representation, turned)
+            back = left.v != right.v and (left.v, right.v) != moment.states
+            found = written_elements(moment.written, up, low, self.representation, back)
             return found * _factor(moment.powers, left, right) if found is not None and moment.powers else found
         if moment.along_abc is not None and moment.spin:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
@@ -118,9 +119,8 @@ class SpinMoments:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
             if found is None:
                 return None
-            return found * (
-                _sign(moment, left, right) * _factor(moment.powers, left, right) * _cosine(moment, left, right)
-            )
+            turned = character(up, moment.turned) if moment.turned and isinstance(up, WangBlock) else 1
+            return found * (turned * _factor(moment.powers, left, right) * _cosine(moment, left, right))
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
@@ -180,12 +180,11 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
     )
 
 
-def _sign(moment: Moment, left: RotorPart, right: RotorPart) -> int:
-    """Of what is turned, and of what depends on the order of the states."""
-    turned = character(left.basis, moment.turned) if moment.turned and isinstance(left.basis, WangBlock) else 1
-    if not moment.by_order:
-        return turned
-    return -turned if (left.v < right.v) == bool(moment.turned) else turned  # of both i · i = -1
+def _order(moment: Moment, left: RotorPart, right: RotorPart) -> int:
+    """The sign of what depends on the order of the states; beside that of what is turned, i · i = -1."""
+    if not moment.by_order or left.v == right.v:
+        return 1
+    return -1 if (left.v < right.v) == bool(moment.turned) else 1
 
 
 def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:

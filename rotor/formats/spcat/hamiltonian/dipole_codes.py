@@ -60,6 +60,7 @@ def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tu
 
 
 FOURIER = (7, 8)
+EVEN_ORDER = (1, 2, 5, 8)  # TYP of electric moments that are of even order in angular momenta: {φ, N}, [N², φ], i sine
 _POWERS = {3: "J", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP with powers of N² of TYP 0
 _WRITTEN = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
 

@@ -1,0 +1,80 @@
+"""Moments of a file in the phases of its functions: what has the factor i between two states, and what stands for C2g times itself.
+
+The rule of `phases` counts the electric moments within states; it is the same for every electric moment between two states, whatever its
+TYP. The factor i is a sign that changes with the order of the states, in functions in which the Hamiltonian is real.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
+from rotor.formats.spcat.hamiltonian.phases import Phases
+from rotor.quantum.moments import Moment, Vector
+
+
+def by_order(
+    moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], reverse: Sequence[bool]
+) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
+    """The moments with the factor i of every electric one between two states, and -i of those beside that are reversed."""
+    if not beside:
+        back = {(w, v): (-a, -b, -c) for (v, w), (a, b, c) in moments.items() if v != w}
+        return moments | back, ()
+    own = {states: along for states, along in moments.items() if states[0] == states[1]}
+    between = [Moment(1.0, states, along) for states, along in moments.items() if states[0] != states[1]]
+    signed = [(moment, False) for moment in between] + list(zip(beside, reverse, strict=True))
+    return own, tuple(_with_i(moment, back) for moment, back in signed)
+
+
+def _with_i(moment: Moment, reverse: bool) -> Moment:
+    if not moment.electric or moment.states[0] == moment.states[1]:
+        return moment
+    return moment._replace(value_debye=-moment.value_debye if reverse else moment.value_debye, by_order=True)
+
+
+def turned_moments(
+    moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], turned: str, phases: Phases
+) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
+    """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
+    apart, each component by itself.
+
+    Parameters
+    ----------
+    moments : dict of (int, int) to (float, float, float)
+        Plain dipoles by pairs of states.
+    beside : tuple of Moment
+        Those of other kinds.
+    turned : str
+        The axis whose half turn goes with time reversal, "" where there is none.
+    phases : Phases
+        Which components have the factor i.
+
+    Returns
+    -------
+    plain : dict of (int, int) to (float, float, float)
+        Those that are as they were.
+    others : tuple of Moment
+        The others.
+    """
+    if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
+        raise ValueError(
+            "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
+            f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
+        )
+    every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
+    plain, others = dict[tuple[int, int], Vector](), list[Moment]()
+    for moment in every:
+        if moment.along_abc is None:
+            others.append(moment)
+            continue
+        for axis, value in enumerate(moment.along_abc, 1):
+            along = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
+            ordered = moment.states[0] != moment.states[1] and phases.has_i(axis)
+            across = "" if "abc"[axis - 1] == turned else turned
+            if value and not across and not ordered and moment in every[: len(moments)]:
+                plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
+            elif value:
+                others.append(moment._replace(along_abc=along, turned=across, by_order=ordered))
+    return plain, tuple(others)
