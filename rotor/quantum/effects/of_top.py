@@ -107,10 +107,9 @@ def _refuse_weights_of_the_geometry(top: Top) -> None:
         return
     first = next(iter(top.spin_constants.totals))
     spin = top.spin_constants.twice[first]
-    remedy = "1 and 0 in place of 1 and 3 of two protons"
     raise ValueError(
         f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
-        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone, of levels of even total spin, such as {remedy}"
+        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone: for two, 1 to levels of even total spin and 0 to the others"
     )
 
 
