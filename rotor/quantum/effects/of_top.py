@@ -109,7 +109,7 @@ def _refuse_weights_of_the_geometry(top: Top) -> None:
     spin = top.spin_constants.twice[first]
     raise ValueError(
         f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
-        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone: for two, 1 to levels of even total spin and 0 to the others"
+        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, 0 to others"
     )
 
 
