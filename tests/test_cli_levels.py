@@ -181,7 +181,7 @@ def test_levels_with_the_spins_of_the_library(call, folder):
 
 @pytest.mark.parametrize(("limits", "expected"), [(None, {"$1_{0,1}, F{=}0,1,2$"}), ((21195.0, 21220.0), {0, 1, 2})])
 def test_overlapping_levels_of_spins_have_one_label(limits, expected):
-    """Steps that cannot be told apart have all values of F at one label; where the view parts them each has its own."""
+    """Steps that cannot be resolved have all values of F at one label; where the view parts them each has its own."""
     top = rotor.read("formamide")
     table = answer_levels(LevelsRequest(top, jmax=1, effects=effects_of(top, True))).table
     figure = levels_figure(table, top, unit="MHz", view=View(vertical=limits))

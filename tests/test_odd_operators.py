@@ -137,17 +137,17 @@ def test_a_spin_along_the_axis():
     file = _file(((199, b), (1099, off), (10200000, c)), spin=2)
     (group,) = groups_of(file, IntensityFile("", Request(), ()))
     levels = group.levels((7, 7))
-    wanted = []
+    expected = []
     for k in range(-4, 5):
         n = np.array([j - 0.5, j + 0.5])
         d = c * k * (j * (j + 1) - n * (n + 1) - 0.75) / (2 * n * (n + 1))
         energy = b * n * (n + 1) + off * k**2
         if abs(k) == 4:  # N = 4 alone
-            wanted.append(energy[1] + d[1])
+            expected.append(energy[1] + d[1])
         else:
             across = np.sqrt(c**2 / 4 - d[0] ** 2)
-            wanted += list(np.linalg.eigvalsh([[energy[0] + d[0], across], [across, energy[1] + d[1]]]))
-    assert np.sort(levels.energy_mhz) == pytest.approx(np.sort(wanted), abs=ROUND_OFF_MHZ)
+            expected += list(np.linalg.eigvalsh([[energy[0] + d[0], across], [across, energy[1] + d[1]]]))
+    assert np.sort(levels.energy_mhz) == pytest.approx(np.sort(expected), abs=ROUND_OFF_MHZ)
 
 
 def test_those_of_the_rarer_kind_are_left_out_with_a_note():

@@ -25,6 +25,7 @@ from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turne
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
+    SpeciesPairs,
     forbidden,
     l_values,
     some_weights_agree,
@@ -140,13 +141,12 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     states = states_of(file)
     first = file.options[0]
     doubled = pairs_of(states)
-    members, oblate = frozenset(v for pair in doubled for v in pair), first.nvib < 0
+    members, oblate = _members(doubled), first.nvib < 0
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     phases = phases_of(file, len(states), members)
     own_axes = _within_states(dipoles, others, states, members)
     phases = with_dipoles(phases, own_axes, oblate, as_spcat and bool(phases.odd))
-    lines = coded_lines(file, len(states), doubled)
-    lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
+    lines = _acting(file, states, doubled, phases.odd)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     lines = of_their_spins(lines, states, as_spcat)[0]
@@ -188,12 +188,24 @@ def _within_states(
 
 def left_out(file: ParameterFile, *, as_spcat: bool = False) -> list[str]:
     """A sentence for every parameter that the declared symmetry forbids, and with `as_spcat` for one of spins that are not there."""
-    states, oblate = states_of(file), file.options[0].nvib < 0
+    states = states_of(file)
     doubled = pairs_of(states)
-    members = frozenset(v for pair in doubled for v in pair)
-    lines, reasons = allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)
-    lines, complex_ = real_ones(lines, phases_of(file, len(states), members).odd, members)
-    return reasons + complex_ + (of_their_spins(lines, states, True)[1] if as_spcat else [])
+    lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), _members(doubled)).odd)
+    return reasons + (of_their_spins(lines, states, True)[1] if as_spcat else [])
+
+
+def _members(doubled: list[Pair]) -> frozenset[int]:
+    """The states of l-doubled pairs."""
+    return frozenset(v for pair in doubled for v in pair)
+
+
+def _acting(
+    file: ParameterFile, states: tuple[StateOptions, ...], doubled: list[Pair], odd: frozenset[str]
+) -> tuple[list[CodedLine], list[str]]:
+    """The lines that symmetry allows and that are real where operators along some axes are odd, and why others are left out."""
+    lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
+    lines, imaginary = real_ones(lines, odd, _members(doubled))
+    return lines, forbidden + imaginary
 
 
 def allowed(
@@ -305,26 +317,28 @@ def _group(
         kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     coupled = coupled_spins(states[0], first)
-    reverse = [as_spcat and code.typ in EVEN_ORDER for _, code in acting]
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
         fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
         moments, beside = turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
     elif light.phases.between_i:
-        moments, beside = by_order(moments, beside, reverse)
-    second = {pair.second for pair in pairs}
-    every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
-    found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
-    apart = {both: species for both, species in found.items() if species is not None}
-    effect = FileEffect(
-        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned, apart
-    )
+        moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
+    axes, apart = basis_axes(oblate), _apart(states, pairs)
+    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
+
+
+def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[int, int], SpeciesPairs]:
+    """By pairs of states the species between which there are elements, where weights forbid others."""
+    second = {pair.second for pair in pairs}
+    every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
+    found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
+    return {both: species for both, species in found.items() if species is not None}
 
 
 def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, tensor_of
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, factors_with_n, tensor_of
 from rotor.quantum.spins.rotor import Piece, RotorBlock, RotorPart, acts
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import BodyTensor, Tensors, overlap, rank_of, tensor_between
@@ -327,16 +327,16 @@ def _of_cosines_with_n(
     if abs(rise) > 1:
         return None
     up, low = left.basis, right.basis
-    stretch = np.sqrt(np.maximum(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
+    stretch, change, length = factors_with_n(m, n)
     parts = [
         (stretch, tensor_of(rotor.components, 2, representation)),
-        ((n * (n + 1) - m * (m + 1)) / 2, axis_tensor(rotor.components, representation)),
+        (change, axis_tensor(rotor.components, representation)),
     ]
     found = [(factor, _of_tensor(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
     acting = [factor * matrix for factor, matrix in found if matrix is not None]
     scalar = float(np.trace(np.array(rotor.components))) / 3
     if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
-        acting.append(scalar * np.sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(up.size, low.size))
+        acting.append(scalar * length * np.eye(up.size, low.size))
     return np.asarray(sum(acting)) if acting else None
 
 

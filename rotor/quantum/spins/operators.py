@@ -25,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -128,6 +127,13 @@ class Cosines:
         return -found if found is not None and self.rank == 1 else found  # i (i E)
 
 
+def factors_with_n(m: float | Floats, n: float | Floats) -> tuple[Floats, float | Floats, Floats]:
+    """Of the elements of `CosinesWithN` from N = n to N' = m, |m - n| <= 1: of T² of c, of its antisymmetric part, of a third of its
+    trace (for m = n)."""
+    stretch = np.sqrt(np.maximum(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
+    return stretch, (n * (n + 1) - m * (m + 1)) / 2, np.sqrt(n * (n + 1) * (2 * n + 1))
+
+
 @dataclass(frozen=True)
 class CosinesWithN:
     """Σ_ij c_ij ½{φ_pi, N_j} with any c (3, 3) along a, b, c: rank 1."""
@@ -141,11 +147,11 @@ class CosinesWithN:
         c, n, m = np.array(self.components), low.j, up.j
         if abs(m - n) > 1 or not m + n:
             return None
-        stretch = sqrt(max(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
+        stretch, change, length = factors_with_n(float(m), float(n))
         found = [
             (stretch, tensor_elements(up, low, tensor_of(self.components, 2, representation))),
-            ((n * (n + 1) - m * (m + 1)) / 2, tensor_elements(up, low, axis_tensor(self.components, representation))),
-            (float(np.trace(c)) / 3, sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(low.size) if up == low else None),
+            (change, tensor_elements(up, low, axis_tensor(self.components, representation))),
+            (float(np.trace(c)) / 3, length * np.eye(low.size) if up == low else None),
         ]
         acting = [factor * matrix for factor, matrix in found if matrix is not None and factor]
         return np.asarray(sum(acting)) if acting else None

@@ -289,16 +289,18 @@ class FileEffect(QuantumEffect):
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
             return coupling
-        of, representation = coupling.operator, "IIIl" if self.axes[2] == "c" else "Ir"
-        whole, part = (
-            of(_LOOKED_AT, representation),
-            between_species(of(_LOOKED_AT, representation), representation, pairs),
-        )
+        of = coupling.operator
+        whole = of(_LOOKED_AT, self._representation)
+        part = between_species(whole, self._representation, pairs)
         if np.abs((whole - part).matrix).max() <= NOTHING * np.abs(whole.matrix).max():
             return coupling
         return replace(
             coupling, operator=lambda j, representation: between_species(of(j, representation), representation, pairs)
         )
+
+    @property
+    def _representation(self) -> str:
+        return "IIIl" if self.axes[2] == "c" else "Ir"
 
     def _is_turned(self, line: CodedLine) -> bool:
         """Whether half a turn about the axis of the phases changes the sign of a line's operator."""
@@ -344,7 +346,7 @@ class FileEffect(QuantumEffect):
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
         if pairs is None or not isinstance(rotor, ByElements | Cosines | CosinesWithN | HalfTurned):
             return term
-        representation = "IIIl" if self.axes[2] == "c" else "Ir"
+        representation = self._representation
         blocks = wang_blocks(_LOOKED_AT, representation)
         beyond = (
             rotor.elements(up, low, representation)
