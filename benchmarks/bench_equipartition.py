@@ -19,13 +19,13 @@ import numpy as np
 from ase.units import fs
 
 from rotor import units
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.initial_box import heat, lattice_box, relax
-from rotor.fluid.motion.bodies import bodies_of
-from rotor.fluid.motion.dynamics import RigidDynamics
-from rotor.fluid.motion.thermostats import Langevin
-from rotor.fluid.run import calculator_of
-from rotor.fluid.settings import Settings
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.initial_box import heat, lattice_box, relax
+from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.dynamics import RigidDynamics
+from rotor.fluids.motion.thermostats import Langevin
+from rotor.fluids.run import calculator_of
+from rotor.fluids.settings import Settings
 from rotor.statistics.equipartition import Equipartition, KineticDegrees, equipartition, kinetic_degrees
 
 CONFIDENCE = 0.99

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fit.assignment import Assignments, assignments, levels_in
-from rotor.fit.fit import Fit, FitOptions, fit_lines
-from rotor.fit.parameters import Parameters, parameters
-from rotor.fit.search import Search
+from rotor.fitting.assignment import Assignments, assignments, levels_in
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.parameters import Parameters, parameters
+from rotor.fitting.search import Search
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.least_squares import _Linear, _State

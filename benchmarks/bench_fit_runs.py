@@ -186,8 +186,8 @@ def iteration(folder: Path) -> float:
     import numpy as np
     from bench_fit import fastest
 
-    from rotor.fit.assignment import levels_in
-    from rotor.fit.search import Search
+    from rotor.fitting.assignment import levels_in
+    from rotor.fitting.search import Search
     from rotor.formats.spcat.fits.fit_input import read_fit
     from rotor.quantum.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State

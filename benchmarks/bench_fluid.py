@@ -31,14 +31,14 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluid.analysis import drift_per_ns
-from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.engine_input import engine_input_of
-from rotor.fluid.engines.pair_tables import Form
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.initial_box import lattice_box, relax
-from rotor.fluid.run import calculator_of, dynamics_of
-from rotor.fluid.settings import Settings
+from rotor.fluids.analysis import drift_per_ns
+from rotor.fluids.engines import lammps, openmm
+from rotor.fluids.engines.engine_input import engine_input_of
+from rotor.fluids.engines.pair_tables import Form
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.initial_box import lattice_box, relax
+from rotor.fluids.run import calculator_of, dynamics_of
+from rotor.fluids.settings import Settings
 
 KJ_PER_MOL = units.mol / units.kJ
 LAMMPS_RUN = """

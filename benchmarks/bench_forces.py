@@ -21,8 +21,8 @@ import numpy as np
 from ase import Atoms
 from bench_tops import processor
 
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.potential import RigidPotential
 from rotor.geometry.rotations import uniform
 
 PER_CUBIC_ANGSTROM = 33.36e-3

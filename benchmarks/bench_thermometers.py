@@ -23,14 +23,14 @@ from ase.units import fs
 
 from rotor import units
 from rotor.classical.integrators.splitting import RotationSplitting
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.initial_box import heat, lattice_box, relax
-from rotor.fluid.motion.bodies import bodies_of
-from rotor.fluid.motion.dynamics import RigidDynamics
-from rotor.fluid.motion.state import Flows, State
-from rotor.fluid.motion.thermometers import THERMOMETERS, kinetic_energy, step_correction
-from rotor.fluid.run import calculator_of, run_fluid
-from rotor.fluid.settings import Settings
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.initial_box import heat, lattice_box, relax
+from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.dynamics import RigidDynamics
+from rotor.fluids.motion.state import Flows, State
+from rotor.fluids.motion.thermometers import THERMOMETERS, kinetic_energy, step_correction
+from rotor.fluids.run import calculator_of, run_fluid
+from rotor.fluids.settings import Settings
 
 MOLECULES = 216
 STEPS_FS = (1.0, 2.0, 3.0, 4.0)

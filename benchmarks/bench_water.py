@@ -21,15 +21,15 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluid.analysis import block_errors, diffusion, drift_per_ns, pair_distribution, yeh_hummer_correction
-from rotor.fluid.engines.results import run_engine
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.forces.potential import RigidPotential
-from rotor.fluid.initial_box import lattice_box, relax
-from rotor.fluid.record import FluidRecord
-from rotor.fluid.run import dynamics_of, pressure_bar
-from rotor.fluid.settings import Settings
-from rotor.fluid.summary import mean_of
+from rotor.fluids.analysis import block_errors, diffusion, drift_per_ns, pair_distribution, yeh_hummer_correction
+from rotor.fluids.engines.results import run_engine
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.potential import RigidPotential
+from rotor.fluids.initial_box import lattice_box, relax
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.run import dynamics_of, pressure_bar
+from rotor.fluids.settings import Settings
+from rotor.fluids.summary import mean_of
 
 KJ_PER_MOL = units.mol / units.kJ  # of 1 eV
 VISCOSITY = 0.729e-3  # Pa s, SPC/E at 298 K: M. A. González and J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)

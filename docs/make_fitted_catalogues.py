@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.fit.assignment import Assignments
-from rotor.fit.choose import Trial, choose_constants
-from rotor.fit.criteria import aicc
-from rotor.fit.fit import Fit, FitOptions
-from rotor.fit.parameters import with_names
+from rotor.fitting.assignment import Assignments
+from rotor.fitting.choose import Trial, choose_constants
+from rotor.fitting.criteria import aicc
+from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.parameters import with_names
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.tops.constants import Constants
 

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.fit.choose import choose_constants
-from rotor.fit.fit import Fit, FitOptions
+from rotor.fitting.choose import choose_constants
+from rotor.fitting.fit import Fit, FitOptions
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.family_file import read_family
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope
-from rotor.structure.family import Family, family
-from rotor.structure.kraitchman import Substituted, kraitchman
-from rotor.structure.least_squares import FittedStructure, fit_structure
-from rotor.structure.substitution import substitution_structure
+from rotor.structures.family import Family, family
+from rotor.structures.kraitchman import Substituted, kraitchman
+from rotor.structures.least_squares import FittedStructure, fit_structure
+from rotor.structures.substitution import substitution_structure
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2

@@ -14,7 +14,7 @@ import numpy as np
 
 import rotor
 from rotor.plots.heat_capacity import Panel, Points, curve_temperatures, plot_heat_capacity
-from rotor.thermo import (
+from rotor.thermodynamics import (
     GAS_CONSTANT,
     ThermoFunctions,
     VibrationalStates,

@@ -20,7 +20,7 @@ from rotor.classical.gas.ensembles import free_gas_correlations
 from rotor.plots.gas import band_figure
 from rotor.plots.heat_capacity import Panel, heat_capacity_figure
 from rotor.spectra.classical_band import classical_band, compare_bands, dipole_band_area, lines_area, rigid
-from rotor.thermo import GAS_CONSTANT, thermodynamic_functions
+from rotor.thermodynamics import GAS_CONSTANT, thermodynamic_functions
 from rotor.units import ASE_TIME_PS, EV_PER_K, MHZ_PER_CM
 
 # %matplotlib inline

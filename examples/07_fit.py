@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.fit.assignment import assignments
-from rotor.fit.choose import choose_constants, suggest_lines
-from rotor.fit.fit import FitOptions, fit_lines
-from rotor.fit.parameters import parameters
-from rotor.fit.publication import publication_table
-from rotor.fit.report import report_text
-from rotor.fit.resampling import bootstrap
+from rotor.fitting.assignment import assignments
+from rotor.fitting.choose import choose_constants, suggest_lines
+from rotor.fitting.fit import FitOptions, fit_lines
+from rotor.fitting.parameters import parameters
+from rotor.fitting.publication import publication_table
+from rotor.fitting.report import report_text
+from rotor.fitting.resampling import bootstrap
 from rotor.formats.assigned_lines import read_assigned_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit
 from rotor.plots.fit import fit_figure

@@ -13,10 +13,10 @@ import rotor
 from rotor.formats.family_file import read_family
 from rotor.molecules.molecule import Molecule
 from rotor.plots.structure import structure_figure
-from rotor.structure.coordinates import named, symmetric_displacements
-from rotor.structure.family import family
-from rotor.structure.least_squares import fit_structure
-from rotor.structure.substitution import substitution_structure
+from rotor.structures.coordinates import named, symmetric_displacements
+from rotor.structures.family import family
+from rotor.structures.least_squares import fit_structure
+from rotor.structures.substitution import substitution_structure
 from rotor.tops.top import Top
 
 # %matplotlib inline

@@ -18,7 +18,7 @@ from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields.deflection import deflection_table
 from rotor.spectra.fields.lines import field_lines
 from rotor.spectra.fields.stark_coefficients import line_coefficients
-from rotor.thermo.field_mixture import field_mixture
+from rotor.thermodynamics.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 

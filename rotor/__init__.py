@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from rotor.classical.free.free_motion import free_motion as free_motion
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
     from rotor.classical.tumble import answer_tumble as answer_tumble
-    from rotor.fluid.request import FluidRequest as FluidRequest
-    from rotor.fluid.request import NewBox as NewBox
-    from rotor.fluid.request import answer_fluid as answer_fluid
+    from rotor.fluids.request import FluidRequest as FluidRequest
+    from rotor.fluids.request import NewBox as NewBox
+    from rotor.fluids.request import answer_fluid as answer_fluid
     from rotor.formats import read as read
     from rotor.formats import write as write
     from rotor.formats.streamed_lines import stream_lines as stream_lines
@@ -64,14 +64,14 @@ if TYPE_CHECKING:
     from rotor.spectra.request import SpectrumRequest as SpectrumRequest
     from rotor.spectra.request import answer_spectrum as answer_spectrum
     from rotor.spectra.spectrum import Spectrum as Spectrum
-    from rotor.thermo import VibrationalStates as VibrationalStates
-    from rotor.thermo import partition_function as partition_function
-    from rotor.thermo import thermodynamic_functions as thermodynamic_functions
-    from rotor.thermo.classical_gas import GasRequest as GasRequest
-    from rotor.thermo.classical_gas import answer_gas as answer_gas
-    from rotor.thermo.request import ThermoRequest as ThermoRequest
-    from rotor.thermo.request import answer_thermo as answer_thermo
-    from rotor.thermo.thermal_tumble import thermal_tumble as thermal_tumble
+    from rotor.thermodynamics import VibrationalStates as VibrationalStates
+    from rotor.thermodynamics import partition_function as partition_function
+    from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
+    from rotor.thermodynamics.classical_gas import GasRequest as GasRequest
+    from rotor.thermodynamics.classical_gas import answer_gas as answer_gas
+    from rotor.thermodynamics.request import ThermoRequest as ThermoRequest
+    from rotor.thermodynamics.request import answer_thermo as answer_thermo
+    from rotor.thermodynamics.thermal_tumble import thermal_tumble as thermal_tumble
     from rotor.tops.constants import Constants as Constants
     from rotor.tops.spins.spin_constants import SpinConstants as SpinConstants
     from rotor.tops.states.state_constants import StateConstants as StateConstants
@@ -81,15 +81,15 @@ _MODULES = {
     "AlignRequest": "rotor.alignment.request",
     "AlignmentTrace": "rotor.alignment.align",
     "Constants": "rotor.tops.constants",
-    "FluidRequest": "rotor.fluid.request",
+    "FluidRequest": "rotor.fluids.request",
     "FreeMotion": "rotor.classical.free.free_motion",
     "GasLayer": "rotor.spectra.request",
-    "GasRequest": "rotor.thermo.classical_gas",
+    "GasRequest": "rotor.thermodynamics.classical_gas",
     "Levels": "rotor.quantum.levels",
     "LevelsRequest": "rotor.quantum.request",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
-    "NewBox": "rotor.fluid.request",
+    "NewBox": "rotor.fluids.request",
     "RamanLines": "rotor.spectra.raman",
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
@@ -98,27 +98,27 @@ _MODULES = {
     "StateConstants": "rotor.tops.states.state_constants",
     "SpectrumRequest": "rotor.spectra.request",
     "StarkRequest": "rotor.quantum.fields.stark_request",
-    "ThermoRequest": "rotor.thermo.request",
+    "ThermoRequest": "rotor.thermodynamics.request",
     "Top": "rotor.tops.top",
     "TumbleRequest": "rotor.classical.tumble",
-    "VibrationalStates": "rotor.thermo",
+    "VibrationalStates": "rotor.thermodynamics",
     "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
     "align": "rotor.alignment.align",
     "answer_align": "rotor.alignment.request",
-    "answer_fluid": "rotor.fluid.request",
-    "answer_gas": "rotor.thermo.classical_gas",
+    "answer_fluid": "rotor.fluids.request",
+    "answer_gas": "rotor.thermodynamics.classical_gas",
     "answer_levels": "rotor.quantum.request",
     "answer_raman": "rotor.spectra.raman_request",
     "answer_emission": "rotor.spectra.emission_request",
     "answer_spectrum": "rotor.spectra.request",
     "answer_stark": "rotor.quantum.fields.stark_request",
-    "answer_thermo": "rotor.thermo.request",
+    "answer_thermo": "rotor.thermodynamics.request",
     "answer_tumble": "rotor.classical.tumble",
     "answer_zeeman": "rotor.quantum.fields.zeeman_request",
     "effects_of": "rotor.quantum.effects.of_top",
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
-    "partition_function": "rotor.thermo",
+    "partition_function": "rotor.thermodynamics",
     "plot": "rotor.plots.show",
     "plan_of": "rotor.scenes.plan",
     "raman_lines": "rotor.spectra.raman",
@@ -130,8 +130,8 @@ _MODULES = {
     "solve_levels": "rotor.quantum.solve",
     "stark_map": "rotor.quantum.effects.stark",
     "stream_lines": "rotor.formats.streamed_lines",
-    "thermal_tumble": "rotor.thermo.thermal_tumble",
-    "thermodynamic_functions": "rotor.thermo",
+    "thermal_tumble": "rotor.thermodynamics.thermal_tumble",
+    "thermodynamic_functions": "rotor.thermodynamics",
     "write": "rotor.formats",
     "write_scene": "rotor.scenes.scene_file",
     "zeeman_map": "rotor.quantum.effects.zeeman",

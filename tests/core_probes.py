@@ -121,7 +121,7 @@ def fluid():
     from ase.build import molecule
     from ase.calculators.lj import LennardJones
 
-    from rotor.fluid.motion.dynamics import RigidDynamics
+    from rotor.fluids.motion.dynamics import RigidDynamics
 
     pair = molecule("H2O") + molecule("H2O")
     pair.positions[3:] += [3.4, 0.3, 0.0]

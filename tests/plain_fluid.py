@@ -9,8 +9,8 @@ import numpy as np
 from ase import Atoms
 from scipy.special import erf, erfc
 
-from rotor.fluid.forces.ewald import COULOMB_EV_ANGSTROM
-from rotor.fluid.forces.models import RigidModel, model_of
+from rotor.fluids.forces.ewald import COULOMB_EV_ANGSTROM
+from rotor.fluids.forces.models import RigidModel, model_of
 
 
 def box_of(counts: dict[str, int], edge: float, seed: int = 1, spread: float = 0.1) -> Atoms:

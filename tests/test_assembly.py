@@ -7,9 +7,9 @@ import plain_fluid as plain
 import pytest
 from ase import Atoms
 
-from rotor.fluid.forces.assembly import assemble, list_centre, spreading_weights
-from rotor.fluid.forces.models import MODELS, RigidModel, Site, model_of, models_of
-from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluids.forces.assembly import assemble, list_centre, spreading_weights
+from rotor.fluids.forces.models import MODELS, RigidModel, Site, model_of, models_of
+from rotor.fluids.forces.potential import RigidPotential
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 DIPOLES = {"spce": 2.351, "tip3p": 2.347, "tip4p": 2.177, "tip4p-2005": 2.305, "tip4p-ew": 2.321}  # D, as published

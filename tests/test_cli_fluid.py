@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ase.io import read
 
-from rotor.fluid.record import FluidRecord
+from rotor.fluids.record import FluidRecord
 
 VAPOUR = ("fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff", "4", "--step", "1fs")
 
@@ -116,7 +116,7 @@ def test_mistakes_are_one_line_and_nothing_is_written(call, folder, arguments, s
 
 
 def test_a_run_that_stops_has_exit_code_one(call, folder, monkeypatch):
-    from rotor.fluid.forces.potential import RigidPotential
+    from rotor.fluids.forces.potential import RigidPotential
 
     calls, inner = [], RigidPotential.calculate
 
@@ -145,7 +145,7 @@ def test_steps_too_long_are_told_with_their_number_and_length(call, folder):
 
 
 def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
-    from rotor.fluid.motion.dynamics import RigidDynamics
+    from rotor.fluids.motion.dynamics import RigidDynamics
 
     step = RigidDynamics.step
 

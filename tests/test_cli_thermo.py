@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.thermo import GAS_CONSTANT, VibrationalStates, partition_function, thermodynamic_functions
+from rotor.thermodynamics import GAS_CONSTANT, VibrationalStates, partition_function, thermodynamic_functions
 
 CONTRACT = Path(__file__).resolve().parents[1] / "docs" / "command_line.md"
 COLUMNS = [

@@ -11,8 +11,8 @@ from ase import Atoms
 from numba import njit
 from scipy.special import erfc
 
-from rotor.fluid.forces import _pair_kernels
-from rotor.fluid.forces.ewald import (
+from rotor.fluids.forces import _pair_kernels
+from rotor.fluids.forces.ewald import (
     COULOMB_EV_ANGSTROM,
     EwaldParameters,
     fourier_error,
@@ -20,8 +20,8 @@ from rotor.fluid.forces.ewald import (
     real_space_error,
     wave_vectors,
 )
-from rotor.fluid.forces.models import RigidModel, Site
-from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluids.forces.models import RigidModel, Site
+from rotor.fluids.forces.potential import RigidPotential
 
 MADELUNG_ROCK_SALT = (
     1.7475645946331822  # J. M. Borwein et al., Lattice Sums Then and Now (2013), from nearest neighbours

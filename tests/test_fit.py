@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.fit.assignment import assignments, duplicates, merged
-from rotor.fit.choose import choose_constants, promised, suggest_lines, try_constants
-from rotor.fit.criteria import chi_squared
-from rotor.fit.fit import FitOptions, fit_lines
-from rotor.fit.parameters import parameters, with_names
-from rotor.fit.publication import publication_table, value_text
-from rotor.fit.report import decisive, report_text
-from rotor.fit.resampling import bootstrap
-from rotor.fit.search import robust
+from rotor.fitting.assignment import assignments, duplicates, merged
+from rotor.fitting.choose import choose_constants, promised, suggest_lines, try_constants
+from rotor.fitting.criteria import chi_squared
+from rotor.fitting.fit import FitOptions, fit_lines
+from rotor.fitting.parameters import parameters, with_names
+from rotor.fitting.publication import publication_table, value_text
+from rotor.fitting.report import decisive, report_text
+from rotor.fitting.resampling import bootstrap
+from rotor.fitting.search import robust
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.lin import read_lin

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.fit import Fit, covariance_of_determined, fit_lines
-from rotor.fit.parameters import Parameters, parameters
-from rotor.fit.publication import publication_table
-from rotor.fit.resampling import bootstrap
-from rotor.fit.top_constants import TopConstants
-from rotor.fit.top_levels import top_levels
+from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.fit import Fit, covariance_of_determined, fit_lines
+from rotor.fitting.parameters import Parameters, parameters
+from rotor.fitting.publication import publication_table
+from rotor.fitting.resampling import bootstrap
+from rotor.fitting.top_constants import TopConstants
+from rotor.fitting.top_levels import top_levels
 from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.formats.fit_request import answer_fit, fit_of_lines, write_fitted_toml
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start_of, write_case
 
-from rotor.fit.assignment import assignments, merged
-from rotor.fit.choose import suggest_lines
-from rotor.fit.fit import fit_lines
+from rotor.fitting.assignment import assignments, merged
+from rotor.fitting.choose import suggest_lines
+from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels
 from rotor.formats.spcat.fits.unmeasured import unmeasured_lines

@@ -11,14 +11,14 @@ import pytest
 
 import rotor
 from rotor.cli.fit import EXAMPLES
-from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.choose import choose_constants, promised, try_constants
-from rotor.fit.criteria import chi_squared, f_test
-from rotor.fit.fit import Fit, FitOptions, fit_lines
-from rotor.fit.parameters import parameters, with_names
-from rotor.fit.report import report_text
-from rotor.fit.resampling import bootstrap
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.choose import choose_constants, promised, try_constants
+from rotor.fitting.criteria import chi_squared, f_test
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.parameters import parameters, with_names
+from rotor.fitting.report import report_text
+from rotor.fitting.resampling import bootstrap
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.assigned_lin import as_lin, note_of_lin
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.plots.fit import fit_figure
@@ -158,7 +158,7 @@ def test_the_bootstrap_has_no_error_for_what_is_not_determined():
 
 
 def test_samples_that_do_not_converge_are_drawn_again(lines, monkeypatch):
-    import rotor.fit.resampling as resampling
+    import rotor.fitting.resampling as resampling
 
     start = TRUE
     fit = fit_lines(lines, start, parameters(start, ["A", "B", "C"]))

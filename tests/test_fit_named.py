@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.fit.first_values import beside_zero
-from rotor.fit.fit import fit_lines
-from rotor.fit.orders import order_of
-from rotor.fit.parameters import parameters, with_names
-from rotor.fit.top_constants import TopConstants
-from rotor.fit.top_levels import top_levels
+from rotor.fitting.first_values import beside_zero
+from rotor.fitting.fit import fit_lines
+from rotor.fitting.orders import order_of
+from rotor.fitting.parameters import parameters, with_names
+from rotor.fitting.top_constants import TopConstants
+from rotor.fitting.top_levels import top_levels
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.fit_request import answer_fit, fit_of_lines
 from rotor.formats.spcat.fits.fit_input import spfit_input

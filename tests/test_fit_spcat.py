@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.fit.fit import fit_lines
-from rotor.fit.resampling import bootstrap
+from rotor.fitting.fit import fit_lines
+from rotor.fitting.resampling import bootstrap
 from rotor.formats.spcat.file_quanta import format_of
 from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, names_of_quanta

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.choose import choose_constants
-from rotor.fit.fit import Fit, FitOptions, fit_lines
-from rotor.fit.parameters import parameters
-from rotor.fit.resampling import bootstrap
+from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.choose import choose_constants
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.parameters import parameters
+from rotor.fitting.resampling import bootstrap
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
@@ -66,8 +66,8 @@ def test_an_interrupt_ends_every_way_of_the_search(seen):
 
 
 def test_an_interrupt_of_many_fits_leaves_what_is_done(seen, monkeypatch):
-    import rotor.fit.choose as choose
-    import rotor.fit.resampling as resampling
+    import rotor.fitting.choose as choose
+    import rotor.fitting.resampling as resampling
 
     fit = fit_lines(seen, TRUE, parameters(TRUE, ["A", "B", "C", "DeltaJ"]))
 
@@ -319,7 +319,7 @@ def test_levels_that_have_become_another_state_are_named(seen):
 def test_lengths_beside_bonds_do_not_lie_on_atoms():
     from rotor.molecules.molecule import Molecule
     from rotor.plots.structure import structure_figure
-    from rotor.structure.substitution import Value
+    from rotor.structures.substitution import Value
 
     z = (-2.96, -1.9, -0.69, 0.69, 1.84)
     chain = Molecule(("H", "C", "C", "C", "N"), [[x, 0, 0] for x in z])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rotor.fluid.analysis import (
+from rotor.fluids.analysis import (
     Diffusion,
     block_errors,
     diffusion,
@@ -14,7 +14,7 @@ from rotor.fluid.analysis import (
     pair_distribution,
     yeh_hummer_correction,
 )
-from rotor.fluid.summary import mean_of
+from rotor.fluids.summary import mean_of
 
 
 def test_an_ideal_gas_has_g_of_one_for_any_number() -> None:

@@ -7,9 +7,9 @@ from ase.build import molecule
 from ase.constraints import FixAtoms
 from fluid_boxes import MIXED, box_of
 
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.initial_box import check_apart, lattice_box, model_labels
-from rotor.fluid.motion.bodies import Pose, bodies_of
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.initial_box import check_apart, lattice_box, model_labels
+from rotor.fluids.motion.bodies import Pose, bodies_of
 from rotor.geometry import rotations
 from rotor.molecules.nuclei import masses
 

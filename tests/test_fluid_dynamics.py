@@ -14,10 +14,10 @@ from ase.units import fs
 from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
 from rotor.classical.free.free_motion import free_motion
-from rotor.fluid.initial_box import at_rest, heat, relax
-from rotor.fluid.motion.bodies import bodies_of
-from rotor.fluid.motion.dynamics import RigidDynamics
-from rotor.fluid.motion.thermometers import THERMOMETERS, kinetic_energy
+from rotor.fluids.initial_box import at_rest, heat, relax
+from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.dynamics import RigidDynamics
+from rotor.fluids.motion.thermometers import THERMOMETERS, kinetic_energy
 from rotor.geometry.rotations import distance
 
 

@@ -13,19 +13,19 @@ import pytest
 from ase import Atoms
 
 from rotor import units
-from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities, rigid_motion
-from rotor.fluid.engines.equimomental import equimomental_points
-from rotor.fluid.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
-from rotor.fluid.engines.pair_tables import Form, pair_energy
-from rotor.fluid.engines.results import engine_frames, record_of, run_engine
-from rotor.fluid.forces import models
-from rotor.fluid.forces.models import RigidModel, Site, model_of
-from rotor.fluid.forces.potential import RigidPotential
-from rotor.fluid.initial_box import lattice_box
-from rotor.fluid.run import run_fluid
-from rotor.fluid.settings import Settings
-from rotor.fluid.summary import mean_of
+from rotor.fluids.engines import lammps, openmm
+from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities, rigid_motion
+from rotor.fluids.engines.equimomental import equimomental_points
+from rotor.fluids.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
+from rotor.fluids.engines.pair_tables import Form, pair_energy
+from rotor.fluids.engines.results import engine_frames, record_of, run_engine
+from rotor.fluids.forces import models
+from rotor.fluids.forces.models import RigidModel, Site, model_of
+from rotor.fluids.forces.potential import RigidPotential
+from rotor.fluids.initial_box import lattice_box
+from rotor.fluids.run import run_fluid
+from rotor.fluids.settings import Settings
+from rotor.fluids.summary import mean_of
 from rotor.geometry.inertia import point_masses
 
 HAS = {
@@ -394,7 +394,7 @@ def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.Monke
     for a, b in zip(one, two, strict=True):
         assert a.potential_ev == pytest.approx(b.potential_ev, rel=1e-10)  # sums in another order
         assert np.allclose(a.positions, b.positions, atol=1e-9)  # the same
-    monkeypatch.setattr("rotor.fluid.engines.lammps.input_file", lambda *a, **k: "units metal\nnonsense 1\n")
+    monkeypatch.setattr("rotor.fluids.engines.lammps.input_file", lambda *a, **k: "units metal\nnonsense 1\n")
     with pytest.raises(RuntimeError, match="LAMMPS stopped: ERROR: Unknown command: nonsense"):
         list(engine_frames("lammps", engine_input, settings))
 

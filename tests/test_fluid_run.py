@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from ase.io import read
 
-from rotor.fluid.checkpoint import AseTrajectory, TextFile, read_checkpoint
-from rotor.fluid.forces.models import model_of
-from rotor.fluid.initial_box import lattice_box
-from rotor.fluid.record import FluidRecord
-from rotor.fluid.run import Outputs, RunStopped, calculator_of, dynamics_of, pressure_bar, run_fluid
-from rotor.fluid.settings import Settings
+from rotor.fluids.checkpoint import AseTrajectory, TextFile, read_checkpoint
+from rotor.fluids.forces.models import model_of
+from rotor.fluids.initial_box import lattice_box
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.run import Outputs, RunStopped, calculator_of, dynamics_of, pressure_bar, run_fluid
+from rotor.fluids.settings import Settings
 
 SETTINGS = Settings(steps=60, every=4, step_fs=1.0, cutoff_angstrom=4.5, friction_per_ps=5.0)
 FILES = Outputs(csv="run.csv", trajectories=("run.traj", "run.xyz"), checkpoint="run.npz", checkpoint_every=14)
@@ -53,7 +53,7 @@ def lines(path):
 
 @pytest.mark.parametrize("ensemble", ENSEMBLES)
 def test_a_run_cut_anywhere_and_resumed_is_the_uninterrupted_one(folder, monkeypatch, ensemble):
-    monkeypatch.setattr("rotor.fluid.run.BAR_EVERY_S", -1.0)
+    monkeypatch.setattr("rotor.fluids.run.BAR_EVERY_S", -1.0)
     settings = replace(SETTINGS, ensemble=ensemble)
     (folder / "a").mkdir()
     os.chdir("a")
@@ -110,7 +110,7 @@ import sys
 import numpy as np
 from test_fluid_run import FILES, SETTINGS, box
 from dataclasses import replace
-from rotor.fluid.run import run_fluid
+from rotor.fluids.run import run_fluid
 run_fluid(box(), replace(SETTINGS, ensemble="langevin", steps=100000), FILES, resume="--resume" in sys.argv)
 """
 
@@ -173,7 +173,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(folder, monkeypa
     def full(*paths):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rotor.fluid.checkpoint.os.replace", full)
+    monkeypatch.setattr("rotor.fluids.checkpoint.os.replace", full)
     monkeypatch.setattr(AseTrajectory, "__init__", lambda self, path, length=None: setattr(self, "path", Path(path)))
     with pytest.raises(RunStopped, match=r"run.npz: No space left on device at step 28.*run.npz is of step 14"):
         run_fluid(box(), replace(SETTINGS, ensemble="langevin"), FILES, resume=True)

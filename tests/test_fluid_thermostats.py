@@ -10,10 +10,10 @@ from ase.units import fs
 from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
 from rotor import units
-from rotor.fluid.initial_box import heat, thermal_momenta
-from rotor.fluid.motion.bodies import bodies_of
-from rotor.fluid.motion.dynamics import RigidDynamics
-from rotor.fluid.motion.thermostats import Langevin, NoseHoover
+from rotor.fluids.initial_box import heat, thermal_momenta
+from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.dynamics import RigidDynamics
+from rotor.fluids.motion.thermostats import Langevin, NoseHoover
 from rotor.geometry import rotations
 from rotor.statistics.degrees_of_freedom import Degrees
 from rotor.statistics.equipartition import equipartition, kinetic_degrees, statistical_inefficiency

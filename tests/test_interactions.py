@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from rotor.fluid.forces.interactions import pair_tables, reaction_field, screened, switched, tail
-from rotor.fluid.forces.models import model_of
+from rotor.fluids.forces.interactions import pair_tables, reaction_field, screened, switched, tail
+from rotor.fluids.forces.models import model_of
 from rotor.units import EV_PER_K
 
 

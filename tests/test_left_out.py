@@ -16,8 +16,8 @@ import rotor
 from rotor import units
 from rotor.classical.driven import DrivenRequest, answer_driven
 from rotor.classical.effects.gravity import GravityAboutPivot
-from rotor.fluid.analysis import Diffusion, yeh_hummer_correction
-from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluids.analysis import Diffusion, yeh_hummer_correction
+from rotor.fluids.motion.bodies import bodies_of
 from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.solve import solve_levels
@@ -107,7 +107,7 @@ def test_the_quantum_correction_is_that_of_oscillators(u):
 
 
 def test_the_step_error_is_that_of_librators():
-    """⟨L²/I⟩ at full steps is s √(1 - s²)/asin s of kT, s = Ωh/2 (`rotor.fluid.motion.thermometers`)."""
+    """⟨L²/I⟩ at full steps is s √(1 - s²)/asin s of kT, s = Ωh/2 (`rotor.fluids.motion.thermometers`)."""
     kelvin, step_fs, count = 300.0, 3.0, 20
     dimers = [molecule("N2") for _ in range(count)]
     for number, one in enumerate(dimers):
@@ -151,9 +151,9 @@ def test_a_plan_of_atoms_on_a_perfect_lattice():
 @pytest.mark.slow
 def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     """Forces and torques after 50 steps from a lattice, against those after two picoseconds; rotation at full steps is colder."""
-    from rotor.fluid.motion.dynamics import RigidDynamics
-    from rotor.fluid.motion.thermostats import Langevin
-    from rotor.fluid.request import box_of
+    from rotor.fluids.motion.dynamics import RigidDynamics
+    from rotor.fluids.motion.thermostats import Langevin
+    from rotor.fluids.request import box_of
     from rotor.scenes.kind import kind_of
 
     box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)

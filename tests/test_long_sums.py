@@ -10,14 +10,14 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, lowest_energies
-from rotor.thermo.level_sums import level_sums
-from rotor.thermo.partition import partition_functions
-from rotor.thermo.partition_table import partition_table
-from rotor.thermo.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.level_sums import level_sums
+from rotor.thermodynamics.partition import partition_functions
+from rotor.thermodynamics.partition_table import partition_table
+from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.tops.top import Top
 
-sums_module = import_module("rotor.thermo.level_sums")
-table_module = import_module("rotor.thermo.partition_table")
+sums_module = import_module("rotor.thermodynamics.level_sums")
+table_module = import_module("rotor.thermodynamics.partition_table")
 
 CUT_SHORT = "A=60778.5498 B=10318.0735 C=8.7997 MHz"  # C of SO2 read from a file that ends in the middle of the number
 
@@ -79,4 +79,4 @@ def test_an_onset_that_no_sum_reaches_is_said_and_not_an_error(monkeypatch):
     assert answer.classical_above_k is None
     assert answer.facts()["classical_above_k"] is None
     with pytest.raises(ValueError, match="beyond the reach"):
-        rotor.thermo.classical_above_k(of(CUT_SHORT))
+        rotor.thermodynamics.classical_above_k(of(CUT_SHORT))

@@ -10,10 +10,10 @@ import plain_fluid as plain
 import pytest
 from ase import Atoms
 
-from rotor.fluid.forces.assembly import assemble
-from rotor.fluid.forces.models import models_of
-from rotor.fluid.forces.neighbours import Neighbours
-from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluids.forces.assembly import assemble
+from rotor.fluids.forces.models import models_of
+from rotor.fluids.forces.neighbours import Neighbours
+from rotor.fluids.forces.potential import RigidPotential
 
 
 def brute(lists: Neighbours) -> set[tuple[int, ...]]:

@@ -14,9 +14,9 @@ from ase import Atoms
 from ase.calculators.calculator import PropertyNotImplementedError
 
 from rotor import units
-from rotor.fluid.forces.ewald import EwaldParameters
-from rotor.fluid.forces.models import MODELS, RigidModel, Site, model_of
-from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluids.forces.ewald import EwaldParameters
+from rotor.fluids.forces.models import MODELS, RigidModel, Site, model_of
+from rotor.fluids.forces.potential import RigidPotential
 
 METHODS = {"reaction-field": math.inf, "shifted": 0.2, "ewald": 0.4}
 MIXTURE = {"tip4p": 12, "trappe-n2": 8, "trappe-co2": 9, "argon": 7, "spce": 0}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.fit.fit import fit_lines
+from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.at_zero import left_at_zero, stay_at_zero
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels

@@ -12,15 +12,15 @@ import pytest
 import rotor
 from rotor.classical.tumble import SI, TumbleRequest, answer_tumble
 from rotor.cli.shared.output import plain, rows_of
-from rotor.fluid.request import FluidRequest, NewBox, answer_fluid
-from rotor.fluid.settings import Settings
+from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
+from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
-from rotor.thermo import VibrationalStates
-from rotor.thermo.classical_gas import GasRequest, answer_gas, settling_times_ps
-from rotor.thermo.request import ThermoRequest, answer_thermo
-from rotor.thermo.thermal_tumble import thermal_tumble
+from rotor.thermodynamics import VibrationalStates
+from rotor.thermodynamics.classical_gas import GasRequest, answer_gas, settling_times_ps
+from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.thermal_tumble import thermal_tumble
 
 OF_COMMAND = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
 

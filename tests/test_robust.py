@@ -257,7 +257,7 @@ with locked_folder(Path(sys.argv[1]), "rotor-lammps-") as folder:
 @pytest.mark.skipif(os.name == "nt", reason="no locks of folders")
 def test_the_folder_of_an_engine_that_was_killed_is_removed_by_the_next_run(folder, monkeypatch):
     """Of a LAMMPS run, which stands where temporary files do; LAMMPS itself is not needed to begin one."""
-    from rotor.fluid.engines import lammps
+    from rotor.fluids.engines import lammps
 
     subprocess.run([sys.executable, "-c", KILLED, str(folder)], check=False)
     assert [name.startswith("rotor-lammps-") for name in os.listdir()] == [True]

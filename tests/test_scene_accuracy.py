@@ -15,7 +15,7 @@ from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
-from rotor.fluid.request import answer_fluid
+from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.spins.method import used_method
 from rotor.scenes.accuracy import asked_of, unit_of
@@ -58,7 +58,7 @@ from rotor.scenes.sections import (
     TumbleConditions,
     TumbleNumerics,
 )
-from rotor.thermo.classical_gas import answer_gas
+from rotor.thermodynamics.classical_gas import answer_gas
 from rotor.tops.top import Top
 
 

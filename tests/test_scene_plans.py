@@ -22,7 +22,7 @@ from rotor.scenes.scene import LevelsScene
 from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sections import LevelsObservables
 from rotor.spectra.spectrum import Spectrum
-from rotor.thermo.classical_limit import classical_partition_function
+from rotor.thermodynamics.classical_limit import classical_partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 

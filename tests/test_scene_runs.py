@@ -346,24 +346,26 @@ def test_a_killed_sweep_goes_on(folder):
     assert result.columns["rows"].tolist() == [(j + 1) ** 2 for j in range(20, 60)]
 
 
-HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.fit", "rotor.structure", "rotor.classical", "rotor.classical.gas", "rotor.spectra.raman",
+HEAVY = ("rotor.fluids", "rotor.alignment", "rotor.fitting", "rotor.structures", "rotor.classical", "rotor.classical.gas",
+"rotor.spectra.raman",
          "rotor.classical.effects.drag", "rotor.classical.effects.rolling", "rotor.spectra.emission", "rotor.quantum.effects.stark",
-         "rotor.quantum.effects.zeeman", "rotor.quantum.spins.blocks", "rotor.spectra", "rotor.thermo.functions", "matplotlib", "ase",
+         "rotor.quantum.effects.zeeman", "rotor.quantum.spins.blocks", "rotor.spectra", "rotor.thermodynamics.functions",
+         "matplotlib", "ase",
          "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask")  # fmt: skip
 LOADED = {  # of HEAVY, what a kind has a use for
-    "spectrum": {"rotor.spectra", "rotor.thermo.functions"},
+    "spectrum": {"rotor.spectra", "rotor.thermodynamics.functions"},
     "levels": set(),
     "raman": {"rotor.spectra", "rotor.spectra.raman"},
     "stark": {"rotor.quantum.effects.stark"},
     "zeeman": {"rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman"},
-    "thermo": {"rotor.thermo.functions"},
+    "thermo": {"rotor.thermodynamics.functions"},
     "tumble": {"rotor.classical", "numba"},
     "driven": {"rotor.classical", "rotor.classical.effects.drag", "numba"},
     "gas": {"rotor.classical", "rotor.classical.gas", "numba"},
     "align": {"rotor.alignment", "numba"},
     "emission": {"rotor.spectra", "rotor.spectra.emission"},
-    "fit": {"rotor.fit"},
-    "fluid": {"rotor.fluid", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
+    "fit": {"rotor.fitting"},
+    "fluid": {"rotor.fluids", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
 }  # fmt: skip
 OCS = 'molecule = "OCS"\n'
 BODY = "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]\n"

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 import rotor
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import symmetry_of
-from rotor.structure.consistency import doubts, gains, moments_across_planes, without_each
-from rotor.structure.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
-from rotor.structure.family import family
-from rotor.structure.kraitchman import kraitchman, planar_moments
-from rotor.structure.least_squares import STUDENT, fit_structure
-from rotor.structure.substitution import substitution_structure
+from rotor.structures.consistency import doubts, gains, moments_across_planes, without_each
+from rotor.structures.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
+from rotor.structures.family import family
+from rotor.structures.kraitchman import kraitchman, planar_moments
+from rotor.structures.least_squares import STUDENT, fit_structure
+from rotor.structures.substitution import substitution_structure
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
@@ -425,7 +425,7 @@ def test_a_semi_experimental_structure_meets_the_published_one(make):
 
 @pytest.mark.parametrize("method", ["r0", "rm1", "rm2"])
 def test_derivatives_of_moments_are_those_of_differences(method):
-    from rotor.structure.least_squares import _Problem
+    from rotor.structures.least_squares import _Problem
 
     water = rotor.read("H2O").molecule
     hydrogen = 1 + water.symbols.index("H")

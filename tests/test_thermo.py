@@ -13,7 +13,7 @@ import rotor
 from rotor import units
 from rotor.molecules.nuclei import data_folder
 from rotor.quantum.solve import solve_levels
-from rotor.thermo import (
+from rotor.thermodynamics import (
     classical_limit,
     classical_partition_function,
     level_sums,
@@ -21,7 +21,7 @@ from rotor.thermo import (
     partition_functions,
     vibrational_partition_function,
 )
-from rotor.thermo.trusted_levels import trusted_energies_mhz
+from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

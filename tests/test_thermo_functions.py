@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import rotor
 from rotor import units
 from rotor.quantum.solve import solve_levels
-from rotor.thermo import (
+from rotor.thermodynamics import (
     GAS_CONSTANT,
     VibrationalStates,
     classical_above_k,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotor.plots.heat_capacity import heat_capacity_figure, plot_heat_capacity
-from rotor.thermo import GAS_CONSTANT, thermodynamic_functions
+from rotor.thermodynamics import GAS_CONSTANT, thermodynamic_functions
 
 HERE = Path(__file__).resolve().parent
 KNOWN = tomllib.loads((HERE / "oracles" / "heat_capacity.toml").read_text(encoding="utf-8"))

@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.formats.read_write import top_of_file
@@ -19,7 +19,7 @@ from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.thermo import partition_function
+from rotor.thermodynamics import partition_function
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

@@ -10,7 +10,7 @@ import pytest
 
 import rotor
 from rotor.cli import run
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.top_constants import TopConstants
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels

@@ -14,7 +14,7 @@ import rotor
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.spectra.lines import line_list
 from rotor.spectra.raman import raman_lines
-from rotor.thermo import VibrationalStates, partition_function, vibrational_partition_function
+from rotor.thermodynamics import VibrationalStates, partition_function, vibrational_partition_function
 
 HC_OVER_K = 1.438776877  # cm K
 

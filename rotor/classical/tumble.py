@@ -1,7 +1,7 @@
 """A request for the free rotation of one rigid body, and what answers it: the exact motion, its table, its stability.
 
 Moments and angular momentum are the exact data of the motion. A body known by its angular velocity starts at
-`TumbleRequest.of_angular_velocity`; a molecule at `rotor.thermo.thermal_tumble`.
+`TumbleRequest.of_angular_velocity`; a molecule at `rotor.thermodynamics.thermal_tumble`.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.save_scene import beside, save_scene, save_scene_option
 
 if TYPE_CHECKING:
-    from rotor.fit.choose import Trial
-    from rotor.fit.fit import Fit, FitOptions
+    from rotor.fitting.choose import Trial
+    from rotor.fitting.fit import Fit, FitOptions
     from rotor.formats.fit_request import FitAnswer, FitRequest
     from rotor.statistics.least_squares import Iteration
 
@@ -384,7 +384,7 @@ def _show(
     steps: Sequence[Trial],
     extras: Extras,
 ) -> None:
-    from rotor.fit.report import far_off, statistics_text, status_text
+    from rotor.fitting.report import far_off, statistics_text, status_text
 
     print(f"{request.title}: {status_text(fit)}")
     show_table(parameter_table(fit, extras.spread))

@@ -31,9 +31,9 @@ from rotor.temporary import locked_folder
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
-    from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
-    from rotor.fluid.run import Outputs as RunFiles
-    from rotor.fluid.settings import Settings
+    from rotor.fluids.request import FluidAnswer, FluidRequest, NewBox
+    from rotor.fluids.run import Outputs as RunFiles
+    from rotor.fluids.settings import Settings
     from rotor.plots.view import View
 
 EXAMPLES = """\b
@@ -132,9 +132,9 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
     import numpy as np
     from ase.io import read
 
-    from rotor.fluid.forces.models import models_of, shapes_of
-    from rotor.fluid.initial_box import model_labels
-    from rotor.fluid.motion.bodies import bodies_of
+    from rotor.fluids.forces.models import models_of, shapes_of
+    from rotor.fluids.initial_box import model_labels
+    from rotor.fluids.motion.bodies import bodies_of
 
     models = models_of(answer.request.settings.model)
     shapes = shapes_of(models)
@@ -146,7 +146,7 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
 
 
 def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str, view: View) -> None:
-    from rotor.fluid.analysis import pair_distribution
+    from rotor.fluids.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
     assert paths is not None
@@ -162,8 +162,8 @@ def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str, v
 
 
 def _settings(options: Options) -> Settings:
-    from rotor.fluid.forces.models import model_of
-    from rotor.fluid.settings import Settings
+    from rotor.fluids.forces.models import model_of
+    from rotor.fluids.settings import Settings
 
     for name in options.model.split(","):
         inputs.parsed("--model", name.strip(), model_of)
@@ -180,7 +180,7 @@ def _settings(options: Options) -> Settings:
 
 def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
     """The files that grow, each with a suffix that can be written, and the one written at the end."""
-    from rotor.fluid.run import Outputs as RunFiles
+    from rotor.fluids.run import Outputs as RunFiles
 
     growing, last = Files(), Files()
     growing.ask("--csv", outputs.csv, (".csv",))
@@ -201,7 +201,7 @@ def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
 
 def _request(options: Options, settings: Settings) -> FluidRequest:
     """The request: the box of a file, or one to make."""
-    from rotor.fluid.request import FluidRequest
+    from rotor.fluids.request import FluidRequest
 
     if options.molecules is not None:
         box = _new_box(options, settings)
@@ -216,8 +216,8 @@ def _request(options: Options, settings: Settings) -> FluidRequest:
 
 
 def _new_box(options: Options, settings: Settings) -> NewBox:
-    from rotor.fluid.forces.models import MODELS, model_of
-    from rotor.fluid.request import WATER_G_CM3, NewBox
+    from rotor.fluids.forces.models import MODELS, model_of
+    from rotor.fluids.request import WATER_G_CM3, NewBox
 
     source = options.source
     if source != settings.model and source in MODELS:
@@ -238,8 +238,8 @@ def _answer(
 ) -> tuple[FluidAnswer, dict[str, Any]]:
     """The run and the keys that begin its JSON; a run that stops on its way is no mistake of the user."""
     import rotor
-    from rotor.fluid.request import answer_fluid
-    from rotor.fluid.run import RunStopped
+    from rotor.fluids.request import answer_fluid
+    from rotor.fluids.run import RunStopped
 
     head = {"rotor_version": rotor.__version__, **said, "engine": request.engine, "settings": asdict(request.settings)}
 

@@ -25,7 +25,7 @@ from rotor.cli.shared.sources import with_sources
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
     from rotor.plots.view import View
-    from rotor.thermo.classical_gas import GasAnswer, GasRequest
+    from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest
 
 SHOWN = 11  # rows of the correlation functions in the report
 
@@ -70,7 +70,7 @@ class Outputs:
 )
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """A classical gas of free molecules: equipartition, correlation functions."""
-    from rotor.thermo.classical_gas import GasRequest, settling_times_ps
+    from rotor.thermodynamics.classical_gas import GasRequest, settling_times_ps
 
     settings, files = _settings(options), Files.of(outputs)
     view = view_of(picture, files, "ps")
@@ -98,7 +98,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
 
 def _settings(options: Options) -> dict[str, Any]:
     """Fields of the request from the texts of the options."""
-    from rotor.thermo.classical_gas import MOST_MOLECULES
+    from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
     require_whole("--molecules", options.molecules, 2, MOST_MOLECULES)
     require_whole("--seed", options.seed, 0)
@@ -115,7 +115,7 @@ def _answer(request: GasRequest) -> GasAnswer:
     """The answer, with a bar on a terminal while the correlation functions are computed."""
     from concurrent.futures import ThreadPoolExecutor
 
-    from rotor.thermo.classical_gas import answer_gas
+    from rotor.thermodynamics.classical_gas import answer_gas
 
     if request.times_ps is None:
         return answer_gas(request)

@@ -54,7 +54,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     from rotor.cli.shared.report import describe
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.estimates.limits import limit_facts, populated_j
-    from rotor.thermo.partition_table import partition_table
+    from rotor.thermodynamics.partition_table import partition_table
 
     content = describe(top, given.text, context.obj)
     content |= limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))

@@ -30,10 +30,10 @@ from rotor.table import counted
 if TYPE_CHECKING:
     from rotor.formats.family_file import FamilyFile
     from rotor.molecules.molecule import Molecule
-    from rotor.structure.consistency import PlanarMoment, Without
-    from rotor.structure.family import Family
-    from rotor.structure.least_squares import FittedStructure
-    from rotor.structure.substitution import SubstitutionStructure, Value
+    from rotor.structures.consistency import PlanarMoment, Without
+    from rotor.structures.family import Family
+    from rotor.structures.least_squares import FittedStructure
+    from rotor.structures.substitution import SubstitutionStructure, Value
 
 EXAMPLES = """\b
 Examples:
@@ -106,9 +106,9 @@ def answered(
     file: FamilyFile, methods: Sequence[str], weights: str, leave_out: str, pair: str, *, check: bool = False
 ) -> Answer:
     """The structures of the methods, in their order; with check, fitted again without each isotopologue."""
-    from rotor.structure.consistency import doubts, gains, moments_across_planes, without_each
-    from rotor.structure.least_squares import fit_structure
-    from rotor.structure.substitution import substitution_structure
+    from rotor.structures.consistency import doubts, gains, moments_across_planes, without_each
+    from rotor.structures.least_squares import fit_structure
+    from rotor.structures.substitution import substitution_structure
 
     substitution = None
     if "rs" in methods:
@@ -310,7 +310,7 @@ def _coordinates_table(found: SubstitutionStructure) -> Table:
 
 
 def _values_table(method: str, values: Sequence[Value]) -> Table:
-    from rotor.fit.publication import value_text
+    from rotor.fitting.publication import value_text
 
     rows = [
         [

@@ -33,8 +33,8 @@ from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
-    from rotor.thermo import ThermoFunctions
-    from rotor.thermo.request import ThermoAnswer
+    from rotor.thermodynamics import ThermoFunctions
+    from rotor.thermodynamics.request import ThermoAnswer
 
 SHOWN = 25  # rows of the table in the report
 
@@ -87,7 +87,7 @@ def command(
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
     one_thread_of_blas()
     from rotor.cli.shared.report import model_facts
-    from rotor.thermo.request import ThermoRequest, answer_thermo
+    from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)
     files = Files.of(outputs)
@@ -146,7 +146,7 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any], view: View) -> dict[
         """The picture as a file."""
         from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
         from rotor.plots.picture import name_of_top
-        from rotor.thermo.request import answer_thermo
+        from rotor.thermodynamics.request import answer_thermo
 
         request = answer.request
         grid = tuple(curve_temperatures(answer.functions.temperature_k).tolist())

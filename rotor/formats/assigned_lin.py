@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotor.fit.assignment import Assignments
+from rotor.fitting.assignment import Assignments
 from rotor.formats.spcat.text.lin import LineList, line_list
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM

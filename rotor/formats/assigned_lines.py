@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fit.assignment import Assignments, assignments
+from rotor.fitting.assignment import Assignments, assignments
 from rotor.formats.assigned_lin import as_lin
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK

@@ -32,13 +32,13 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fit.fit import Fit, FitOptions, fit_lines
-from rotor.fit.parameters import parameters
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.parameters import parameters
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
-from rotor.structure.coordinates import Named, named
-from rotor.structure.family import Family, family
+from rotor.structures.coordinates import Named, named
+from rotor.structures.family import Family, family
 from rotor.tops.constants import Constants
 from rotor.tops.uncertain_numbers import parse_named
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.fit.assignment import Assignments, merged
-from rotor.fit.first_values import beside_zero
-from rotor.fit.fit import Fit, FitOptions, covariance_of_determined, fit_lines
-from rotor.fit.parameters import Parameters, parameters, with_names
-from rotor.fit.publication import publication_table
-from rotor.fit.report import fit_facts, report_text
-from rotor.fit.top_constants import ConstantSet, TopConstants
+from rotor.fitting.assignment import Assignments, merged
+from rotor.fitting.first_values import beside_zero
+from rotor.fitting.fit import Fit, FitOptions, covariance_of_determined, fit_lines
+from rotor.fitting.parameters import Parameters, parameters, with_names
+from rotor.fitting.publication import publication_table
+from rotor.fitting.report import fit_facts, report_text
+from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.formats.assigned_lines import QUANTA, names_sums, read_assigned_lines
 from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit
 from rotor.formats.spcat.fits.named_fit import named_file
@@ -50,7 +50,7 @@ class FitFiles:
 class FitRequest:
     """What is to be fitted.
 
-    lines, constants, parameters, options: as `rotor.fit.fit.fit_lines` takes them. title: for reports. files: what it was read
+    lines, constants, parameters, options: as `rotor.fitting.fit.fit_lines` takes them. title: for reports. files: what it was read
     from. spfit: the files of SPFIT, where it was read from them. ties, priors_mhz: as given, of a list of lines. notes: what must be
     known of how it was read.
     """
@@ -118,7 +118,7 @@ class FitAnswer:
 def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnswer:
     """The fit that a request asks for; `fit.converged` says whether it is a result.
 
-    Raises ValueError as `rotor.fit.fit.fit_lines` does.
+    Raises ValueError as `rotor.fitting.fit.fit_lines` does.
     """
     fit = fit_lines(
         request.lines, request.constants, request.parameters, request.options, model=request.model, progress=progress
@@ -156,7 +156,7 @@ def fit_of_lines(
     free : sequence of str, optional
         Constants to fit; those that have an error by default. One that the top does not have starts at 0.
     ties, priors_mhz : optional
-        As of `rotor.fit.parameters.parameters`.
+        As of `rotor.fitting.parameters.parameters`.
     start : path, optional
         The file of the top: its other tables go into a file of the result.
 

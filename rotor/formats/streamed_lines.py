@@ -33,8 +33,8 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import intensity_cut, jmax_for_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
 from rotor.spectra.transitions import all_transitions
-from rotor.thermo import PartitionFunction
-from rotor.thermo.trusted_levels import are_trusted
+from rotor.thermodynamics import PartitionFunction
+from rotor.thermodynamics.trusted_levels import are_trusted
 from rotor.tops.top import Top
 from rotor.version import version
 

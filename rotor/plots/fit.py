@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fit.fit import Fit
+from rotor.fitting.fit import Fit
 from rotor.plots.picture import BLUE, GREY, ORANGE, checked_suffix, new_figure, save, styled
 from rotor.table import counted
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fluid.analysis import PairDistribution
-from rotor.fluid.record import FluidRecord
+from rotor.fluids.analysis import PairDistribution
+from rotor.fluids.record import FluidRecord
 from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, checked_suffix, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotor.plots.picture import PALETTE, SIZE_INCHES, checked_suffix, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.thermo import ThermoFunctions
+from rotor.thermodynamics import ThermoFunctions
 from rotor.version import version
 
 GREY = "#777777"

@@ -14,7 +14,7 @@ from rotor.alignment.request import AlignAnswer
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.gas.ensembles import Correlations
 from rotor.classical.tumble import PERIODS, TumbleAnswer
-from rotor.fluid.request import FluidAnswer
+from rotor.fluids.request import FluidAnswer
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.plots.picture import save
@@ -30,9 +30,9 @@ from rotor.spectra.raman_request import RamanAnswer
 from rotor.spectra.request import SpectrumAnswer
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
-from rotor.thermo.classical_gas import GasAnswer
-from rotor.thermo.functions import ThermoFunctions
-from rotor.thermo.request import ThermoAnswer
+from rotor.thermodynamics.classical_gas import GasAnswer
+from rotor.thermodynamics.functions import ThermoFunctions
+from rotor.thermodynamics.request import ThermoAnswer
 
 
 def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:

@@ -11,8 +11,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.plots.picture import GREY, checked_suffix, formula_text, new_figure, save, styled
-from rotor.structure.coordinates import bonded
-from rotor.structure.substitution import Value
+from rotor.structures.coordinates import bonded
+from rotor.structures.substitution import Value
 
 _MARGIN = 0.9  # Å around the atoms
 _STANDS, _BESIDE = 0.5, 0.1  # sine of a bond's slope from which its length stands beside it, and how far, Å
@@ -82,8 +82,8 @@ def plot_structure(
 
 
 def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int) -> None:
-    from rotor.fit.publication import value_text
-    from rotor.structure.coordinates import named
+    from rotor.fitting.publication import value_text
+    from rotor.structures.coordinates import named
 
     x = molecule.positions_angstrom
     written: dict[tuple[int, ...], str] = {}

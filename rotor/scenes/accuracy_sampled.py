@@ -34,8 +34,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.scenes.choice import Choice
 
 if TYPE_CHECKING:
-    from rotor.fluid.request import FluidRequest
-    from rotor.thermo.classical_gas import GasAnswer, GasRequest
+    from rotor.fluids.request import FluidRequest
+    from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest
 
 PILOT_MOLECULES = 2_000
 SPARE = 1.25  # the forces where a run ends are others than those that Ewald's tolerance was chosen by
@@ -97,7 +97,7 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
         Where molecules are given too, and where more are needed than a run has.
     """
     from rotor.scenes.sections import GasNumerics
-    from rotor.thermo.classical_gas import MOST_MOLECULES
+    from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
     if scene.numerics.molecules != GasNumerics().molecules:
         raise ValueError("accuracy and numerics.molecules: give one of them")
@@ -118,7 +118,7 @@ def _spread(request: GasRequest, asked: float, unit: str) -> float:
         return scale * relative_spread(unit, degrees_of(request))
     if request.times_ps is None:
         raise ValueError(f"accuracy: {asked:g}: is of correlation functions; give observables.times, or a unit, K or %")
-    from rotor.thermo.classical_gas import answer_gas
+    from rotor.thermodynamics.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
     return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)  # the spread itself is known to some percent
@@ -173,7 +173,7 @@ def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> C
 
 def made_of(request: FluidRequest) -> FluidRequest:
     """The request with its box, made once."""
-    from rotor.fluid.request import NewBox, box_of
+    from rotor.fluids.request import NewBox, box_of
 
     if not isinstance(request.box, NewBox):
         return request

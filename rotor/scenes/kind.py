@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from rotor.quantum.effect import QuantumEffect
     from rotor.table import Table
-    from rotor.thermo import VibrationalStates
+    from rotor.thermodynamics import VibrationalStates
     from rotor.tops.top import Top
 
 Writer = Callable[[Path], None]
@@ -105,7 +105,7 @@ def vibrations(given: VibrationSection) -> VibrationalStates | None:
     """The vibrational states that one of the two keys gives."""
     if given.fundamentals is None and given.states is None:
         return None
-    from rotor.thermo import VibrationalStates
+    from rotor.thermodynamics import VibrationalStates
 
     if given.fundamentals is not None and given.states is not None:
         raise ValueError("vibration: fundamentals and states: give one of them")

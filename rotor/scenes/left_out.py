@@ -9,10 +9,10 @@ rotation, inversion, electron spin (`rotor.quantum.estimates.limits` and `beyond
 | pressure width | 2 n ⟨v⟩ σ/2π, σ = π (4 Å)² + π μ²/(2 · 4πε₀ ħ⟨v⟩): a hard core, and V. Weisskopf's radius of dipoles |
 | Stark shift of a stray field | linear, J = 0: (μE)²/6hB, second order; symmetric, J = K = 1: μE KM/J(J+1), first order |
 | the same of an asymmetric top | J = M = 1: two levels that a component couples |
-| quantum corrections of a classical gas | a/T of ln Q (`rotor.thermo.classical_limit`) |
+| quantum corrections of a classical gas | a/T of ln Q (`rotor.thermodynamics.classical_limit`) |
 | centrifugal distortion of a classical gas | d T of ln Q (there) |
 | quantum corrections of a fluid | ħ²/24(kT)³ (⟨F²⟩/m + Σ⟨T²⟩/I) of A/NkT (J. G. Powles and G. Rickayzen, Mol. Phys. 38, 1875 (1979)) |
-| step of a fluid | h²/12 Σ⟨T²⟩/I of the rotational energy (`rotor.fluid.motion.thermometers`) |
+| step of a fluid | h²/12 Σ⟨T²⟩/I of the rotational energy (`rotor.fluids.motion.thermometers`) |
 | box of a fluid | N^(-1/3) of the diffusion (S. A. Khrapak, J. Phys. Chem. B (2024), arXiv:2402.09348), a short form of Yeh and Hummer's |
 """
 
@@ -27,7 +27,7 @@ from rotor import units
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
-    from rotor.fluid.motion.bodies import Bodies
+    from rotor.fluids.motion.bodies import Bodies
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
@@ -118,7 +118,7 @@ def doppler(top: Top, frequency_mhz: float, temperature_k: float) -> LeftOut | N
 
 def of_classical_gas(top: Top, temperature_k: float) -> list[LeftOut]:
     """What a classical gas of rigid molecules leaves out, as parts of Q in percent, largest first."""
-    from rotor.thermo.classical_limit import classical_limit
+    from rotor.thermodynamics.classical_limit import classical_limit
 
     limit = classical_limit(top)
     quantum, distortion = abs(limit.a) / temperature_k, abs(limit.d) * temperature_k
@@ -175,7 +175,7 @@ def of_fluid(bodies: Bodies, force: Floats, torque: Floats, temperature_k: float
     -------
     list of LeftOut
     """
-    from rotor.fluid.motion.thermometers import step_correction
+    from rotor.fluids.motion.thermometers import step_correction
 
     kt, count = units.EV_PER_K * temperature_k, len(bodies)
     quantum = step_correction(bodies, force, torque, units.HBAR_CLASSICAL / kt).total_ev / (24 * kt * count)

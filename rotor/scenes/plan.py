@@ -124,7 +124,7 @@ def _highest_j(kind: str, request: Any) -> int:
 def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
     """J max of a list of lines, and why."""
     from rotor.spectra.intensity import jmax_for_cut
-    from rotor.thermo import partition_function
+    from rotor.thermodynamics import partition_function
 
     if request.jmax is not None:
         return request.jmax, "given"
@@ -241,7 +241,7 @@ def _in_field(request: Any) -> Plan:
 
 def _gas(request: Any) -> Plan:
     from rotor.classical.gas.ensembles import PIECE
-    from rotor.thermo.classical_gas import answer_gas
+    from rotor.thermodynamics.classical_gas import answer_gas
 
     def short(n: int) -> Any:
         return answer_gas(replace(request, molecules=n))
@@ -282,7 +282,7 @@ def _raman(request: Any) -> Plan:
 
 def _thermo(request: Any) -> Plan:
     from rotor.quantum.estimates.limits import populated_j
-    from rotor.thermo.request import answer_thermo
+    from rotor.thermodynamics.request import answer_thermo
 
     top, hottest = request.top, max(request.temperatures_k)
     found: list[Any] = []
@@ -341,7 +341,7 @@ def _tumble(request: Any) -> Plan:
 
 
 def _fluid(request: Any) -> Plan:
-    from rotor.fluid.request import NewBox, answer_fluid, box_of
+    from rotor.fluids.request import NewBox, answer_fluid, box_of
 
     settings = request.settings
     if request.engine != "rotor":
@@ -371,8 +371,8 @@ def _fluid(request: Any) -> Plan:
 
 def _left_out_of_fluid(atoms: Any, settings: Any) -> list[left_out.LeftOut]:
     """By the forces and torques of a box."""
-    from rotor.fluid.forces.models import models_of, shapes_of
-    from rotor.fluid.motion.dynamics import RigidDynamics
+    from rotor.fluids.forces.models import models_of, shapes_of
+    from rotor.fluids.motion.dynamics import RigidDynamics
 
     dynamics = RigidDynamics(atoms, 1.0, removed=0, shapes=shapes_of(models_of(settings.model)))
     return left_out.of_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)

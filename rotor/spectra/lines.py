@@ -40,8 +40,8 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.table import counted
-from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
-from rotor.thermo.trusted_levels import are_trusted, in_level_table
+from rotor.thermodynamics import PartitionFunction, VibrationalStates, partition_function
+from rotor.thermodynamics.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import without_constants
 
@@ -301,7 +301,7 @@ def line_list(
     sort : bool, optional
         Whether lines rise in frequency; False leaves them in the order in which they are found.
     untrusted : bool, optional
-        List lines of levels beyond the reach of the distortion constants too (`rotor.thermo.trusted_levels`); by
+        List lines of levels beyond the reach of the distortion constants too (`rotor.thermodynamics.trusted_levels`); by
         default they are left out and counted.
     effects : sequence of QuantumEffect, optional
         What the Hamiltonian consists of.

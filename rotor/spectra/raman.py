@@ -31,7 +31,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
-from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
+from rotor.thermodynamics import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -23,8 +23,8 @@ from rotor.spectra.raman import (
     raman_lines,
 )
 from rotor.table import TextOf
-from rotor.thermo import VibrationalStates
-from rotor.thermo.partition_table import partition_facts
+from rotor.thermodynamics import VibrationalStates
+from rotor.thermodynamics.partition_table import partition_facts
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
-from rotor.thermo import VibrationalStates
-from rotor.thermo.partition_table import partition_facts
+from rotor.thermodynamics import VibrationalStates
+from rotor.thermodynamics.partition_table import partition_facts
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts, without_constants
 

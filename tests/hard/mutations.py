@@ -125,7 +125,7 @@ MUTATIONS = (
         "tests/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
     ),
     Mutation(
-        12, "rotor/structure/least_squares.py",
+        12, "rotor/structures/least_squares.py",
         "        and family.planar\n", "        and not family.planar\n",
         "tests/hard/test_safeguards.py::test_three_dependent_moments_of_a_planar_molecule_are_named",
     ),
@@ -220,7 +220,7 @@ MUTATIONS = (
         "tests/test_degrees.py::test_a_linear_triatomic_has_five_degrees_not_six",
     ),
     Mutation(
-        29, "rotor/fluid/motion/thermometers.py",
+        29, "rotor/fluids/motion/thermometers.py",
         "    counts = (degrees.total, degrees.translation, degrees.rotation)\n",
         "    counts, kinetic = (degrees.total,) * 3, Kinetic(kinetic.total_ev / 2, kinetic.total_ev / 2)\n",
         "tests/hard/test_safeguards.py::test_rotation_has_a_temperature_of_its_own",

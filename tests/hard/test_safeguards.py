@@ -10,13 +10,13 @@ from slow_matrix import watson_matrix
 
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2
 from rotor.classical.lyapunov import body_flow, lyapunov_exponents
-from rotor.fluid.motion.thermometers import Kinetic, temperatures
+from rotor.fluids.motion.thermometers import Kinetic, temperatures
 from rotor.molecules.molecule import Molecule
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.degrees_of_freedom import Degrees
-from rotor.structure.family import family
-from rotor.structure.least_squares import fit_structure
+from rotor.structures.family import family
+from rotor.structures.least_squares import fit_structure
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from rotor.cli.shared import inputs
 
 if TYPE_CHECKING:
-    from rotor.fit.choose import Suggestion, Trial
-    from rotor.fit.fit import Fit, FitOptions
+    from rotor.fitting.choose import Suggestion, Trial
+    from rotor.fitting.fit import Fit, FitOptions
     from rotor.formats.fit_request import FitAnswer, FitRequest
 
 
@@ -42,8 +42,8 @@ def extras_of(answer: FitAnswer, tried: Sequence[str] | None, suggest: str | Non
 
 def chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
     """The fit of the constants that the lines call for, and the steps that led to it; after an interrupt those found so far."""
-    from rotor.fit.choose import choose_constants
-    from rotor.fit.parameters import with_names
+    from rotor.fitting.choose import choose_constants
+    from rotor.fitting.parameters import with_names
     from rotor.formats.fit_request import FitAnswer, answer_fit
 
     if request.spfit is not None:
@@ -70,7 +70,7 @@ def chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tu
 def _trials(fit: Fit, options: FitOptions, names: Sequence[str] | None) -> list[Trial]:
     if names is None:
         return []
-    from rotor.fit.choose import try_constants
+    from rotor.fitting.choose import try_constants
 
     with inputs.named("--try"):
         return try_constants(fit, names, options)
@@ -82,7 +82,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
         return []
     import numpy as np
 
-    from rotor.fit.choose import suggest_lines
+    from rotor.fitting.choose import suggest_lines
 
     error = float(np.median(fit.line_errors_mhz[fit.used]))
     own = name if fit.constants is None else fit.constants.own_name(name)
@@ -93,7 +93,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
 
         upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
         return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
-    from rotor.fit.unmeasured import unmeasured
+    from rotor.fitting.unmeasured import unmeasured
 
     upper, lower = unmeasured(fit)
     return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
@@ -105,7 +105,7 @@ def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[
         return [], 0
     import numpy as np
 
-    from rotor.fit.resampling import bootstrap
+    from rotor.fitting.resampling import bootstrap
 
     values, spread = bootstrap(fit, samples, np.random.default_rng(seed), request.options, model=request.model)
     return spread.tolist(), len(values)

@@ -11,9 +11,9 @@ from rotor.cli.shared.output import (
 )
 
 if TYPE_CHECKING:
-    from rotor.fit.choose import Suggestion, Trial
-    from rotor.fit.fit import Fit
-    from rotor.fit.top_constants import ConstantSet
+    from rotor.fitting.choose import Suggestion, Trial
+    from rotor.fitting.fit import Fit
+    from rotor.fitting.top_constants import ConstantSet
     from rotor.formats.fit_request import FitAnswer
 
 
@@ -82,7 +82,7 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
-    from rotor.fit.report import dfbetas
+    from rotor.fitting.report import dfbetas
 
     moved = dict(zip(fit.groups.tolist(), dfbetas(fit), strict=True))
     difference = fit.difference_mhz
@@ -105,8 +105,8 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
 
 
 def parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
-    from rotor.fit.publication import value_text
-    from rotor.fit.report import scatter_text
+    from rotor.fitting.publication import value_text
+    from rotor.fitting.report import scatter_text
 
     columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
     rows = []

@@ -10,7 +10,7 @@ from rotor.cli.shared.options import option
 
 if TYPE_CHECKING:
     from rotor.spectra.request import GasLayer
-    from rotor.thermo import VibrationalStates
+    from rotor.thermodynamics import VibrationalStates
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def vibrations_of(given: Vibration) -> VibrationalStates | None:
     fundamentals, states = given.vibration, given.vibrational_states
     if fundamentals is None and states is None:
         return None
-    from rotor.thermo import VibrationalStates
+    from rotor.thermodynamics import VibrationalStates
 
     if fundamentals is not None and states is not None:
         raise ValueError("--vibration and --vibrational-states: give one of them, fundamentals or a list of states")

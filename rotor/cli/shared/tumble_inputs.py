@@ -152,7 +152,7 @@ def _ordinary_body(body: NamedBody) -> Body:
 
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
     from rotor.classical.tumble import SI
-    from rotor.thermo.thermal_tumble import TILT_DEGREES
+    from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
     size = TURN_RAD_PER_S * float(np.sort(moments)[1])
@@ -211,7 +211,7 @@ def _start_of(options: Options, moments: Floats, unit: str) -> tuple[Three, str]
 
 
 def _molecule(given: Input, options: Options) -> Start:
-    from rotor.thermo.thermal_tumble import TEMPERATURE_K, thermal_tumble
+    from rotor.thermodynamics.thermal_tumble import TEMPERATURE_K, thermal_tumble
 
     fixed = "--omega" if options.omega is not None else "--angular-momentum"
     if options.temperature is not None and (options.angular_momentum or options.omega) is not None:

@@ -42,7 +42,7 @@ from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.table import counted
-from rotor.thermo import PartitionFunction, partition_function
+from rotor.thermodynamics import PartitionFunction, partition_function
 from rotor.tops.top import Top
 
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²

@@ -37,7 +37,7 @@ from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
 from rotor.table import counted
-from rotor.thermo import PartitionFunction
+from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
 _TAIL = 1e-7  # of Q: what may lie beyond the last F

@@ -6,10 +6,10 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor.fluid.record import FluidRecord
-from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox, answer_fluid
-from rotor.fluid.run import Outputs
-from rotor.fluid.settings import Settings
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.request import FluidAnswer, FluidRequest, NewBox, answer_fluid
+from rotor.fluids.run import Outputs
+from rotor.fluids.settings import Settings
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where
 from rotor.scenes.molecule import named

@@ -14,7 +14,7 @@ from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import top_of
 from rotor.scenes.scene import GasScene, molecule_of
 from rotor.scenes.sections import GasConditions, GasNumerics, GasObservables, MoleculeSection
-from rotor.thermo.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
+from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 
 if TYPE_CHECKING:
     from rotor.table import Table

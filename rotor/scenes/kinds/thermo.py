@@ -11,8 +11,8 @@ from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import top_of
 from rotor.scenes.scene import ThermoScene, molecule_of
 from rotor.scenes.sections import MoleculeSection, ThermoConditions, ThermoNumerics, ThermoObservables
-from rotor.thermo.functions import ThermoFunctions
-from rotor.thermo.request import TEMPERATURES_K, ThermoAnswer, ThermoRequest, answer_thermo
+from rotor.thermodynamics.functions import ThermoFunctions
+from rotor.thermodynamics.request import TEMPERATURES_K, ThermoAnswer, ThermoRequest, answer_thermo
 
 _NAMES = {
     "temperatures_k": "conditions.temperature", "pressure_bar": "conditions.pressure",

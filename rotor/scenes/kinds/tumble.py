@@ -33,7 +33,7 @@ def request(scene: TumbleScene, folder: Where = ".") -> TumbleRequest | DrivenRe
         return _driven(scene, scene.body) if scene.effects else _of_body(scene.body, scene.conditions)
     if scene.effects:
         raise ValueError("effects: act on a body; give its moments in [body] instead of a molecule")
-    from rotor.thermo.thermal_tumble import thermal_tumble
+    from rotor.thermodynamics.thermal_tumble import thermal_tumble
 
     start = scene.conditions
     with kind.fields(angular_momentum="conditions.angular_momentum", temperature_k="conditions.temperature"):

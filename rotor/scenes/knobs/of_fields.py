@@ -25,7 +25,7 @@ SHARES_OF_J = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 def thermo(request: Any) -> Knobs:
     """Of a scene of thermodynamic functions."""
-    from rotor.thermo.request import answer_thermo
+    from rotor.thermodynamics.request import answer_thermo
 
     measures = tuple(
         Measure(of, "%", _relative(name))

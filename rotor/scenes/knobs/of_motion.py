@@ -14,7 +14,7 @@ from rotor.scenes.choice import NOTHING_CHEAPER
 from rotor.scenes.knobs.knob import Knob, Knobs, Measure, ladder
 
 if TYPE_CHECKING:
-    from rotor.fluid.request import FluidRequest
+    from rotor.fluids.request import FluidRequest
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 FINEST_TOLERANCE = 1e-13
@@ -80,7 +80,7 @@ def _splitting(request: Any, order: int, finest: Any, measure: Measure, against:
 
 def gas(request: Any) -> Knobs:
     """Of a scene of a classical gas: the number of molecules, whose error is statistical."""
-    from rotor.thermo.classical_gas import answer_gas
+    from rotor.thermodynamics.classical_gas import answer_gas
 
     def answers(asked: Any) -> list[Any]:
         return [answer_gas(replace(asked, seed=asked.seed + 10 * n)) for n in range(SEEDS)]
@@ -139,7 +139,7 @@ def _curve_error(found: Any, reference: Any) -> float:
 
 def fluid(request: FluidRequest) -> Knobs:
     """Of a scene of a fluid: the step, by energy and positions over a short time; cutoff and Ewald's tolerance, by forces."""
-    from rotor.fluid.request import NewBox, box_of
+    from rotor.fluids.request import NewBox, box_of
 
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
@@ -158,7 +158,7 @@ def followed(request: FluidRequest, step_fs: float) -> FluidRequest:
 
 def answer_followed(request: FluidRequest) -> Any:
     """The run of a copy of its box."""
-    from rotor.fluid.request import answer_fluid
+    from rotor.fluids.request import answer_fluid
 
     return answer_fluid(replace(request, box=_copied(request)), progress=lambda *_: None)
 
@@ -215,7 +215,7 @@ def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, toleran
     callable
         Its answer is an (n, 3) array in eV/Å.
     """
-    from rotor.fluid.forces.potential import RigidPotential
+    from rotor.fluids.forces.potential import RigidPotential
 
     atoms = _copied(request)
     atoms.calc = RigidPotential(

@@ -35,7 +35,7 @@ from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_o
 from rotor.spectra.fields.light import Light, LightText, Vector, light_of
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
-from rotor.thermo.field_mixture import POPULATIONS, Populations, populations_in_field
+from rotor.thermodynamics.field_mixture import POPULATIONS, Populations, populations_in_field
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

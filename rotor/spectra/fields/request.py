@@ -13,7 +13,7 @@ from rotor.checks import require_one_of, require_positive
 from rotor.quantum.fields.stark_request import StarkRequest
 from rotor.spectra.fields.light import LightText, light_of
 from rotor.table import Table
-from rotor.thermo.field_mixture import POPULATIONS, field_mixture
+from rotor.thermodynamics.field_mixture import POPULATIONS, field_mixture
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap

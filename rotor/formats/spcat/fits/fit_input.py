@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.fit import Fit, FitOptions
-from rotor.fit.parameters import Parameters
+from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain

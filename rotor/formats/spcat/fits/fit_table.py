@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rotor.fit.fit import Fit
-from rotor.fit.publication import Row, value_text
+from rotor.fitting.fit import Fit
+from rotor.fitting.publication import Row, value_text
 from rotor.formats.spcat.fits.fit_input import SpfitInput
 from rotor.formats.spcat.hamiltonian.codes import (
     A_REDUCTION,

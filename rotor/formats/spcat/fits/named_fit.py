@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fit.fit import Fit
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.fit import Fit
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.fits.fit_input import packed_correlations
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file

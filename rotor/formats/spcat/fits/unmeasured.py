@@ -7,7 +7,7 @@ from math import prod
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.fit.assignment import Assignments
+from rotor.fitting.assignment import Assignments
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks

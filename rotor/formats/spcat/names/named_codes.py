@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.hamiltonian.codes import (
     AXES,
     Digits,

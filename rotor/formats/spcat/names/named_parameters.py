@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fit.top_constants import TopConstants
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.names.named_codes import codes_of_names

@@ -1,0 +1,377 @@
+"""Which constants the lines call for, and which unmeasured line would help most.
+
+Adding one constant to a fit with χ²₀ leaves χ²₁ with f₁ degrees of freedom; F = (χ²₀ - χ²₁)/(χ²₁/f₁) follows Fisher's
+distribution with 1 and f₁ where the constant is not needed. Beside it stand Akaike's criterion with its correction for small
+samples (N. Sugiura, Commun. Stat. A7, 13 (1978)),
+
+    AICc = n ln(χ²/n) + 2k + 2k(k + 1)/(n - k - 1),
+
+and the rms of the residuals that leaving each line out in turn would give, r_i/(1 - h_i), to first order in the leverages h
+(D. M. Allen, Technometrics 16, 125 (1974)). A constant is taken when all three say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.assignment import Assignments
+from rotor.fitting.criteria import aicc, cross_validated_rms, f_test
+from rotor.fitting.first_values import beside_zero, search_of, weighted_derivatives
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.orders import order_of
+from rotor.fitting.parameters import Parameters, parameters, with_names
+from rotor.fitting.top_constants import ConstantSet
+from rotor.fitting.top_levels import model_of
+from rotor.quantum.labelled import LevelModel
+from rotor.statistics.least_squares import INTERRUPTED
+from rotor.table import counted
+
+CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
+_MOST_STEPS = 40
+_TRIED = 8  # constants, or pairs, of those that promise most that are fitted at each step
+_MADE_UP = 1e-14  # of the squared length of a column of derivatives: what is left of one that the others make up
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A fit with one constant more or less.
+
+    name, added : which ("HK with h1" for two together), and whether it was added (else left out). fit : what came out
+    f_ratio, chance : F and the probability of one so large where the constant is not needed
+    aicc, cross_validated : of the model tried; those of the model it was tried against stand in `aicc_before` and
+    `cross_validated_before`
+    """
+
+    name: str
+    added: bool
+    fit: Fit
+    f_ratio: float
+    chance: float
+    aicc: float
+    cross_validated: float
+    aicc_before: float
+    cross_validated_before: float
+
+    @property
+    def better(self) -> bool:
+        """Whether all three signs speak for the model tried."""
+        if self.added:
+            needed = self.chance < CHANCE and self.aicc < self.aicc_before
+            return self.fit.converged and needed and self.cross_validated < self.cross_validated_before
+        return self.fit.converged and self.chance >= CHANCE and self.aicc <= self.aicc_before
+
+    @property
+    def error_ratio(self) -> float:
+        """|constant|/standard error in the larger model; nan where it is not in the model tried."""
+        if not self.added:
+            return float("nan")
+        i = self.fit.parameters.names.index(self.name.partition(" with ")[0])
+        return float(abs(self.fit.values[i]) / self.fit.errors[i])
+
+
+def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | None = None) -> list[Trial]:
+    """The fit again with each candidate added (from 0) where it is not free, and left out (at 0) where it is.
+
+    Parameters
+    ----------
+    fit : Fit
+        In plain constants (see `rotor.fitting.parameters.parameters`).
+    candidates : sequence of str
+    options : FitOptions, optional
+
+    Returns
+    -------
+    list of Trial
+        By F, the largest of those added first; A, B, C, the E of a state, and a constant with an a-priori error (which
+        is a measurement of it) are never left out. Ties and a-priori errors stay; what is tied to a constant that is left out
+        follows it to 0.
+
+    Raises
+    ------
+    ValueError
+        For a name that the kind of top or the reduction does not have, and for a constant that is tied.
+    """
+    options = replace(options or FitOptions(), pass_interrupt=True)
+    constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
+    out = []
+    for name in candidates:
+        own = constants.own_name(name)
+        if own in fit.parameters.names:
+            known = np.isfinite(fit.parameters.prior[fit.parameters.names.index(own)])
+            if own.partition("[")[0] not in ("A", "B", "C", "E") and not known:
+                out.append(_without(fit, own, options))
+        else:
+            out.append(_with(fit, constants, own, options))
+    return sorted([trial for trial in out if trial], key=lambda one: (not one.added, -one.f_ratio))
+
+
+def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
+    others = [other for other in constants.values if other not in fit.named.values and other != name]
+    own, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
+    more = fit.parameters.moved(fit.values).with_free(own, [name])
+    try:
+        found = fit_lines(fit.lines, own, more, options)
+    except ValueError:  # more constants than lines
+        return None
+    ratio, chance = f_test(fit, found)
+    return _trial(name, True, fit, found, ratio, chance)
+
+
+def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
+    rest = fit.parameters.moved(fit.values).without(name)
+    constants = dict(zip(rest.constant_names, rest.constants_of(rest.start).tolist(), strict=True))
+    try:
+        found = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
+    except ValueError:
+        return None
+    ratio, chance = f_test(found, fit)
+    return _trial(name, False, fit, found, ratio, chance)
+
+
+def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance: float) -> Trial:
+    return Trial(
+        name,
+        added,
+        found,
+        ratio,
+        chance,
+        aicc(found),
+        cross_validated_rms(found),
+        aicc(before),
+        cross_validated_rms(before),
+    )
+
+
+def choose_constants(
+    lines: Assignments,
+    constants: ConstantSet,
+    base: Sequence[str] | Parameters,
+    candidates: Sequence[str],
+    options: FitOptions | None = None,
+    *,
+    by_order: bool = True,
+    progress: Callable[[Trial], None] | None = None,
+) -> tuple[Fit, list[Trial]]:
+    """A model built up order by order in J, then freed of what it does not need.
+
+    Of the candidates of one order that all three signs speak for, the one with the largest F is taken, until none is left; where
+    none helps alone, pairs of one order are tried, because such constants often make sense together only. Then the next order
+    follows. At the end constants that the whole model does not need are left out one by one, highest order first.
+
+    Parameters
+    ----------
+    lines : Assignments
+    constants : Constants or TopConstants
+        Where the fit starts; candidates start from 0 unless they are in it.
+    base : sequence of str or Parameters
+        Constants that are always free; as parameters of the same constants with their ties and a-priori errors, which stay.
+    candidates : sequence of str
+    options : FitOptions, optional
+    by_order : bool
+        False: candidates of all orders compete from the first step on. Where some states are disturbed it finds constants of high
+        order that a search by order does not reach; compare both by `aicc`.
+    progress : callable, optional
+        Called with every step taken.
+
+    Returns
+    -------
+    (Fit, list of Trial)
+        The last fit, and the steps that were taken. After a KeyboardInterrupt these are the model so far, which has not converged.
+    """
+    start = constants if isinstance(base, Parameters) else with_names(constants, base)
+    free = base if isinstance(base, Parameters) else parameters(start, base)
+    fit = fit_lines(lines, start, free, _patient(options))
+    fixed, taken = tuple(fit.parameters.names), list[Trial]()
+    known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
+    names = dict.fromkeys(known.own_name(name) for name in candidates)
+    orders = {name: order_of(name, known) for name in names if name not in fixed}
+    free.with_free(known, list(orders))  # refuses constants that are tied
+
+    different = sorted(set(orders.values()))
+    groups = [{order} for order in different] if by_order else [set(different)]
+    try:
+        for trial in _steps(fit, fixed, orders, groups, _patient(options)):
+            taken.append(trial)
+            if progress:
+                progress(trial)
+    except KeyboardInterrupt:
+        last = taken[-1].fit if taken else fit
+        ended = replace(last.minimum, status=INTERRUPTED)
+        return replace(
+            last,
+            minimum=ended,
+            converged=False,
+            reason=f"interrupted after {counted(len(taken), 'step')} of the choice",
+        ), taken
+    return taken[-1].fit if taken else fit, taken
+
+
+def _steps(
+    fit: Fit, fixed: Sequence[str], orders: Mapping[str, int], groups: Sequence[set[int]], options: FitOptions
+) -> Iterator[Trial]:
+    """The steps of `choose_constants`, each a trial that is better than the model before it."""
+    count, before = 0, -1
+    while count > before:  # once more while something was taken: a higher order may have made a lower one significant
+        before = count
+        for group in groups:
+            while count < _MOST_STEPS:
+                left = [name for name in orders if orders[name] in group and name not in fit.parameters.names]
+                best = _best_added(fit, left, options)
+                if best is None:
+                    break
+                count, fit = count + 1, best.fit
+                yield best
+    while True:
+        spare = [name for name in fit.parameters.names if name not in fixed]
+        needless = [one for one in try_constants(fit, _weakest(fit, spare), options) if one.better]
+        if not needless:
+            return
+        least = min(needless, key=lambda one: (-orders[one.name], one.f_ratio))
+        fit = least.fit
+        yield least
+
+
+def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | None:
+    """The constant, or where none helps alone the pair, that all three signs speak for, with the largest F.
+
+    Fitted are those few that promise the largest decrease of χ² in the linear model; see `promised`.
+    """
+    if not left:
+        return None
+    alone, pairs = promised(fit, left, options)
+    for name in beside_zero(with_names(fit.named, left), left, fit.lines, options)[
+        1
+    ]:  # of no promise in a linear model
+        i = left.index(name)
+        alone[i], pairs[i], pairs[:, i] = np.inf, 0.0, 0.0
+    few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
+    best = next((one for one in try_constants(fit, few, options) if one.added and one.better), None)
+    if best is not None or len(left) < 2:
+        return best
+    upper = [(i, j) for i in range(len(left)) for j in range(i)]
+    order = sorted(upper, key=lambda one: -pairs[one])[:_TRIED]
+    found = [trial for i, j in order if (trial := _pair(fit, left[j], left[i], options)) and trial.better]
+    return max(found, key=lambda trial: trial.f_ratio, default=None)
+
+
+def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> tuple[Floats, Floats]:
+    """By how much χ² would fall, to first order, with each constant free (n,), and with each two of them (n, n).
+
+    What is left of the derivatives x by a new constant beside those of the fit, x - J J⁺ x, decreases χ² by (x · r)²/(x · x); two
+    of them by b A⁻¹ b with b = x · r and A their products. A constant that the others make up promises 0.
+    """
+    search = search_of(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
+    own, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
+    columns = np.vstack([columns, np.zeros((len(own) - len(columns), len(names)))])  # a-priori values know no other
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0, size, 1.0)
+    basis = np.linalg.qr(own / np.where(np.linalg.norm(own, axis=0) > 0, np.linalg.norm(own, axis=0), 1.0))[0]
+    for _ in range(2):  # once more for the digits that the first time cancels
+        columns = columns - basis @ (basis.T @ columns)
+    products, along = columns.T @ columns, columns.T @ fit.residuals
+    own_size = np.diag(products).copy()
+    seen = own_size > _MADE_UP
+    alone = np.where(seen, along**2 / np.where(seen, own_size, 1.0), 0.0)
+    determinant = np.outer(own_size, own_size) - products**2
+    both = np.outer(along**2, own_size) + np.outer(own_size, along**2) - 2 * np.outer(along, along) * products
+    apart = determinant > 1e-6 * np.outer(own_size, own_size)
+    apart &= np.outer(seen, seen)
+    return alone, np.where(apart, both / np.where(apart, determinant, 1.0), 0.0)
+
+
+def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
+    """The few constants that are smallest in units of their standard errors."""
+    ratio = dict(zip(fit.parameters.names, np.abs(fit.values) / fit.errors, strict=True))
+    return sorted(names, key=lambda name: ratio[name])[:_TRIED]
+
+
+def _patient(options: FitOptions | None) -> FitOptions:
+    """A model on its way may be far from the lines: only the last one is judged by its rms. An interrupt ends the whole choice."""
+    return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
+
+
+def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
+    """Two constants together, judged as one step; None where the lines are too few."""
+    constants, _ = beside_zero(with_names(fit.named, [one, other]), [one, other], fit.lines, options)
+    try:
+        free = fit.parameters.moved(fit.values).with_free(constants, [one, other])
+        both = fit_lines(fit.lines, constants, free, options)
+    except ValueError:
+        return None
+    ratio, chance = f_test(fit, both)
+    return _trial(f"{one} with {other}", True, fit, both, ratio, chance)
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """An unmeasured line: its labels, where it is predicted with which error, and the error of the constant after it, over now."""
+
+    upper: tuple[int, ...]
+    lower: tuple[int, ...]
+    frequency_mhz: float
+    error_mhz: float
+    error_ratio: float
+
+
+def suggest_lines(
+    fit: Fit,
+    name: str,
+    upper: Ints,
+    lower: Ints,
+    *,
+    error_mhz: float,
+    model: Callable[[Ints], LevelModel] | None = None,
+) -> list[Suggestion]:
+    """How much each line, if it were measured, would reduce the standard error of one parameter; the best first.
+
+    A line with the derivatives d by the parameters and the error σ takes (C d)_j²/(σ² + dᵀ C d) from the variance C_jj.
+
+    Parameters
+    ----------
+    fit : Fit
+    name : str
+        The parameter.
+    upper, lower : (m, k) arrays
+        Labels of the lines to choose from.
+    error_mhz : float
+        With which it would be measured.
+    model : callable, optional
+        As in `fit_lines`.
+
+    Returns
+    -------
+    list of Suggestion
+
+    Raises
+    ------
+    ValueError
+        For an unknown parameter, or one that the lines do not determine (any line in which it counts would).
+    """
+    if name not in fit.parameters.names:
+        raise ValueError(f"{name} is not among the free parameters {', '.join(fit.parameters.names)}")
+    column = fit.parameters.names.index(name)
+    if not np.isfinite(fit.errors).all():
+        raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
+    labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
+    places = places.reshape(-1)
+    made = model(labels) if model else model_of(fit.named, labels)
+    energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
+    slopes = slopes @ fit.parameters.matrix
+    up, low = places[: len(upper)], places[len(upper) :]
+    rows = slopes[up] - slopes[low]
+    covariance = fit.statistics.covariance
+    spread = np.einsum("ij,jk,ik->i", rows, covariance, rows)
+    gained = (rows @ covariance[:, column]) ** 2 / (error_mhz**2 + spread)
+    ratio = np.sqrt(np.maximum(1 - gained / covariance[column, column], 0.0))
+    frequency = energies[up] - energies[low]
+    return [
+        Suggestion(
+            tuple(np.asarray(upper)[i].tolist()), tuple(np.asarray(lower)[i].tolist()), float(frequency[i]),
+            float(np.sqrt(spread[i])), float(ratio[i]),
+        )
+        for i in np.argsort(ratio, kind="stable").tolist()
+    ]  # fmt: skip

@@ -1,0 +1,427 @@
+"""The fit: constants from assigned lines by weighted least squares, with all that is known about the result.
+
+    χ² = Σ ((ν_obs - ν_calc)/σ)² + Σ ((p - p₀)/σ_prior)²,      ν_calc = E(upper) - E(lower), in a blend the weighted mean
+
+The fit knows levels by their labels only: a `LevelModel` gives their energies and derivatives for any constants. The search
+itself is in `rotor.fitting.search` and `rotor.fitting.strategies`. A fit has converged when the search is at a minimum and
+that minimum describes the lines: a weighted rms far above 1 is a failure and says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.assignment import Assignments, duplicates, levels_in
+from rotor.fitting.parameters import Parameters
+from rotor.fitting.search import FitOptions as FitOptions
+from rotor.fitting.search import Search, errors_of, round_off, too_few
+from rotor.fitting.strategies import with_rejection
+from rotor.fitting.top_constants import ConstantSet
+from rotor.fitting.top_levels import model_of
+from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
+from rotor.statistics.regression import Regression, regression
+from rotor.table import counted
+from rotor.tops.covariance import Covariance
+
+NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
+CHANGED_STATE = 0.5  # overlap below which a level is another state than it was at the start
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A finished fit.
+
+    lines : as given. constants : the fitted set with its standard errors, None where the parameters are not named constants (SPFIT's
+    codes with spins or several states). parameters : what was fitted, `values` (n,) at the end
+    calculated_mhz (lines,) : each line; blended_mhz (lines,) : the mean of its blend. calculated_errors_mhz (lines,) : of the
+    prediction, from the stated errors. line_errors_mhz (lines,) : the errors of the lines as they counted, the default one among them;
+    0 where there is none. used (lines,) : whether a line counted; left_out : why not, by line
+    residuals (u,), jacobian's statistics : of the measured frequencies that counted, blends as one, in order of `groups`
+    minimum : how the search ended. converged, reason : whether this is a result, and the sentence that says why or why not
+    changed_states : levels that are another state than at the start, as text. notes : what must be known
+    """
+
+    lines: Assignments
+    constants: ConstantSet | None
+    parameters: Parameters
+    values: Floats
+    calculated_mhz: Floats
+    blended_mhz: Floats
+    calculated_errors_mhz: Floats
+    line_errors_mhz: Floats
+    used: NDArray[np.bool_]
+    left_out: dict[int, str]
+    residuals: Floats
+    groups: Ints
+    statistics: Regression
+    minimum: Minimum
+    converged: bool
+    reason: str
+    changed_states: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def named(self) -> ConstantSet:
+        """The fitted constants. ValueError where the parameters are not named constants."""
+        if self.constants is None:
+            raise ValueError(
+                "the parameters of this fit are codes of SPFIT with spins or states; it has no named constants"
+            )
+        return self.constants
+
+    @property
+    def difference_mhz(self) -> Floats:
+        """Observed minus calculated (lines,), of blends against their mean."""
+        return np.asarray(self.lines.frequency_mhz - self.blended_mhz)
+
+    @property
+    def weighted_rms(self) -> float:
+        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR, less the part of a-priori values.
+
+        Of a blend of known width its components count too.
+        """
+        r = self.residuals[: len(self.residuals) - int(np.isfinite(self.parameters.prior).sum())]
+        return float(np.sqrt(r @ r / len(r))) if len(r) else float("nan")
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Measured frequencies that counted, and a-priori values, less the combinations that they determine."""
+        return len(self.residuals) - self.statistics.rank
+
+    @property
+    def reduced_chi(self) -> float:
+        """√(χ²/degrees of freedom); nan where there are none."""
+        free = self.degrees_of_freedom
+        return float(np.sqrt(self.residuals @ self.residuals / free)) if free > 0 else float("nan")
+
+    @property
+    def errors(self) -> Floats:
+        """Standard errors (n,) of the parameters in MHz from the stated errors of the lines."""
+        return self.statistics.errors
+
+    @property
+    def scaled_errors(self) -> Floats:
+        """The same times √(χ²/degrees of freedom): from the scatter of the lines."""
+        return np.asarray(self.errors * self.reduced_chi)
+
+    @property
+    def covariance(self) -> Covariance:
+        """Of the constants that depend on what was fitted, from the stated errors. ValueError where one is not determined."""
+        return covariance_of(self.parameters, self.statistics)
+
+    def rms_mhz(self, wavenumber: bool = False) -> float:
+        """Unweighted rms of the measured frequencies, MHz (of those measured in cm⁻¹ in cm⁻¹); nan where there are none."""
+        chosen = self.groups[self.lines.wavenumber[self.groups] == wavenumber]
+        d = self.difference_mhz[chosen] / (29979.2458 if wavenumber else 1.0)
+        return float(np.sqrt(d @ d / len(d))) if len(d) else float("nan")
+
+
+def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
+    """The covariance (MHz²) of the constants that follow from free parameters."""
+    if not np.isfinite(statistics.errors).all():
+        lost = ", ".join(one.text for one in statistics.undetermined)
+        raise ValueError(
+            f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
+        )
+    found = covariance_of_determined(parameters, statistics)
+    return found or Covariance((), np.zeros((0, 0)))
+
+
+def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
+    """The same without the constants that follow from a free parameter that is not determined; None where no other is there."""
+    open_ = ~np.isfinite(statistics.errors)
+    rows = np.flatnonzero(parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
+    if not len(rows):
+        return None
+    own = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
+    matrix = parameters.matrix[rows] @ own @ parameters.matrix[rows].T
+    return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
+
+
+def fit_lines(
+    lines: Assignments,
+    constants: ConstantSet | None,
+    parameters: Parameters,
+    options: FitOptions | None = None,
+    *,
+    model: Callable[[Ints], LevelModel] | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Constants fitted to assigned lines.
+
+    Parameters
+    ----------
+    lines : Assignments
+    constants : Constants or TopConstants
+        Where the fit starts: kind, reduction, representation and every constant that is held; None with a model of its own.
+    parameters : Parameters
+        What is free, for the same constants.
+    options : FitOptions, optional
+    model : callable, optional
+        Labels (levels, k) to a `LevelModel`; that of the constants where it is left out.
+    progress : callable, optional
+        Called with every `Iteration`. A KeyboardInterrupt ends the search with the best constants so far.
+
+    Returns
+    -------
+    Fit
+        `converged` is False where it is no result, and `reason` says why; the best point is in it all the same.
+
+    Raises
+    ------
+    ValueError
+        No lines, all errors 0, labels that no level has, a line from a level to itself, more free parameters than measured frequencies.
+
+    Notes
+    -----
+    Errors are those of normal statistics to first order at the minimum; a blend counts as one frequency with the error of its
+    first line.
+
+    >>> from rotor.fitting.assignment import assignments
+    >>> from rotor.fitting.parameters import parameters as free
+    >>> from rotor.tops.constants import Constants
+    >>> start = Constants(B=57000.0, D=0.1)
+    >>> seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [115271.2018, 230538.0, 345795.9899], 0.0005)
+    >>> found = fit_lines(seen, start, free(start, ["B", "D"]))
+    >>> found.converged, round(found.constants["B"], 3), round(found.constants["D"], 4)
+    (True, 57635.968, 0.1835)
+    """
+    options = options or FitOptions()
+    if not len(lines):
+        raise ValueError("there are no lines to fit to")
+    lines, made, missing = _with_levels(lines, model or _of_constants(constants, options), options)
+    left_out, sigma = errors_of(lines, options)
+    labels, upper, lower = levels_in(lines)
+    if made.names != parameters.constant_names:
+        raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
+
+    used = np.ones(len(lines), dtype=bool)
+    used[list(left_out)] = False
+    if few := too_few(lines, used, parameters):
+        raise ValueError(f"{lines.source or 'the lines'}: {few}")
+    search = Search(lines, made, parameters, options, upper, lower, sigma, used)
+    search, minimum, rejected = with_rejection(search, options, progress)
+    left_out |= rejected
+    fit = _finished(search, minimum, constants, left_out, labels)
+    return replace(fit, notes=(*missing, *fit.notes))
+
+
+def _of_constants(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
+    """What makes the model of the constants, from labels."""
+    if constants is None:
+        raise ValueError("either constants or a model of the levels is needed")
+    return partial(model_of, constants, kmax=options.kmax)
+
+
+def _with_levels(
+    lines: Assignments, model: Callable[[Ints], LevelModel], options: FitOptions
+) -> tuple[Assignments, LevelModel, list[str]]:
+    """The lines whose two levels there are, their model, and what was left out.
+
+    A label that no level has is an error, or, with `leave_out_missing`, its lines are left out.
+    """
+    labels, upper, lower = levels_in(lines)
+    one = np.flatnonzero(upper == lower)
+    if len(one):
+        raise ValueError(
+            f"{_named(lines, int(one[0]))}: upper and lower state are one level, which makes "
+            "no line: correct its labels, or take the line out"
+        )
+    try:
+        return lines, model(labels), []
+    except MissingLevelsError as error:
+        lost = np.isin(upper, error.places) | np.isin(lower, error.places)
+        if not options.leave_out_missing or lost.all():
+            raise ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}") from None
+        notes = [
+            f"{_named(lines, i)}, is left out: it has a level that does not exist"
+            for i in np.flatnonzero(lost).tolist()
+        ]
+    rest, made, more = _with_levels(lines.take(~lost), model, options)
+    return rest, made, notes + more
+
+
+def _named(lines: Assignments, i: int) -> str:
+    """A line by its place and labels."""
+    return f"{lines.source or 'the lines'}: line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
+
+
+def _finished(
+    search: Search, minimum: Minimum, constants: ConstantSet | None, left_out: dict[int, str], labels: Ints
+) -> Fit:
+    values, parameters = minimum.parameters, search.parameters
+    calculated, jacobian, slopes = search.lines_of(values)
+    residuals, _ = search.weighted(values)
+    statistics = regression(minimum.jacobian, parameters.names, round_off(search, slopes))
+    fitted, order = _constants(constants, parameters, values, statistics)
+    fit = Fit(
+        lines=search.lines,
+        constants=fitted,
+        parameters=parameters,
+        values=values,
+        calculated_mhz=calculated,
+        blended_mhz=search.group.spread_back(search.group.mean(calculated), calculated),
+        calculated_errors_mhz=_prediction_errors(jacobian, statistics),
+        line_errors_mhz=_line_errors(search),
+        used=search.used,
+        left_out=left_out,
+        residuals=residuals,
+        groups=search.group.first,
+        statistics=statistics,
+        minimum=minimum,
+        converged=False,
+        reason="",
+        changed_states=_changed(search, values, labels),
+        notes=(),
+    )
+    converged, reason = _verdict(fit, order, search.options)
+    return replace(fit, converged=converged, reason=reason, notes=tuple(_notes(fit)))
+
+
+def _constants(
+    constants: ConstantSet | None, parameters: Parameters, values: Floats, statistics: Regression
+) -> tuple[ConstantSet | None, str]:
+    """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
+    if constants is None:
+        return None, ""
+    new = dict(zip(parameters.constant_names, parameters.constants_of(values).tolist(), strict=True))
+    touched = np.asarray(parameters.matrix.any(axis=1)).tolist()
+    covariance = statistics.covariance
+    errors = {}
+    for name, row, moves in zip(parameters.constant_names, parameters.matrix, touched, strict=True):
+        used = row != 0
+        if moves and np.isfinite(covariance.diagonal()[used]).all():
+            errors[name] = float(np.sqrt(row[used] @ covariance[np.ix_(used, used)] @ row[used]))
+    chosen = {name: value for name, value in constants.uncertainties.items() if name not in new}
+    try:
+        return constants.replace(**new, uncertainties={**chosen, **errors}), ""
+    except ValueError as error:
+        return constants, str(error)
+
+
+def _line_errors(search: Search) -> Floats:
+    without = (search.lines.error_mhz == 0) & (search.options.default_error_mhz is None)
+    return np.where(without, 0.0, search.sigma)
+
+
+def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:
+    """√(d C dᵀ) of rows d (lines, n); infinite where a parameter that is not determined counts."""
+    open_ = ~np.isfinite(statistics.errors)
+    closed = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)
+    out = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, closed, jacobian, optimize=True), 0.0))
+    touched = (np.abs(jacobian[:, open_]) > 0).any(axis=1) if open_.any() else np.zeros(len(jacobian), dtype=bool)
+    return np.where(touched & bool(len(statistics.undetermined)), np.inf, out)
+
+
+def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
+    """Levels that are mostly another state than with the constants of the start."""
+    start = search.parameters.constants_of(search.parameters.start)
+    overlap = search.model.overlaps(start, search.parameters.constants_of(values))
+    return tuple(search.lines.label_text(labels[i].tolist()) for i in np.flatnonzero(overlap < CHANGED_STATE))
+
+
+def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
+    """Whether the fit is a result, and the sentence that says so or says why not."""
+    minimum = fit.minimum
+    rms = fit.weighted_rms if options.loss == "squares" else minimum.rms  # of what was made least
+    if disorder:
+        return False, f"the constants that were reached are no set of constants: {disorder}"
+    near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE
+    if not (minimum.converged or near):
+        return False, f"{minimum.reason}; weighted rms {rms:.4g}"
+    if rms > options.poor_rms:
+        return False, (
+            f"a minimum was reached, but it does not describe the lines: weighted rms {rms:.4g}, above {options.poor_rms:g}; "
+            "check assignments, the start, and which constants are free"
+        )
+    reason = minimum.reason
+    if near:
+        count = len(minimum.iterations)
+        done, left = counted(count, "iteration"), f"{minimum.distance:.1e} standard errors"
+        reason = f"ended after {done}, as many as allowed: the next step would be {left}"
+    if not fit.degrees_of_freedom:
+        reason += (
+            "; 0 degrees of freedom: as many frequencies as they determine constants, so that nothing checks these, and there "
+            "are no errors from the scatter"
+        )
+    if len(fit.statistics.undetermined):
+        named = "; ".join(one.text for one in fit.statistics.undetermined)
+        return True, f"{reason}; not determined by these lines and left at the start: {named}"
+    return True, reason
+
+
+def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
+    """What is to be known of lines that stand twice."""
+    first, second = np.array(pairs).T
+    apart = np.abs(lines.frequency_mhz[first] - lines.frequency_mhz[second])
+    worst = int(np.argmax(apart))
+    return (
+        f"{counted(len(pairs), 'line stands', 'lines stand')} twice in the list, "
+        f"the first: {lines.text(int(second[0]))}; the largest difference is "
+        f"{apart[worst]:.4g} MHz, of {lines.text(int(second[worst]))}"
+    )
+
+
+def _unlikely(lines: Assignments) -> list[str]:
+    """Lines of one state without spins that no dipole makes: J changes by more than 1, or Ka and Kc both by even numbers."""
+    if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] == "f":
+        return []
+    there = ~lines.from_zero
+    change = np.abs(lines.upper - lines.lower)
+    far = there & (change[:, 0] > 1)
+    even = there & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
+    out = []
+    for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
+        some = np.flatnonzero(rows)
+        if len(some):
+            first = f"line {lines.number(int(some[0]))}, {lines.text(int(some[0]))}"
+            out.append(
+                f"{counted(len(some), 'line')} that no dipole moment makes, {first}: {why}; are the labels right?"
+            )
+    return out
+
+
+def _bent(fit: Fit) -> list[str]:
+    """The parameters that the linear model would move most, in units of the lengths of their columns."""
+    statistics = fit.statistics
+    moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
+    return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
+
+
+def _notes(fit: Fit) -> list[str]:
+    lines, notes = fit.lines, list[str]()
+    for i, why in fit.left_out.items():
+        notes.append(
+            f"line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}"
+        )
+    if fit.changed_states:
+        some = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
+        notes.append(
+            f"{counted(len(fit.changed_states), 'level is', 'levels are')} mostly another state than at the start (by overlap): {some}"
+        )
+    twice = duplicates(lines)
+    if twice:
+        notes.append(_of_twice(lines, twice))
+    notes += _unlikely(lines)
+    reversed_ = np.flatnonzero(
+        fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))
+    )
+    for i in reversed_.tolist():
+        notes.append(
+            f"line {lines.number(i)}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
+        )
+    if fit.minimum.converged and fit.minimum.distance > BENT * max(1.0, fit.minimum.rms):
+        notes.append(
+            f"χ² is not quadratic within the standard errors, which are those of the linear model: {', '.join(_bent(fit))} may be "
+            "known better or worse than they say; hold one of these, or add lines"
+        )
+    if np.isfinite(fit.statistics.condition) and fit.statistics.condition > 1e5:
+        notes.append(f"condition number {fit.statistics.condition:.1e}: some constants are nearly interchangeable")
+    return notes

@@ -1,0 +1,41 @@
+"""The order of a constant, by the highest power of the angular momentum in its operator: models are built up in this order."""
+
+from __future__ import annotations
+
+from rotor.fitting.top_constants import ConstantSet, TopConstants
+from rotor.quantum.effects.spin_effect import parse_name
+from rotor.tops.operators import distortion_terms, powers_of_spelled
+
+
+def order_of(name: str, constants: ConstantSet) -> int:
+    """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK; 1 for G_c, 0 for chi_aa.
+
+    >>> from rotor.tops.constants import Constants
+    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
+    6
+    """
+    if isinstance(constants, TopConstants) and set("[(") & set(name):
+        return _order_of_named(name, constants)
+    if name in ("A", "B", "C"):
+        return 2
+    spelled = powers_of_spelled(name)
+    known = distortion_terms(constants.kind, constants.reduction)
+    if not spelled and name not in known:
+        raise ValueError(
+            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
+        )
+    terms = {spelled: 1.0} if spelled else known[name]
+    return max(2 * (p + q + n) for p, q, n in terms)
+
+
+def _order_of_named(name: str, constants: TopConstants) -> int:
+    """Of a constant of a state, of two states, or of spins: spin-rotation has one power of N, as G has."""
+    head = name.partition("[")[0]
+    if "(" not in name and "," not in name:
+        return 0 if head == "E" else order_of(head, constants.top.constants)
+    parts = parse_name(name)
+    kind, _, letters = parts.symbol.partition("_")
+    own = {"G": 1, "F": 2, "C": 1, "eps": 1, "gamma": 1}.get(kind, 0)
+    if kind == "W" and letters:
+        own = int(letters.removeprefix("pm"))
+    return own + 2 * (parts.n2 + parts.nz2) + parts.ns

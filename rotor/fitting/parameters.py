@@ -1,0 +1,214 @@
+"""What is fitted: parameters that constants follow linearly, some free, some held, some tied, some with an a-priori error.
+
+constants = base + matrix @ parameters. With plain names a parameter is a constant; in SPFIT's coding it is what a code
+multiplies (A - B, -D_J), and a tied parameter retains its ratio to the one before it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.top_constants import ConstantSet
+from rotor.units import parse_quantity
+
+_NAME = r"(\w+(?:-[abc]{2}(?:_\w+)?(?=\())?(?:\([^()]*\))?(?:\[[^\[\]]*\])?)"  # DeltaJ, A[1], G_c[0,1], chi_bb-cc(14N)
+_TIE = re.compile(
+    rf"\s*{_NAME}\s*=\s*(?:([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*\*\s*)?{_NAME}\s*(?:([+-])\s*(.+))?\s*$"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Free parameters and how the constants follow from them.
+
+    names (n,) : of the free parameters. start (n,) : their values before the fit, MHz. prior (n,) : a-priori standard errors in
+    MHz, infinite where there are none. centre (n,) : the a-priori values, MHz, where they are not `start`
+    constant_names (c,) ; base (c,), matrix (c, n) : constants = base + matrix @ parameters
+    """
+
+    names: tuple[str, ...]
+    start: Floats
+    prior: Floats
+    constant_names: tuple[str, ...]
+    base: Floats
+    matrix: Floats
+    centre: Floats | None = None
+
+    @property
+    def expected(self) -> Floats:
+        """A-priori values (n,), MHz, from which the errors `prior` count."""
+        return self.start if self.centre is None else self.centre
+
+    def constants_of(self, parameters: Floats) -> Floats:
+        """The constants (c,) in MHz."""
+        return np.asarray(self.base + self.matrix @ parameters)
+
+    def slopes_of(self, slopes: Floats) -> Floats:
+        """Derivatives by the parameters (..., n) from those by the constants (..., c)."""
+        if self._constants is None:
+            return np.asarray(slopes @ self.matrix)
+        return slopes if len(self._constants) == slopes.shape[-1] else slopes.take(self._constants, axis=-1)
+
+    @cached_property
+    def _constants(self) -> Ints | None:
+        """Which constants the parameters are; None where some are not constants, or tied to several."""
+        rows = self.matrix.argmax(axis=0) if self.matrix.size else np.zeros(0, dtype=np.int64)
+        plain = np.zeros(self.matrix.shape)
+        plain[rows, np.arange(len(rows))] = 1.0
+        rising = bool((np.diff(rows) > 0).all())  # so that all of them are in their order
+        return rows if rising and np.array_equal(self.matrix, plain) else None
+
+    def without(self, name: str) -> Parameters:
+        """The same with one parameter held at 0."""
+        i = self.names.index(name)
+        keep = [k for k in range(len(self.names)) if k != i]
+        return Parameters(
+            tuple(self.names[k] for k in keep), self.start[keep], self.prior[keep], self.constant_names, self.base,
+            self.matrix[:, keep], self.expected[keep],
+        )  # fmt: skip
+
+    def moved(self, start: Floats) -> Parameters:
+        """The same from another start; a-priori values stay where they are."""
+        start = np.asarray(start, dtype=np.float64)
+        centre = np.where(np.isfinite(self.prior), self.expected, start)
+        return replace(self, start=start, centre=centre)
+
+    def with_free(self, constants: ConstantSet, added: Sequence[str]) -> Parameters:
+        """The same with more free constants, ties and a-priori errors as they are.
+
+        constants : the set with the added ones, which start from it. Raises ValueError for one that is free or tied already.
+        """
+        names, own = tuple(constants.values), [_known(name, constants, "free") for name in added]
+        moving = {name for name, row in zip(self.constant_names, self.matrix, strict=True) if row.any()}
+        if taken := [name for name in own if name in moving]:
+            raise ValueError(f"{taken[0]} is free or tied already; leave it out, or take the tie away")
+        held = dict(zip(self.constant_names, self.base.tolist(), strict=True))
+        rows = dict(zip(self.constant_names, self.matrix, strict=True))
+        none = np.zeros(len(self.names))
+        first = np.array([rows.get(name, none) for name in names]).reshape(len(names), len(self.names))
+        return Parameters(
+            names=(*self.names, *own),
+            start=np.append(self.start, [constants[name] for name in own]),
+            prior=np.append(self.prior, np.full(len(own), np.inf)),
+            centre=np.append(self.expected, [constants[name] for name in own]),
+            constant_names=names,
+            base=np.array([0.0 if name in own else held.get(name, constants[name]) for name in names]),
+            matrix=np.column_stack([first, *(np.array([one == name for one in names], dtype=float) for name in own)]),
+        )
+
+
+def parameters(
+    constants: ConstantSet,
+    free: Sequence[str],
+    *,
+    ties: Sequence[str] = (),
+    priors_mhz: Mapping[str, float] | None = None,
+) -> Parameters:
+    """Parameters that are constants by name.
+
+    Parameters
+    ----------
+    constants : Constants or TopConstants
+        The start; those not free stay as they are. A free constant that the set does not have must be added to it first.
+    free : sequence of str
+    ties : sequence of str
+        Such as "DeltaK = 2.5*DeltaJ" (a fixed ratio) or "C = B - 300" (a fixed difference, MHz or with a unit): the constant on
+        the left follows the one on the right and is not free itself.
+    priors_mhz : mapping, optional
+        A-priori standard errors of free constants, which then are drawn to their start.
+
+    Returns
+    -------
+    Parameters
+        Start values and a-priori errors (free,) in MHz, and how the constants follow from them.
+
+    Raises
+    ------
+    ValueError
+        A name given twice, unknown, free and tied at once, or tied to what is not free; no free constant; a prior not above 0.
+
+    Examples
+    --------
+    >>> from rotor.tops.constants import Constants
+    >>> set_ = Constants(A=9.0, B=3.0, C=2.0)
+    >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).constants_of(np.array([9.5, 3.5])).tolist()
+    [9.5, 3.5, 2.5]
+    """
+    names, values = tuple(constants.values), np.array(list(constants.values.values()))
+    chosen = [_known(name, constants, "free") for name in free]
+    twice = next((name for name in chosen if chosen.count(name) > 1), None)
+    if twice:
+        raise ValueError(f"free: {twice} is named twice among the free constants; once is enough")
+    if not chosen:
+        raise ValueError("free: no constant is free; name those that are to be fitted, such as A,B,C")
+
+    base, matrix = values.copy(), np.zeros((len(names), len(chosen)))
+    for column, name in enumerate(chosen):
+        base[names.index(name)] = 0.0
+        matrix[names.index(name), column] = 1.0
+    for text in ties:
+        left, ratio, right, shift = _tie(text, constants)
+        if left in chosen or right not in chosen:
+            raise ValueError(f"tie {text!r}: {left} must not be free, and {right} must be")
+        row = names.index(left)
+        if matrix[row].any():
+            raise ValueError(f"tie {text!r}: {left} is tied already")
+        base[row] = shift
+        matrix[row, chosen.index(right)] = ratio
+    start = np.array([constants[name] for name in chosen])
+    return Parameters(tuple(chosen), start, _priors(chosen, priors_mhz or {}, constants), names, base, matrix)
+
+
+def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
+    """The set with those constants of `names` that it lacks added at 0, so that they can be fitted.
+
+    Raises ValueError for a name that the kind of top or the reduction does not have, and for a state or spin that there is not.
+
+    >>> from rotor.tops.constants import Constants
+    >>> with_names(Constants(B=6081.5), ["D"]).values["D"]
+    0.0
+    """
+    missing = [name for name in names if name not in constants]
+    return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
+
+
+def _known(name: str, constants: ConstantSet, where: str) -> str:
+    if name not in constants:
+        raise ValueError(
+            f"{where}: {name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
+        )
+    return constants.own_name(name)
+
+
+def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:
+    """Left, ratio, right, difference in MHz of `left = ratio*right + difference`."""
+    match = _TIE.match(text.replace("−", "-"))
+    if not match:
+        raise ValueError(
+            f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
+        )
+    left, right = (_known(match[i], constants, f"tie {text!r}") for i in (1, 3))
+    if left == right:
+        raise ValueError(f"tie {text!r}: {left} cannot follow itself")
+    try:
+        shift = parse_quantity(match[5], "MHz") if match[5] else 0.0
+    except ValueError as error:
+        raise ValueError(f"tie {text!r}: {error}") from None
+    return left, float(match[2] or 1.0), right, -shift if match[4] == "-" else shift
+
+
+def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: ConstantSet) -> Floats:
+    known = {_known(name, constants, "priors_mhz"): value for name, value in priors_mhz.items()}
+    lost = [name for name in known if name not in chosen]
+    if lost:
+        raise ValueError(f"priors_mhz: a-priori error of {', '.join(lost)}, which is not free")
+    for name, value in known.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; a standard error is above 0")
+    return np.array([known.get(name, np.inf) for name in chosen])

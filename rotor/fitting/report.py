@@ -1,0 +1,268 @@
+"""The report of a fit: every line with what was calculated, every parameter with its errors, and how far to trust both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fitting.assignment import Assignments
+from rotor.fitting.fit import Fit
+from rotor.fitting.publication import value_text
+
+FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
+_CORRELATED = 0.95  # correlation from which a pair is listed
+_INFLUENTIAL = 10  # lines listed that move a constant most
+_MOVED = 3  # constants listed of each
+_INFLUENCE = f"INFLUENCE: leverage, and what moves most without the line (DFBETAS), of {_INFLUENTIAL} lines"
+
+
+def report_text(
+    fit: Fit, title: str = "", *, notes: Sequence[str] = (), head: Sequence[str] = (), of_file: Sequence[str] = ()
+) -> str:
+    """The whole report, in the order of SPFIT's .fit: parameters at the start, lines, parameters at the end, statistics.
+
+    Parameters
+    ----------
+    fit : Fit
+    title : str, optional
+    notes : sequence of str, optional
+        What must be known of how the lines were read.
+    head : sequence of str, optional
+        Lines below the title, such as what was read.
+    of_file : sequence of str, optional
+        A line for each parameter of SPFIT's file, free or not.
+
+    Returns
+    -------
+    str
+    """
+    parts = [
+        [title or "fit of rotational constants", status_text(fit), *_hamiltonian(fit), *head, ""],
+        ["PARAMETERS AT THE START (MHz), A-PRIORI ERRORS", *_start(fit), ""],
+        ["LINES", *_lines(fit), ""],
+        [
+            "PARAMETERS (MHz): value(error), error from stated line errors, error from the scatter, change",
+            *_end(fit),
+            "",
+        ],
+        *([["PARAMETERS OF THE FILE: code, label, value(error)", *of_file, ""]] if of_file else []),
+        ["STATISTICS", *statistics_text(fit), ""],
+        [
+            _INFLUENCE,
+            *influence(fit),
+            "",
+        ],
+        ["SEARCH: weighted rms before and after each step, damping", *_search(fit), ""],
+        ["CORRELATIONS", *_correlations(fit), ""],
+    ]
+    said = [*notes, *fit.notes]
+    if said:
+        parts.append(["NOTES", *(f"- {text}" for text in said), ""])
+    return "\n".join(line for part in parts for line in part).rstrip() + "\n"
+
+
+def fit_facts(fit: Fit) -> dict[str, Any]:
+    """What is known of a fit as a whole, by the keys of its record."""
+    return {
+        "converged": fit.converged,
+        "reason": fit.reason,
+        "line_count": len(fit.lines),
+        "lines_used": int(fit.used.sum()),
+        "frequencies": len(fit.groups),
+        "weighted_rms": fit.weighted_rms,
+        "reduced_chi": fit.reduced_chi,
+        "rms_mhz": fit.rms_mhz(),
+        "rms_cm": fit.rms_mhz(wavenumber=True),
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "condition": fit.statistics.condition,
+        "iterations": len(fit.minimum.iterations),
+        "undetermined": [one.text for one in fit.statistics.undetermined],
+        "changed_states": list(fit.changed_states),
+        "notes": list(fit.notes),
+    }
+
+
+def status_text(fit: Fit) -> str:
+    """One line: converged or not, and why."""
+    return f"{'CONVERGED' if fit.converged else 'NOT CONVERGED'}: {fit.reason}"
+
+
+def statistics_text(fit: Fit) -> list[str]:
+    """What there is to say about the fit as a whole, a line each."""
+    rms, infrared = fit.rms_mhz(), fit.rms_mhz(wavenumber=True)
+    condition = fit.statistics.condition
+    out = [
+        f"lines {len(fit.lines)}, of which {int(fit.used.sum())} count in {len(fit.groups)} measured frequencies",
+        f"free parameters {len(fit.parameters.names)}, degrees of freedom {fit.degrees_of_freedom}",
+        f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {scatter_text(fit.reduced_chi, '.5f')}",
+        *_with_priors(fit),
+        *([f"rms of lines in MHz {rms:.6f} MHz"] if math.isfinite(rms) else []),
+        *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
+        f"condition number of the column-scaled Jacobian {condition:.3e}",
+    ]
+    out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
+    out += [f"far off, {text}" for text in far_off(fit)]
+    out += [f"influential, {text}" for text in influential(fit)]
+    return out + [f"decisive, {text}" for text in decisive(fit)]
+
+
+def scatter_text(value: float, form: str) -> str:
+    """A number that follows from the scatter of the lines; undefined with 0 degrees of freedom.
+
+    >>> scatter_text(1.25, ".3f"), scatter_text(float("nan"), ".3f")
+    ('1.250', 'undefined')
+    """
+    return "undefined" if math.isnan(value) else format(value, form)
+
+
+def _with_priors(fit: Fit) -> list[str]:
+    """The weighted rms as SPFIT counts it where there are a-priori values: with their part in χ², over the lines alone."""
+    known = int(np.isfinite(fit.parameters.prior).sum())
+    if not known:
+        return []
+    lines = len(fit.residuals) - known
+    rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))
+    return [f"{known} a-priori values; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
+
+
+def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
+    """Lines that count and are further off than so many errors, worst first."""
+    parts = np.abs(fit.residuals[: len(fit.groups)])
+    order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
+    return [
+        f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
+        for i in order[:20]
+    ]
+
+
+def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
+    """Lines without which a combination of parameters would not be determined: leverage near 1."""
+    leverages = fit.statistics.leverages[: len(fit.groups)]
+    return [
+        f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"
+        for i in np.argsort(-leverages)[:10].tolist()
+        if leverages[i] > leverage
+    ]
+
+
+def dfbetas(fit: Fit) -> Floats:
+    """By how many standard errors each parameter moves when a measured frequency is left out (frequencies, n); see `Regression`."""
+    return fit.statistics.dfbetas(fit.minimum.residuals)[: len(fit.groups)]
+
+
+def influential(fit: Fit, errors: float = 1.0) -> list[str]:
+    """Lines without which a constant would move by more than so many of its standard errors, the most influential first."""
+    moved, out = dfbetas(fit), list[str]()
+    size = np.where(np.isfinite(moved), np.abs(moved), 0.0)
+    largest = size.max(axis=1, initial=0.0)
+    for i in np.argsort(-largest, kind="stable")[:5].tolist():
+        if largest[i] > errors:
+            k, place = int(np.argmax(size[i])), int(fit.groups[i])
+            out.append(
+                f"line {fit.lines.number(place)}, {fit.lines.text(place)}: moves {fit.parameters.names[k]} by {moved[i, k]:+.1f} "
+                "standard errors (DFBETAS)"
+            )
+    return out
+
+
+def influence(fit: Fit) -> list[str]:
+    """The lines that move a constant most, with their leverages and DFBETAS, in standard errors of the scatter without them."""
+    moved = dfbetas(fit)
+    size = np.abs(moved).max(axis=1, initial=0.0)
+    leverages, lines = fit.statistics.leverages, fit.lines
+    out = []
+    for i in np.argsort(-size, kind="stable")[:_INFLUENTIAL].tolist():
+        place = int(fit.groups[i])
+        text = f"line {lines.number(place)}, {lines.text(place)}: leverage {leverages[i]:.3f}"
+        if not np.isfinite(size[i]):
+            out.append(f"{text}; without it constants are not determined")
+            continue
+        most = np.argsort(-np.abs(moved[i]), kind="stable")[:_MOVED].tolist()
+        out.append(f"{text}; " + ", ".join(f"{fit.parameters.names[k]} {moved[i, k]:+.2f}" for k in most))
+    return out
+
+
+def _hamiltonian(fit: Fit) -> list[str]:
+    """Kind of top, reduction and representation of the constants."""
+    if fit.constants is None:
+        return []
+    one = fit.constants
+    return [f"{one.kind} top" + (f", {one.reduction}-reduction, {one.representation}" if one.reduction else "")]
+
+
+def _start(fit: Fit) -> list[str]:
+    rows = zip(fit.parameters.names, fit.parameters.start.tolist(), fit.parameters.prior.tolist(), strict=True)
+    return [f"{i:5d}  {name:<16}{value:24.15E}  {prior:12.4E}" for i, (name, value, prior) in enumerate(rows, 1)]
+
+
+def _lines(fit: Fit) -> list[str]:
+    lines = fit.lines
+    texts = _texts(lines)
+    width = max(map(len, texts), default=0)
+    head = f"{'':>6} {'upper - lower':<{width}} {'observed':>16} {'calculated':>16} {'obs-calc':>12} {'error':>10}"
+    out = [f"{head} {'est.error':>10} {'/error':>8}  MHz, lines in cm-1 marked c"]
+    blended = np.bincount(lines.blend[fit.used], minlength=int(lines.blend.max(initial=0)) + 1) > 1
+    in_blend = (blended[lines.blend] & fit.used).tolist()
+    leverages = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    unit = np.where(lines.wavenumber, 29979.2458, 1.0)
+    difference, error = fit.difference_mhz, fit.line_errors_mhz
+    numbers = (lines.frequency_mhz, fit.calculated_mhz, difference, error, fit.calculated_errors_mhz)
+    columns = [(column / unit).tolist() for column in numbers]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(error > 0, difference / error, np.nan).tolist()
+    marks = np.where(lines.wavenumber, "c", " ").tolist()
+    for i, (seen, calculated, off, stated, estimated) in enumerate(zip(*columns, strict=True)):
+        ratio = f"{ratios[i]:8.2f}" if stated > 0 else f"{'-':>8}"
+        text = (
+            f"{lines.number(i):5d}: {texts[i]:<{width}} {seen:16.5f} {calculated:16.5f} {off:12.5f} {stated:10.5f} {estimated:10.5f} "
+            f"{ratio} {marks[i]}"
+        )
+        if in_blend[i]:
+            text += f" blend, mean {fit.blended_mhz[i] / unit[i]:.5f}, weight {lines.weight[i]:g}"
+        if i in fit.left_out:
+            text += f" DOES NOT COUNT: {fit.left_out[i]}"
+        elif leverages.get(i, 0.0) > 0.9:
+            text += f" leverage {leverages[i]:.2f}"
+        out.append(text.rstrip())
+    return out
+
+
+def _texts(lines: Assignments) -> list[str]:
+    """The labels of every line, as `Assignments.text` has them."""
+    sides = ([" ".join(map(str, row)) for row in side.tolist()] for side in (lines.upper, lines.lower))
+    return [" - ".join(pair) for pair in zip(*sides, strict=True)]
+
+
+def _end(fit: Fit) -> list[str]:
+    errors, scaled = fit.errors, fit.scaled_errors
+    out = []
+    for i, name in enumerate(fit.parameters.names):
+        value, error = float(fit.values[i]), float(errors[i])
+        shown = value_text(value, error) if math.isfinite(error) else f"{value!r} (not determined)"
+        change = value - float(fit.parameters.start[i])
+        out.append(
+            f"{i + 1:5d}  {name:<16}{shown:>28}  {error:12.4E}  "
+            f"{scatter_text(float(scaled[i]), '12.4E'):>12}  {change:12.4E}"
+        )
+    return out
+
+
+def _search(fit: Fit) -> list[str]:
+    return [
+        f"{one.number:5d}  {one.rms_before:14.6f} {one.rms_after:14.6f}  {one.damping:8.1e}{'' if one.taken else '  refused'}"
+        for one in fit.minimum.iterations
+    ] or ["    0  the start was the minimum"]
+
+
+def _correlations(fit: Fit) -> list[str]:
+    matrix, names = fit.statistics.correlations, fit.parameters.names
+    out = []
+    for i, row in enumerate(matrix):
+        numbers = " ".join(f"{value:9.6f}" if np.isfinite(value) else "        -" for value in row[: i + 1])
+        out.append(f"{i + 1:5d}  {names[i]:<16}{numbers}")
+    strong = np.argwhere(np.tril(np.abs(np.nan_to_num(matrix)), -1) > _CORRELATED)
+    return out + [f"strong: {names[i]} and {names[j]} {matrix[i, j]:+.5f}" for i, j in strong.tolist()]

@@ -1,0 +1,96 @@
+"""Errors of constants by resampling: fits to lines drawn anew with replacement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.quantum.labelled import LevelModel
+
+
+def bootstrap(
+    fit: Fit,
+    samples: int,
+    rng: np.random.Generator,
+    options: FitOptions | None = None,
+    *,
+    model: Callable[[Ints], LevelModel] | None = None,
+) -> tuple[Floats, Floats]:
+    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
+
+    Measured frequencies are drawn, blends as one. Samples that determine fewer constants, or whose search does not converge, are
+    drawn again, at most ten times as many.
+
+    Parameters
+    ----------
+    fit : Fit
+        A finished fit of n parameters; each sample starts from its result.
+    samples : int
+        How many samples.
+    rng : numpy.random.Generator
+        Draws the lines.
+    options : FitOptions, optional
+        Of each fit; it has as many iterations as a fit has without options, or more.
+    model : callable, optional
+        As in `fit_lines`.
+
+    Returns
+    -------
+    values : (samples, n) array
+        MHz; of fewer samples where a KeyboardInterrupt came, with two or more done.
+    deviations : (n,) array
+        Standard deviations, MHz; infinite for what the lines of the fit do not determine.
+
+    Raises
+    ------
+    ValueError
+        Where ten times as many samples are not enough: how many determine fewer constants, and how many do not converge.
+
+    Notes
+    -----
+    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
+    out too large or infinite.
+    """
+    groups = fit.lines.blend[fit.groups]
+    members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
+    at = fit.parameters.moved(fit.values)
+    asked = options or FitOptions()
+    most = max(asked.most_iterations, FitOptions().most_iterations)
+    own = replace(asked, poor_rms=1e12, most_iterations=most, pass_interrupt=True)  # no sample is judged by its rms
+    out: list[Floats] = []
+    fewer = astray = 0
+
+    def sample() -> Fit:
+        drawn = rng.choice(groups, size=len(groups)).tolist()
+        rows = np.concatenate([members[b] for b in drawn])
+        blend = np.repeat(np.arange(len(drawn)), [len(members[b]) for b in drawn])
+        widths = {i: fit.lines.widths_mhz[b] for i, b in enumerate(drawn) if b in fit.lines.widths_mhz}
+        lines = replace(fit.lines.take(rows), blend=blend, comments=(), widths_mhz=widths)
+        return fit_lines(lines, fit.constants, at, own, model=model)
+
+    try:
+        for _ in range(10 * samples):
+            one = sample()
+            if one.statistics.rank != fit.statistics.rank:
+                fewer += 1
+            elif not one.converged:
+                astray += 1
+            else:
+                out.append(one.values)
+            if len(out) == samples:
+                break
+    except KeyboardInterrupt:
+        if len(out) < 2:
+            raise
+        samples = len(out)
+    if len(out) < samples:
+        raise ValueError(
+            f"only {len(out)} of {10 * samples} samples determine all constants and converge ({fewer} determine fewer, {astray} do "
+            "not converge); too few lines for a bootstrap, or a fit far from linear"
+        )
+    found = np.array(out)
+    return found, np.where(np.isfinite(fit.errors), found.std(axis=0, ddof=1), np.inf)

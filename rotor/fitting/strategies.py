@@ -1,0 +1,299 @@
+"""The ways of a search: directly; with most of the lines first; by rising J; with other signs; without lines that are far off.
+
+A direct search finds the minimum from most starts. Where it makes no way or ends far from the lines, others are tried, and the best point
+counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.fitting.search import FitOptions, Grouping, Search, round_off, too_few
+from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
+from rotor.statistics.regression import regression
+
+_REJECTIONS = 20
+_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
+_STAGE_ITERATIONS = 4  # of each
+_FAR = 15.0  # times the median of the residuals, some ten standard deviations: lines beyond it may be those of other levels
+_ROUNDS = 8  # of searches with the lines that are not far off
+_ROUND_ITERATIONS = 12  # of each
+_NEARLY = 0.1  # standard errors within which one has converged
+_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
+_WAY = 0.01  # of the weighted rms at the start, below which it has
+_LATELY = 6  # iterations in which it must halve the weighted rms after these
+_TURNED = 5  # parameters whose other sign is tried
+_TURNED_ITERATIONS = 8  # after which it must have made way
+_BETTER = 0.99  # of the weighted rms, below which the other sign is taken
+_FURTHER, _MANY_ERRORS = (
+    0.5,
+    20.0,
+)  # of its size at the start, and standard errors: who went further may have gone to another minimum
+_PUT_BACK = 3  # parameters that are put back
+_LOWER = 1.0  # by which χ² must be lower there: a standard error of one parameter
+_AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
+
+
+def with_rejection(
+    search: Search, options: FitOptions, progress: Progress | None
+) -> tuple[Search, Minimum, dict[int, str]]:
+    """The search, repeated without the lines that are too far off until the same ones stay out.
+
+    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
+    the start describes half of the lines and more, see `_from_near_lines`.
+    """
+    minimum, may = _passed_on(_searched(search, progress), options), search.used
+    if options.reject_above is None or minimum.status == INTERRUPTED:
+        return search, minimum, {}
+    if not minimum.converged or _is_poor(search, minimum):
+        search, minimum = _from_near_lines(search, minimum, progress)
+    if not _passed_on(minimum, options).converged:
+        return search, minimum, {}
+    for _ in range(_REJECTIONS):
+        used = may & _near(search, may, minimum.parameters)
+        if (used == search.used).all():
+            break
+        if too_few(search.lines, used, search.parameters):
+            break
+        search = replace(search, used=used)
+        minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
+        if _passed_on(minimum, options).status == INTERRUPTED:
+            break
+    out = np.flatnonzero(may & ~search.used)
+    return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
+    """The same; KeyboardInterrupt for a search that was interrupted, where the caller asked for it."""
+    if minimum.status == INTERRUPTED and options.pass_interrupt:
+        raise KeyboardInterrupt
+    return minimum
+
+
+def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
+    """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
+    calculated, _, _ = search.lines_of(values)
+    group = Grouping.of(search.lines, may)
+    means = group.spread_back(group.mean(calculated), calculated)
+    off = np.abs(search.lines.frequency_mhz - means) / search.sigma
+    return np.asarray(off <= (search.options.reject_above or math.inf))
+
+
+def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) -> tuple[Search, Minimum]:
+    """The minimum of the lines that the start describes, where these are half of them and more and all together led nowhere.
+
+    SPFIT leaves lines out at the start always. Then lines that constants a little off put far away never come back, so that all
+    lines are tried first here.
+    """
+    start, limit = search.parameters.start, search.options.most_iterations
+    near = search.used & _near(search, search.used, start)
+    if 2 * near.sum() < search.used.sum() or too_few(search.lines, near, search.parameters):
+        return search, first
+    few = replace(search, used=near)
+    found = _continued(first, _minimised(few, start, progress, limit))
+    if found.status == INTERRUPTED:
+        return search, _better(first, found, replaced=False)
+    return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
+
+
+def _searched(search: Search, progress: Progress | None) -> Minimum:
+    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, two by rising
+    J, and other signs. What iterations are left then go on from the best point."""
+    limit = search.options.most_iterations
+    first = _minimised(search, search.parameters.start, progress, limit, _makes_no_way(search.options))
+    for further in (
+        _with_most_lines,
+        partial(_by_stages, rough=10.0),
+        partial(_by_stages, rough=1.0),
+        _with_a_sign_turned,
+    ):
+        if _is_open(search, first):
+            first = further(search, first, progress)
+    if _is_open(search, first) and first.status == EXHAUSTED:
+        left = limit - len(first.iterations)
+        first = _continued(first, _minimised(search, first.parameters, progress, left))
+    if first.converged and "v" in search.lines.names:
+        first = _with_one_as_at_the_start(search, first, progress)
+    return first
+
+
+def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
+    """Whether the iterations of a search so far make further ones a waste, while there are other ways."""
+
+    def hopeless(taken: Sequence[Iteration]) -> bool:
+        if len(taken) < _FIRST_ITERATIONS:
+            return False
+        now = min(one.rms_after for one in taken)
+        lately = min(one.rms_after for one in taken[:-_LATELY])
+        return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
+
+    return hopeless
+
+
+def _is_open(search: Search, found: Minimum) -> bool:
+    """Whether another way may lead further: the lines are not described, or the search has stalled, and iterations are left."""
+    if found.status == INTERRUPTED or len(found.iterations) >= search.options.most_iterations:
+        return False
+    return found.status == STALLED or _is_poor(search, found)
+
+
+def _is_poor(search: Search, found: Minimum) -> bool:
+    """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
+    limit, size = search.options.reject_above, np.abs(found.residuals[: len(search.group.first)])
+    if limit is not None and found.converged and 2 * int((size <= limit).sum()) >= len(size):
+        size = size[size <= limit]
+        return bool(np.sqrt(size @ size / max(len(size), 1)) > search.options.poor_rms)
+    return found.rms > search.options.poor_rms
+
+
+def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of a minimum that does not describe the lines and those that are reached from it with the sign of one parameter turned.
+
+    The sign of a coupling between states counts only in products with others, so that a search may end with one of them turned.
+    Tried are the few that went furthest from their start, counted in its size.
+    """
+
+    def hopeless(taken: Sequence[Iteration]) -> bool:
+        return len(taken) >= _TURNED_ITERATIONS and min(one.rms_after for one in taken) > search.options.poor_rms
+
+    start, reached = search.parameters.start, first.parameters
+    moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)
+    for place in np.argsort(-moved, kind="stable")[:_TURNED].tolist():
+        turned = reached.copy()
+        turned[place] *= -1
+        left = search.options.most_iterations - len(first.iterations)
+        try:
+            second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
+        except ValueError:  # out of the bounds of the model
+            continue
+        # where it is not much better the lines do not know the sign
+        first = _better(first, second, replaced=second.rms < _BETTER * first.rms)
+        if first.status == INTERRUPTED or first.rms <= search.options.poor_rms:
+            break
+    return first
+
+
+def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of a minimum and those that are reached from it with one parameter put back to its start.
+
+    Two couplings of the same states act together as a square, (G + F)², so that χ² has two minima along one of them, which differ
+    little. Tried are the few that went further than half their size and many standard errors.
+    """
+    start, moved = search.parameters.start, first.parameters - search.parameters.start
+    floor = round_off(search, search.lines_of(first.parameters)[2])
+    errors = regression(first.jacobian, search.parameters.names, floor).errors
+    far = (start != 0) & (np.abs(moved) > _FURTHER * np.abs(start)) & (np.abs(moved) > _MANY_ERRORS * errors)
+    order = np.argsort(np.where(far, -np.abs(moved) / np.maximum(np.abs(start), _AT_ZERO_MHZ), 0.0), kind="stable")
+    for place in order[: min(int(far.sum()), _PUT_BACK)].tolist():
+        back = first.parameters.copy()
+        back[place] = start[place]
+        left = min(search.options.most_iterations - len(first.iterations), _FIRST_ITERATIONS)
+        try:
+            second = _continued(first, _minimised(search, back, progress, max(left, 0)))
+        except ValueError:  # out of the bounds of the model
+            continue
+        lower = first.residuals @ first.residuals - second.residuals @ second.residuals
+        first = _better(first, second, replaced=second.converged and bool(lower > _LOWER))
+        if first.status == INTERRUPTED:
+            break
+    return first
+
+
+def _better(first: Minimum, second: Minimum, *, replaced: bool) -> Minimum:
+    """The second search in place of the first or not, with the iterations of both; an interrupt of the second ends all."""
+    best = second if replaced else replace(first, iterations=second.iterations)
+    return replace(best, status=INTERRUPTED) if second.status == INTERRUPTED else best
+
+
+def _continued(first: Minimum, second: Minimum) -> Minimum:
+    """The second search with the iterations of both."""
+    return replace(second, iterations=(*first.iterations, *second.iterations))
+
+
+def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of the minimum found and the one that is reached from the start when lines far off those of the rest come in last.
+
+    Where two levels share their functions nearly by halves, a small error of the constants exchanges their names. Such lines are off by
+    the distance of the levels, a hundred times as far as all others, and they alone decide where a direct search goes. With the others
+    in their places the names are right, and they come back.
+    """
+    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
+    rough = replace(search.options, tolerance=_NEARLY)
+    for number in range(_ROUNDS):
+        part = replace(search, options=rough, used=_not_far_off(search, last.parameters))
+        if (part.used == search.used).all() and not number:
+            return first  # that was the direct search
+        if (part.used == search.used).all() or too_few(search.lines, part.used, search.parameters):
+            break
+        before = part.evaluate(last.parameters)[0]
+        left = min(max(limit - len(last.iterations), 0), _ROUND_ITERATIONS)
+        last = _continued(last, _minimised(part, last.parameters, progress, left))
+        if last.status == INTERRUPTED:  # the best point of all lines is the one before
+            return _better(first, last, replaced=False)
+        if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
+            return replace(first, iterations=last.iterations)
+    left = max(limit - len(last.iterations), 0)
+    second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
+    return _better(first, second, replaced=second.rms < first.rms)
+
+
+def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
+    """The lines (lines,) that count and whose residual is not many times the median of all."""
+    group = search.group
+    size = np.abs(search.weighted(values)[0][: len(group.first)])
+    near = size <= max(_FAR * float(np.median(size)), search.options.poor_rms)
+    blends = search.lines.blend[group.first[near]]
+    return search.used & np.isin(search.lines.blend, blends)
+
+
+def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough: float) -> Minimum:
+    """The better of the minimum found and the one that a search by rising J ends in.
+
+    Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
+    lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
+    starts at 0 stays there. rough : standard errors within which a stage has converged
+    """
+    j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
+    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
+    coarse = replace(search.options, tolerance=rough)
+    try:
+        for share in _STAGES:
+            cut = np.quantile(j[search.used], share)
+            soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
+            stage = replace(
+                search, options=coarse, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
+            )
+            left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
+            last = _continued(last, _minimised(stage, last.parameters, progress, left))
+            if last.status == INTERRUPTED:  # of a part of the lines; the best point of all of them is the one before
+                return _better(first, last, replaced=False)
+        left = max(limit - len(last.iterations), 0)
+        second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
+    except ValueError:  # a stage left the bounds of the model
+        return first
+    return _better(first, second, replaced=second.rms < first.rms)
+
+
+def _minimised(
+    search: Search,
+    start: Floats,
+    progress: Progress | None,
+    limit: int,
+    hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
+) -> Minimum:
+    return minimise(
+        search.evaluate,
+        start,
+        tolerance=search.options.tolerance,
+        most_iterations=limit,
+        floor=round_off(search, search.lines_of(start)[2]),
+        progress=progress,
+        hopeless=hopeless,
+    )

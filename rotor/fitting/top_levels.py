@@ -1,0 +1,136 @@
+"""Chosen levels of a top with further states or with spins, and their derivatives by its named constants.
+
+The Hamiltonian is that of `rotor.quantum.effects.of_top`, the same that predictions have. Only the J or F are solved in which a line
+has a level: connected Wang blocks of states (`state_units`), blocks of an F (`labelled_spins`), or, where nothing connects the states
+of a symmetric top, E = Σ c ∂E/∂c, which is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.top_constants import ConstantSet, TopConstants
+from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.estimates.state_units import state_units
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
+from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
+from rotor.quantum.levels import Levels
+from rotor.quantum.quanta import value_text
+from rotor.quantum.solve import solve_levels
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
+
+
+@dataclass(frozen=True)
+class TopLevels(LevelModel):
+    """Levels in blocks that are solved for any values of the constants.
+
+    parts : places of labels among all, and the blocks in which they lie
+    """
+
+    names: tuple[str, ...]
+    count: int
+    parts: tuple[tuple[Ints, UnitBlocks | ContractedLevels], ...]
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`."""
+        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
+        for rows, blocks in self.parts:
+            energies[rows], slopes[rows] = blocks.levels(values_mhz)
+        return energies, slopes
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """1: levels are called by what they mostly are, whatever the constants are."""
+        return np.ones(self.count)
+
+
+def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
+    """The model for labels (levels, k) by `constants.quanta`, half-integers doubled.
+
+    Raises MissingLevelsError for labels that no level has, with the first of them.
+    """
+    names, form = tuple(constants.values), constants.quanta
+    if labels.shape[1] != len(form):
+        raise ValueError(f"{labels.shape[1]} quantum numbers for each state; these constants have {', '.join(form)}")
+    begin = constants.replace(**{name: AT_ZERO_MHZ for name, value in constants.values.items() if value == 0})
+    columns = {name: labels[:, i] for i, name in enumerate(form)}
+    unsigned = [i for i, name in enumerate(form) if name != "k"]
+    _refuse(constants, labels, np.asarray((labels[:, unsigned] < 0).any(axis=1)))
+    if constants.hyperfine:
+        return _of_spins(begin, columns, labels, names)
+    if "kc" in form:
+        return _of_states(begin, columns, labels, names)
+    return _in_closed_form(begin, columns, labels, names)
+
+
+def model_of(constants: ConstantSet, labels: Ints, kmax: int | None = None) -> LevelModel:
+    """The model of named constants for labels (levels, k); `kmax` cuts the basis of an asymmetric top of one state without spins."""
+    if isinstance(constants, TopConstants):
+        return top_levels(constants, labels)
+    return level_model(constants, labels, kmax=kmax)
+
+
+def _refuse(constants: TopConstants, labels: Ints, missing: NDArray[np.bool_]) -> None:
+    if missing.any():
+        places = np.flatnonzero(missing)
+        raise MissingLevelsError(
+            f"there is no level {_text(constants, labels[places[0]])} ({', '.join(constants.quanta)}) in this model",
+            places,
+        )
+
+
+def _text(constants: TopConstants, label: Ints) -> str:
+    pairs = zip(constants.quanta, label.tolist(), strict=True)
+    return " ".join(value_text(value, name in constants.halves) for name, value in pairs)
+
+
+def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+    asked = np.column_stack([columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]])
+    values = np.array(list(begin.values.values()))
+    blocks = state_units(begin.top, begin.effects, names, asked, values)
+    missing = np.ones(len(labels), dtype=bool)
+    missing[blocks.found] = False
+    _refuse(begin, labels, missing)
+    return TopLevels(names, len(labels), ((np.arange(len(labels)), blocks),))
+
+
+def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+    from rotor.quantum.estimates.labelled_spins import found_with_spins  # with all that spins need
+
+    total = begin.quanta[-1]
+    doubled = columns[total] if total in begin.halves else 2 * columns[total]
+    asked = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
+
+    def rows_of(levels: Levels, chosen: Ints) -> Ints:
+        return levels.rows_of(**{name: column[chosen] for name, column in asked.items()})
+
+    values, every = np.array(list(begin.values.values())), np.arange(len(names))
+    found = found_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
+    missing = np.ones(len(labels), dtype=bool)
+    for one in found:
+        missing[one.rows] = False
+    _refuse(begin, labels, missing)
+    whole = [(one.blocks, one.rows, every) for one in found if isinstance(one.blocks, UnitBlocks)]
+    parts: list[tuple[Ints, UnitBlocks | ContractedLevels]] = []
+    if whole:
+        rows = np.concatenate([own for _, own, _ in whole])
+        starts = np.cumsum([0, *(len(own) for _, own, _ in whole)])
+        moved = [(one[0], np.arange(a, b), every) for one, a, b in zip(whole, starts, starts[1:], strict=False)]
+        parts.append((rows, joined(moved, len(rows))))
+    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, UnitBlocks)]
+    return TopLevels(names, len(labels), tuple(parts))
+
+
+def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+    """Tops whose levels are sums of constants times numbers."""
+    asked = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
+    levels = solve_levels(begin.top, int(asked["j"].max()), effects=begin.effects)
+    rows = levels.rows_of(**asked)
+    _refuse(begin, labels, rows < 0)
+    return ClosedForm(names, level_derivatives(begin.top, levels, names, rows))

@@ -1,0 +1,64 @@
+"""Lines that a fit in named constants has not, of the kinds that were measured: for advice on what to measure next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.fitting.assignment import Assignments
+from rotor.fitting.fit import Fit
+from rotor.fitting.top_constants import TopConstants
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.spectra.lines import line_list
+from rotor.tops.top import Top
+
+_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
+_WIDER = 0.01  # of the lowest and highest frequency: how far beyond them a line may lie
+
+
+def unmeasured(fit: Fit) -> tuple[Ints, Ints]:
+    """Labels (n, k) of both states of lines of the kinds, frequencies and J that were measured, without those that are measured."""
+    measured, named = fit.lines, fit.named
+    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
+    seen_mhz = (
+        float(measured.frequency_mhz.min()) * (1 - _WIDER),
+        float(measured.frequency_mhz.max()) * (1 + _WIDER),
+    )
+    if isinstance(named, TopConstants):
+        top, effects = _bright_top(named.top, measured, _components(fit)), named.effects
+    else:
+        top, effects = Top.from_constants(named, dipole_abc_debye=_components(fit)), SEMI_RIGID
+    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz, effects=effects)
+    strong = lines.strength_debye2 > _WORTH_MEASURING
+    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
+    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
+    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
+    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
+    return upper[new], lower[new]
+
+
+def _bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, float, float]) -> Top:
+    """The top with that dipole in every state, and 1 D along each axis between states where a line was measured."""
+    states = top.states
+    if states is not None and "v" in lines.names:
+        v = lines.names.index("v")
+        pairs = {
+            (max(a, b), min(a, b)) for a, b in zip(lines.upper[:, v].tolist(), lines.lower[:, v].tolist(), strict=True)
+        }
+        between = {pair: (1.0, 1.0, 1.0) for pair in pairs if pair[0] != pair[1]}
+        states = replace(states, dipoles=between)
+    return replace(top, dipole_abc_debye=dipole_abc_debye, states=states, symmetry_checked=False)
+
+
+def _components(fit: Fit) -> tuple[float, float, float]:
+    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
+    kind = fit.named.kind
+    if kind != "asymmetric":
+        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
+    change = (fit.lines.upper[:, 1:3] - fit.lines.lower[:, 1:3]) % 2
+    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
+    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
+    a, b, c = (float(axis in found) for axis in range(3))
+    return a, b, c

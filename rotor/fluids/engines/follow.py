@@ -1,0 +1,119 @@
+"""A run by another engine, OpenMM or LAMMPS: rows and frames are read back and written as they come."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.fluids.checkpoint import TextFile, csv_line, trajectory_file
+from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities
+from rotor.fluids.engines.results import engine_frames, row_of
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.run import COLUMNS, Outputs, RunStopped, ns_per_day, progress_bar
+from rotor.fluids.settings import Settings
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+THREAD_OPTIONS = {"openmm": "threads", "lammps": "cores"}  # what a number of threads is called by each
+
+
+def follow_engine(
+    engine: str,
+    atoms: Atoms,
+    settings: Settings,
+    outputs: Outputs,
+    threads: int = 1,
+    on_start: Callable[[], None] = lambda: None,
+) -> FluidRecord:
+    """Run a box by an engine, and write rows and frames as they come.
+
+    Parameters
+    ----------
+    engine : "openmm" or "lammps"
+    atoms : ase.Atoms
+        The box; its momenta are used if there are any.
+    settings, outputs : Settings, Outputs
+        What is run and which files grow; no checkpoints.
+    threads : int
+        Threads of OpenMM's CPU platform, MPI processes of LAMMPS.
+    on_start : callable
+        Called when the engine has given its first frame, before any file is opened.
+
+    Returns
+    -------
+    FluidRecord
+        One row every `settings.every` steps.
+
+    Raises
+    ------
+    ValueError
+        For what the engine cannot run, and where it is not installed or does not load.
+    RunStopped
+        Where it stops before the end.
+    """
+    frames_every = outputs.frames_every or settings.every
+    if outputs.trajectories and frames_every % settings.every:
+        raise ValueError(
+            f"frames_every {frames_every}: with {engine} expected a multiple of the {settings.every} steps between rows"
+        )
+    engine_input = engine_input_of(atoms, settings)
+    try:
+        options: dict[str, Any] = {THREAD_OPTIONS[engine]: threads, "accuracy": settings.ewald_tolerance}
+        frames = engine_frames(engine, engine_input, settings, **options)
+        return _follow(frames, engine_input, atoms, settings, outputs, on_start)
+    except ModuleNotFoundError as error:
+        raise ValueError(str(error)) from error
+    except RuntimeError as error:
+        raise RunStopped(str(error)) from error
+
+
+def _follow(
+    frames: Iterator[Frame],
+    engine_input: EngineInput,
+    atoms: Atoms,
+    settings: Settings,
+    outputs: Outputs,
+    on_start: Callable[[], None],
+) -> FluidRecord:
+    """Write every frame that comes, and make the table; files are opened when the engine has given its first frame."""
+    first = next(frames)
+    rows, started = [], time.perf_counter()
+    with ExitStack() as stack, progress_bar(settings.steps, None) as shown:
+        on_start()
+        csv, trajectories = _opened(stack, outputs)
+        for frame in itertools.chain([first], frames):
+            rows.append(row_of(frame, engine_input, settings))
+            if csv is not None:
+                csv.add(csv_line(rows[-1]))
+            if trajectories and frame.step % (outputs.frames_every or settings.every) == 0:
+                placed = _placed(frame, engine_input, atoms)
+                for file in trajectories:
+                    file.add(placed, rows[-1][0])
+            shown(frame.step, settings.steps, ns_per_day(settings, frame.step, time.perf_counter() - started))
+    return FluidRecord(*np.array(rows).T)
+
+
+def _opened(stack: ExitStack, outputs: Outputs) -> tuple[Any, list[Any]]:
+    """The growing files, closed with the stack."""
+    trajectories = [stack.enter_context(closing(trajectory_file(path))) for path in outputs.trajectories]
+    if outputs.csv is None:
+        return None, trajectories
+    csv = stack.enter_context(closing(TextFile(outputs.csv)))
+    csv.add(",".join(COLUMNS) + "\n")
+    return csv, trajectories
+
+
+def _placed(frame: Frame, engine_input: EngineInput, atoms: Atoms) -> Atoms:
+    """The box at a frame, with the velocities of its rigid motion."""
+    masses, owners = engine_input.site_masses[engine_input.real], engine_input.molecule_of_site[engine_input.real]
+    placed: Atoms = atoms.copy()
+    placed.set_masses(masses)
+    placed.positions = frame.positions
+    placed.set_velocities(point_velocities(frame.motion, owners, masses, frame.positions))
+    return placed

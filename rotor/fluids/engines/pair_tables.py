@@ -1,0 +1,87 @@
+"""The pair potential in the form of an engine: numbers for closed forms, or a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fluids.engines.engine_input import EngineInput
+from rotor.fluids.forces.ewald import COULOMB_EV_ANGSTROM
+from rotor.fluids.forces.interactions import mixed, reaction_field, screened, switched, tail
+from rotor.fluids.forces.models import Site
+from rotor.fluids.settings import Settings
+
+
+@dataclass(frozen=True)
+class Form:
+    """What of the potential is no part of `Settings`; the values are those of our calculator.
+
+    switch_angstrom: over how much before the cutoff Lennard-Jones is switched off, 0 for a hard cut. dielectric: around the
+    sphere of the reaction field, infinite for a conductor. alpha_per_angstrom: damping of shifted charges.
+    """
+
+    switch_angstrom: float = 1.0
+    dielectric: float = float("inf")
+    alpha_per_angstrom: float = 0.2
+
+
+def pair_energy(
+    r: Floats, sites: tuple[Site, Site], settings: Settings, form: Form, charges: bool = True
+) -> tuple[Floats, Floats]:
+    """Energy and force of two sites at distances up to the cutoff.
+
+    Parameters
+    ----------
+    r : (n,) array
+        Distances, Å.
+    sites : (Site, Site)
+        The two sites.
+    settings : Settings
+        Cutoff and electrostatics.
+    form : Form
+        Of the charges under a cutoff.
+    charges : bool
+        False leaves the second term to a sum over the lattice.
+
+    Returns
+    -------
+    (n,) array, (n,) array
+        S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) in eV, with the switch S and the form f of charges under a cutoff as in
+        `rotor.fluids.forces.interactions`, and minus its slope in eV/Å.
+    """
+    one, other = sites
+    sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
+    sixth = (sigma / r) ** 6
+    _, begin, slope = switched(settings.cutoff_angstrom, form.switch_angstrom)
+    t = np.clip((r - begin) * slope, 0.0, 1.0)
+    switch, fall = 1 - t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2 * slope
+    bare = 4 * epsilon * (sixth**2 - sixth)
+    energy, force = switch * bare, switch * 24 * epsilon * (2 * sixth**2 - sixth) / r + fall * bare
+    if not charges:
+        return energy, force
+    f, g = _charges(r, settings, form)
+    qq = COULOMB_EV_ANGSTROM * one.charge_e * other.charge_e
+    return energy + qq * f, force + qq * g
+
+
+def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]:
+    """f(r) and -f'(r) of unit charges under a cutoff."""
+    from scipy.special import erfc
+
+    if settings.electrostatics == "reaction-field":
+        _, k, c = reaction_field(settings.cutoff_angstrom, form.dielectric)
+        return 1 / r + k * r**2 - c, 1 / r**2 - 2 * k * r
+    _, b, c, alpha, slope, cutoff = screened(settings.cutoff_angstrom, form.alpha_per_angstrom, True)
+    damped = erfc(alpha * r) / r
+    return damped - c + b * (r - cutoff), damped / r + slope * np.exp(-((alpha * r) ** 2)) / r - b
+
+
+def tail_of(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
+    """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, the fluid taken as even there."""
+    counts = np.bincount(engine_input.kinds, minlength=len(engine_input.species))
+    models = tuple(one.model for one in engine_input.species)
+    energy, pressure = tail(models, counts, settings.cutoff_angstrom, form.switch_angstrom)
+    volume = float(np.prod(engine_input.edges))
+    return energy / volume, pressure / volume**2

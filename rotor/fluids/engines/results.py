@@ -1,0 +1,135 @@
+"""Frames of an engine read back: into the table that every run fills, and into a path for the analysis."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of
+from rotor.fluids.motion.thermometers import THERMOMETERS, temperatures
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.settings import Settings
+
+ENGINES = ("openmm", "lammps")
+
+
+@dataclass(frozen=True)
+class EngineRun:
+    """What an engine has made of a box: the table, and the real atoms' places (frames, atoms, 3), molecules whole."""
+
+    engine_input: EngineInput
+    record: FluidRecord
+    positions_angstrom: Floats
+
+
+def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
+    """Run a box by the engine of that name and read it back.
+
+    Parameters
+    ----------
+    name : str
+        "openmm" or "lammps".
+    atoms : ase.Atoms
+        The box.
+    settings : Settings
+        What is run.
+    options : object
+        Of the engine, see `rotor.fluids.engines.openmm.frames` and `rotor.fluids.engines.lammps.frames`.
+
+    Returns
+    -------
+    EngineRun
+        Input, table and positions in Å.
+
+    Raises
+    ------
+    ValueError
+        For what the engine cannot represent.
+    ModuleNotFoundError
+        Where it is not installed.
+    OSError
+        Where it does not load.
+    RuntimeError
+        Where it stops on its way.
+    """
+    engine_input = engine_input_of(atoms, settings)
+    seen = list(engine_frames(name, engine_input, settings, **options))
+    return EngineRun(
+        engine_input, record_of(seen, engine_input, settings), np.stack([frame.positions for frame in seen])
+    )
+
+
+def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Iterator[Frame]:
+    """The frames of an engine by its name, each checked to be finite.
+
+    Parameters
+    ----------
+    name : str
+        "openmm" or "lammps".
+    engine_input : EngineInput
+        The box as engines take it.
+    settings : Settings
+        What is run.
+    options : object
+        Of the engine.
+
+    Returns
+    -------
+    iterator of Frame
+        At step 0 and after every `settings.every` steps.
+
+    Raises
+    ------
+    ValueError
+        For an unknown engine.
+    RuntimeError
+        For energies or positions that are not finite.
+    """
+    if name not in ENGINES:
+        raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
+    engine = importlib.import_module(f"rotor.fluids.engines.{name}")
+    for frame in engine.frames(engine_input, settings, **options):
+        if not (np.isfinite(frame.potential_ev) and np.isfinite(frame.positions).all()):
+            raise RuntimeError(
+                f"{name}: energy or positions are not finite at step {frame.step}: molecules on top of each other, or a "
+                "step too long"
+            )
+        yield frame
+
+
+def record_of(frames: Iterable[Frame], engine_input: EngineInput, settings: Settings) -> FluidRecord:
+    """The table of frames."""
+    rows = np.array([row_of(frame, engine_input, settings) for frame in frames], dtype=np.float64)
+    return FluidRecord(*rows.reshape(-1, len(fields(FluidRecord))).T)
+
+
+def row_of(frame: Frame, engine_input: EngineInput, settings: Settings) -> list[float]:
+    """A row of the table.
+
+    Energies of motion are those of the thermometer without an error of order h² (`rotor.fluids.motion.thermometers`): mixed from
+    momenta on the step, as they are from momenta between steps, where a thermostat acts. The total has the energy on the
+    step.
+    """
+    stored = frame.motion.kinetic()
+    kinetic = stored
+    if not frame.half:
+        h = settings.step_fs / 1000 / units.ASE_TIME_PS
+        kinetic = stored + frame.motion.correction(h).times(THERMOMETERS["mixed"])
+    heat = temperatures(kinetic, engine_input.degrees)
+    return [
+        frame.step * settings.step_fs / 1000,
+        frame.potential_ev,
+        kinetic.translation_ev,
+        kinetic.rotation_ev,
+        frame.potential_ev + stored.total_ev + frame.thermostat_ev,
+        heat.all_k,
+        heat.translation_k,
+        heat.rotation_k,
+        frame.pressure_bar,
+    ]

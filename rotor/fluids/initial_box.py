@@ -1,0 +1,203 @@
+"""How a box starts: its molecules on a lattice, their overlaps relaxed, velocities drawn from the canonical ensemble."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.fluids.forces.models import RigidModel
+from rotor.fluids.motion.bodies import Bodies
+from rotor.geometry import rotations
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+TOO_NEAR_ANGSTROM = 0.5  # no two atoms of different molecules are ever that near
+RELAXING_STEPS = 300
+RELAXING_FS = 1.0
+RELAXING_K = 300.0  # of the speeds that relaxing molecules may reach
+
+
+def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np.random.Generator) -> Atoms:
+    """A cubic periodic box of molecules on a simple cubic lattice, turned at random.
+
+    Parameters
+    ----------
+    model : RigidModel
+        Of the molecules.
+    molecules : int
+        How many; the smallest lattice with enough sites is used, some left empty at random.
+    density_g_cm3 : float
+        Gives the edge, with the masses of the most abundant isotopes.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    ase.Atoms
+        Labelled in arrays["molecule"]. Neighbours may stand too close: `relax` the box before anything is measured.
+
+    Examples
+    --------
+    >>> from rotor.fluids.forces.models import model_of
+    >>> box = lattice_box(model_of("spce"), 216, 0.997, np.random.default_rng(1))
+    >>> len(box), round(float(box.cell[0, 0]), 3)
+    (648, 18.643)
+    """
+    from ase import Atoms
+
+    from rotor.fluids.motion.bodies import atom_masses
+
+    if molecules < 1:
+        raise ValueError(f"{molecules} molecules: expected at least 1")
+    if not (math.isfinite(density_g_cm3) and density_g_cm3 > 0.0):
+        raise ValueError(f"a density of {density_g_cm3} g/cm³: expected a number above 0")
+    single = Atoms("".join(model.symbols), model.positions_angstrom[: len(model.symbols)])
+    masses = atom_masses(single)
+    volume = molecules * masses.sum() * units.ATOMIC_MASS_KG / (density_g_cm3 * 1e-27)  # 1 g/cm³ = 1e-27 kg/Å³
+    edge = volume ** (1.0 / 3.0)
+    across = math.ceil(round(molecules ** (1.0 / 3.0), 9))
+    sites = np.array(list(np.ndindex(across, across, across)))
+    chosen = np.sort(rng.choice(len(sites), molecules, replace=False))
+    centred = single.positions - masses @ single.positions / masses.sum()
+    turned = rotations.rotate(rotations.uniform(molecules, rng=rng)[:, None, :], centred)
+    places = (sites[chosen, None, :] + 0.5) * (edge / across) + turned
+    box = Atoms(single.get_chemical_symbols() * molecules, places.reshape(-1, 3), cell=[edge] * 3, pbc=True)
+    box.arrays["molecule"] = np.repeat(np.arange(molecules), len(single))
+    return box
+
+
+def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64]:
+    """A label of the molecule for each atom of a box whose molecules stand one after another, as the models have them.
+
+    At each place the longest model that fits is taken; ValueError where none does.
+
+    >>> from ase import Atoms
+    >>> from rotor.fluids.forces.models import model_of
+    >>> model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [model_of("spce")]).tolist()
+    [0, 0, 0, 1, 1, 1]
+    """
+    symbols = tuple(atoms.get_chemical_symbols())
+    ordered = sorted((model.symbols for model in models), key=len, reverse=True)
+    labels, at, number = np.zeros(len(symbols), dtype=np.int64), 0, 0
+    while at < len(symbols):
+        fits = next((elements for elements in ordered if symbols[at : at + len(elements)] == elements), None)
+        if fits is None:
+            expected = " or ".join(" ".join(elements) for elements in ordered)
+            raise ValueError(
+                f"atom {at} ({symbols[at]}) begins no molecule of the models given: expected {expected}, in this order"
+            )
+        labels[at : at + len(fits)] = number
+        at, number = at + len(fits), number + 1
+    return labels
+
+
+def check_apart(atoms: Atoms, bodies: Bodies) -> None:
+    """ValueError where atoms of two molecules lie on top of each other, with both named."""
+    from ase.neighborlist import neighbor_list
+
+    first, second, distances = neighbor_list("ijd", atoms, TOO_NEAR_ANGSTROM)
+    body = np.empty(len(atoms), dtype=np.int64)
+    body[bodies.order] = np.repeat(np.arange(len(bodies)), np.diff(bodies.starts))
+    between = np.flatnonzero(body[first] != body[second])
+    if len(between):
+        pair = between[np.argmin(distances[between])]
+        one, other = (bodies.name_of(int(body[k])) for k in (first[pair], second[pair]))
+        raise ValueError(
+            f"{one} and {other} are on top of each other: two of their atoms are {distances[pair]:.3g} Å apart"
+        )
+
+
+def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
+    """Let molecules slide off each other, in place: a quench, in which a molecule that moves against its force is stopped.
+
+    Steps of 1 fs; speeds are held below those of 300 K. It finds no minimum of energy, only places from which a motion can
+    start. The atoms keep no momenta. how: as of `RigidDynamics`.
+    """
+    from ase.units import fs
+
+    from rotor.fluids.motion.dynamics import RigidDynamics
+
+    atoms.set_momenta(np.zeros((len(atoms), 3)))
+    dynamics = RigidDynamics(atoms, RELAXING_FS * fs, **{**how, "removed": 0})
+    bodies, state = dynamics.bodies, dynamics.state
+    kt = RELAXING_K * units.EV_PER_K
+    fastest, widest = np.sqrt(bodies.mass * kt)[:, None], np.sqrt(bodies.moments * kt)
+    for _ in range(steps):
+        dynamics.step()
+        dynamics.nsteps += 1
+        force, torque = dynamics.wrench()
+        against = np.sum(force * state.momentum, axis=1) < 0.0
+        state.momentum[against] = 0.0
+        back = np.sum(torque * state.angular * bodies.inverse_moments, axis=1) < 0.0
+        state.spin[back, :3] = 0.0
+        state.carry[back, :3] = 0.0
+        np.clip(state.momentum, -fastest, fastest, out=state.momentum)
+        state.spin[:, :3] = np.clip(state.angular, -widest, widest)
+        dynamics.write_momenta()
+    atoms.set_momenta(np.zeros((len(atoms), 3)))
+
+
+def thermal_momenta(
+    bodies: Bodies, temperature_k: float, rng: np.random.Generator, removed: int = 0
+) -> tuple[Floats, Floats]:
+    """Momenta of rigid molecules drawn from the canonical ensemble, in ASE's units.
+
+    Parameters
+    ----------
+    bodies : Bodies
+        The molecules.
+    temperature_k : float
+        Temperature.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    removed : int
+        3 takes the total momentum out, each body giving the share of its mass; what remains is the canonical ensemble of 3
+        degrees fewer, not rescaled.
+
+    Returns
+    -------
+    (n, 3) array, (n, 3) array
+        p in space and L in body axes, normal with variances m kT and I_i kT (`rotor.classical.gas.ensembles`).
+    """
+    from rotor.classical.gas import ensembles
+
+    kt = temperature_k * units.EV_PER_K
+    momentum = rng.standard_normal((len(bodies), 3)) * np.sqrt(bodies.mass * kt)[:, None]
+    angular = np.zeros((len(bodies), 3))
+    for species in range(len(bodies.names)):
+        members = np.flatnonzero(bodies.species == species)
+        angular[members] = ensembles.thermal_momenta(bodies.moments[members[0]], kt, len(members), rng=rng)
+    return (at_rest(bodies, momentum) if removed else momentum), angular
+
+
+def at_rest(bodies: Bodies, momentum: Floats) -> Floats:
+    """Momenta (n, 3) without the total: every body gives the share of its mass."""
+    return np.asarray(momentum - np.outer(bodies.mass / bodies.mass.sum(), momentum.sum(axis=0)))
+
+
+def heat(atoms: Atoms, bodies: Bodies, attitude: Floats, temperature_k: float, rng: np.random.Generator) -> None:
+    """Give the atoms thermal momenta of rigid molecules, the total momentum removed, in place.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        Whose momenta are set.
+    bodies : Bodies
+        Its molecules.
+    attitude : (n, 4) array
+        Of the bodies.
+    temperature_k : float
+        Temperature.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    """
+    momentum, angular = thermal_momenta(bodies, temperature_k, rng, removed=3)
+    atoms.set_masses(bodies.masses)
+    atoms.set_momenta(bodies.momenta(momentum, angular, attitude))

@@ -1,0 +1,210 @@
+"""A request for a run of a fluid, and what answers it: a box that is read or made, an engine, and the table of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.checks import require_one_of, require_positive, require_whole
+from rotor.fluids.engines.results import ENGINES
+from rotor.fluids.forces.models import model_of, models_of, shapes_of
+from rotor.fluids.initial_box import RELAXING_STEPS, lattice_box, relax
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, run_fluid
+from rotor.fluids.settings import Settings
+from rotor.fluids.summary import conserved, means
+from rotor.table import TextOf
+from rotor.units import ATOMIC_MASS_KG
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+    from rotor.fluids.motion.bodies import Bodies
+    from rotor.statistics.degrees_of_freedom import Degrees
+
+WATER_G_CM3 = 0.997
+DEFAULT = Settings()
+
+
+@dataclass(frozen=True)
+class NewBox:
+    """A box to make: so many molecules of one model on a lattice at a density, turned at random and relaxed."""
+
+    molecules: int
+    density_g_cm3: float = WATER_G_CM3
+
+    def __post_init__(self) -> None:
+        require_whole("molecules", self.molecules, 1)
+        require_positive("density_g_cm3", self.density_g_cm3, "g/cm³")
+
+
+@dataclass(frozen=True, eq=False)
+class FluidRequest:
+    """A run of rigid molecules in a box; every field is checked when the request is made.
+
+    settings: model, ensemble and length of the run. box: an ase.Atoms with its cell, or a `NewBox` to make. engine: rotor,
+    openmm or lammps. threads: of the built-in potential or of the engine. box_source: where a box that was read is from.
+    """
+
+    box: Atoms | NewBox
+    settings: Settings = DEFAULT
+    engine: str = "rotor"
+    threads: int = 1
+    box_source: str = "given"
+
+    def __post_init__(self) -> None:
+        require_whole("threads", self.threads, 1)
+        require_one_of("engine", self.engine, ("rotor", *ENGINES))
+        models = models_of(self.settings.model)
+        if isinstance(self.box, NewBox) and len(models) > 1:
+            raise ValueError(f"model {self.settings.model!r}: a box is made of one model; give a box of the mixture")
+
+    @property
+    def start(self) -> str:
+        """Where the box is from, in words."""
+        if not isinstance(self.box, NewBox):
+            return self.box_source
+        return (
+            f"{self.box.molecules} molecules on a lattice at {self.box.density_g_cm3:g} g/cm³, turned at random, "
+            f"{RELAXING_STEPS} quenched steps of 1 fs"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FluidAnswer(TextOf):
+    """A run: the table, the atoms where it ended, and how it started."""
+
+    shown = "record"
+
+    request: FluidRequest
+    record: FluidRecord
+    atoms: Atoms
+    start: str
+
+    @cached_property
+    def _count(self) -> tuple[Bodies, Degrees, str]:
+        return bodies_and_degrees(self.atoms, self.request.settings)
+
+    @property
+    def thermometer(self) -> str:
+        """By which momenta a temperature is measured."""
+        return "mixed" if self.request.engine == "lammps" else self._count[2]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the count of degrees of freedom depends on."""
+        return tuple(self._count[1].notes)
+
+    @property
+    def density_g_cm3(self) -> float | None:
+        """Mass over volume; None where the cell does not repeat."""
+        bodies, atoms = self._count[0], self.atoms
+        if not atoms.pbc.all():
+            return None
+        return float(bodies.mass.sum()) * ATOMIC_MASS_KG * 1e27 / float(atoms.get_volume())
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        bodies, degrees, _ = self._count
+        rms, drift = conserved(self.record)
+        return {
+            "engine": self.request.engine,
+            "settings": asdict(self.request.settings),
+            "start": self.start,
+            "box_angstrom": self.atoms.cell.lengths() if self.atoms.pbc.all() else None,
+            "density_g_cm3": self.density_g_cm3,
+            "molecules": _species(bodies),
+            "degrees": {name: getattr(degrees, name) for name in ("translation", "rotation", "removed", "total")},
+            "thermometer": self.thermometer,
+            "means": [asdict(mean) for mean in means(self.record, len(bodies))],
+            "conserved_rms_ev": rms,
+            "conserved_drift_ev_per_ns": drift,
+            "notes": list(self.notes),
+        }
+
+
+def answer_fluid(
+    request: FluidRequest,
+    outputs: Outputs | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+    on_start: Callable[[], None] = lambda: None,
+) -> FluidAnswer:
+    """The run of a request.
+
+    Parameters
+    ----------
+    request : FluidRequest
+    outputs : Outputs, optional
+        Files that grow during the run.
+    resume : bool
+        Continue from `outputs.checkpoint`; of our own engine alone.
+    progress : callable, optional
+        Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    on_start : callable
+        Called once everything is found to be in order.
+
+    Returns
+    -------
+    FluidAnswer
+
+    Raises
+    ------
+    ValueError
+        A box, outputs or an engine that do not fit, see `rotor.fluids.run.run_fluid`.
+    RunStopped
+        A ValueError too: a run that stopped on its way.
+    """
+    outputs = outputs or Outputs()
+    own = request.engine == "rotor"
+    if not own and (outputs.checkpoint or resume):
+        raise ValueError(f"engine {request.engine}: checkpoints are written by the engine rotor alone")
+    atoms = box_of(request, relaxed=not resume)
+    settings = request.settings
+    speeds = "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
+    start = f"resumed from {outputs.checkpoint}" if resume else f"{request.start}; velocities {speeds}"
+    if own:
+        if atoms.calc is None:
+            atoms.calc = calculator_of(settings, request.threads)
+        record = run_fluid(atoms, settings, outputs, resume=resume, progress=progress, on_start=on_start)
+    else:
+        from rotor.fluids.engines.follow import follow_engine
+
+        record = follow_engine(request.engine, atoms, settings, outputs, request.threads, on_start)
+    return FluidAnswer(request, record, atoms, start)
+
+
+def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:
+    """The box of a request, made where it is a `NewBox`. relaxed: False leaves out the quench, as a resumed run does."""
+    if not isinstance(request.box, NewBox):
+        return request.box
+    model, settings = model_of(request.settings.model), request.settings
+    rng = np.random.default_rng(settings.seed)
+    atoms = lattice_box(model, request.box.molecules, request.box.density_g_cm3, rng)
+    atoms.calc = calculator_of(settings, request.threads)
+    if relaxed:
+        relax(atoms, shapes=shapes_of([model]))
+    return atoms
+
+
+def _species(bodies: Bodies) -> list[dict[str, Any]]:
+    """One record for each species."""
+    records = []
+    for number, name in enumerate(bodies.names):
+        members = (bodies.species == number).nonzero()[0]
+        moments = bodies.moments[members[0]]
+        records.append(
+            {
+                "name": name,
+                "count": len(members),
+                "mass_u": float(bodies.mass[members[0]]),
+                "moments_u_angstrom2": moments.tolist(),
+                "rotational_degrees": int((moments > 0.0).sum()),
+            }
+        )
+    return records

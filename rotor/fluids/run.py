@@ -1,0 +1,387 @@
+"""Long runs of a fluid: rows and frames as they come, checkpoints, and exact restarts.
+
+After each checkpoint the calculator discards its state (lists of neighbours, the last result), as after a
+restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
+uninterrupted one does, on one machine with the same settings and the same interval of checkpoints.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.fluids.checkpoint import (
+    AseTrajectory,
+    Checkpoint,
+    ExtendedXyz,
+    TextFile,
+    csv_line,
+    read_checkpoint,
+    read_rows,
+    trajectory_file,
+)
+from rotor.fluids.forces.models import models_of, shapes_of
+from rotor.fluids.initial_box import at_rest, check_apart, heat, model_labels
+from rotor.fluids.motion.state import State
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.settings import Settings
+from rotor.units import EV_PER_ANGSTROM3_BAR
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+    from rotor.fluids.motion.bodies import Bodies
+    from rotor.fluids.motion.dynamics import RigidDynamics
+    from rotor.fluids.motion.thermostats import Thermostat
+    from rotor.statistics.degrees_of_freedom import Degrees
+
+COLUMNS = tuple(field.name for field in fields(FluidRecord))
+MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
+BAR_EVERY_S = 0.2
+
+Progress = Callable[[int, int, float], None]
+
+
+class RunStopped(ValueError):
+    """A run that began could not continue; what was written before stays."""
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files of a run; what is None or empty is not written.
+
+    csv: rows of the table as they come. trajectories: frames, .traj, .xyz or .extxyz. frames_every: steps between frames, by
+    default those between rows. checkpoint: file to resume from. checkpoint_every: steps between checkpoints.
+    """
+
+    csv: str | os.PathLike[str] | None = None
+    trajectories: Sequence[str | os.PathLike[str]] = ()
+    frames_every: int | None = None
+    checkpoint: str | os.PathLike[str] | None = None
+    checkpoint_every: int = 1000
+
+    def __post_init__(self) -> None:
+        for name in ("frames_every", "checkpoint_every"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ValueError(f"{name} = {value}: expected at least 1")
+
+
+def run_fluid(
+    atoms: Atoms,
+    settings: Settings,
+    outputs: Outputs | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+    on_start: Callable[[], None] = lambda: None,
+) -> FluidRecord:
+    """Run a box of rigid molecules and return its table; the atoms end where the run does.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        Molecules one after another, atoms in the order of their models; its own calculator, if it has one, takes the place
+        of the model's potential. Momenta are used if there are any (without their total, where that is conserved), else
+        drawn at `settings.temperature_k`.
+    settings : Settings
+        Model, ensemble, temperature and steps.
+    outputs : Outputs, optional
+        Files that grow, and checkpoints; none by default.
+    resume : bool
+        Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
+    progress : callable, optional
+        Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    on_start : callable, optional
+        Called once everything is found to be in order and the files are open.
+
+    Returns
+    -------
+    FluidRecord
+        One row every `settings.every` steps.
+
+    Raises
+    ------
+    ValueError
+        Molecules that do not fit their model or lie on top of each other; a checkpoint of another box or other settings.
+    RunStopped
+        A ValueError too: a force that is not finite, a full disk; with the step and the last checkpoint.
+    """
+    outputs = outputs or Outputs()
+    if resume and outputs.checkpoint is None:
+        raise ValueError("to resume a run, name the checkpoint that it wrote")
+    if not resume and outputs.checkpoint is not None and os.path.exists(outputs.checkpoint):
+        raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to begin anew")
+    dynamics = dynamics_of(atoms, settings, begin=not resume)
+    run = _Run(dynamics, settings, outputs)
+    if resume:
+        assert outputs.checkpoint is not None
+        run.restore_from(outputs.checkpoint)
+    dynamics.wrench()  # a state that cannot begin is refused before any file is opened
+    with run.files(), progress_bar(settings.steps, progress) as shown:
+        on_start()
+        run.go(shown)
+    return run.record()
+
+
+def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDynamics:
+    """The dynamics of settings, with model, thermostat and, if the box is to begin, thermal momenta."""
+    from ase.units import fs
+
+    from rotor.fluids.motion.bodies import bodies_of
+    from rotor.fluids.motion.dynamics import RigidDynamics
+
+    models = models_of(settings.model)
+    if "molecule" not in atoms.arrays:
+        atoms.arrays["molecule"] = model_labels(atoms, models)
+    shapes = shapes_of(models)
+    bodies, pose = bodies_of(atoms, shapes=shapes)
+    if atoms.calc is None:
+        atoms.calc = calculator_of(settings)
+    velocities, noise = np.random.default_rng(settings.seed).spawn(2)
+    thermostat = thermostat_of(settings, noise)
+    if begin:
+        check_apart(atoms, bodies)
+        if not atoms.get_momenta().any():
+            heat(atoms, bodies, pose.attitude, settings.temperature_k, velocities)
+        elif thermostat is None or thermostat.conserves_momentum:
+            momentum, angular = bodies.wrench(atoms.get_momenta(), pose.attitude)
+            atoms.set_momenta(bodies.momenta(at_rest(bodies, momentum), angular, pose.attitude))
+    else:
+        atoms.set_momenta(np.zeros((len(atoms), 3)))
+    return RigidDynamics(atoms, settings.step_fs * fs, thermostat=thermostat, shapes=shapes)
+
+
+def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degrees, str]:
+    """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
+    from rotor.fluids.motion.bodies import bodies_of
+
+    bodies, _ = bodies_of(atoms, shapes=shapes_of(models_of(settings.model)))
+    removed = 0 if settings.ensemble == "langevin" else 3
+    return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
+
+
+def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
+    """The thermostat of an ensemble; None for nve."""
+    from ase.units import fs
+
+    from rotor.fluids.motion.thermostats import Langevin, NoseHoover
+
+    if settings.ensemble == "langevin":
+        return Langevin(settings.temperature_k, settings.friction_per_ps / (1000.0 * fs), rng)
+    if settings.ensemble == "nose-hoover":
+        return NoseHoover(settings.temperature_k, settings.relaxation_fs * fs)
+    return None
+
+
+def calculator_of(settings: Settings, threads: int = 1) -> Any:
+    """The built-in potential of settings, as an ASE calculator."""
+    from rotor.fluids.forces.potential import RigidPotential
+
+    return RigidPotential(
+        settings.model,
+        cutoff_angstrom=settings.cutoff_angstrom,
+        electrostatics=settings.electrostatics,
+        tolerance=settings.ewald_tolerance,
+        threads=threads,
+    )
+
+
+def pressure_bar(dynamics: RigidDynamics) -> float:
+    """Pressure from centres of mass, (2 K_trans + Σ R·F)/3V; not a number where the calculator gives no stress.
+
+    The built-in potential's stress is that of molecules already. From others' Σ r·f over atoms is taken off what forces do
+    along the sites of each molecule, Σ s·f, since the forces that hold it rigid undo that (M. P. Allen and D. J. Tildesley,
+    Computer Simulation of Liquids, section 2.4).
+    """
+    from rotor.fluids.forces.potential import RigidPotential
+
+    atoms, bodies = dynamics.atoms, dynamics.bodies
+    if "stress" not in getattr(atoms.calc, "implemented_properties", ()) or not atoms.pbc.all():
+        return float("nan")
+    virial = -float(np.trace(atoms.get_stress(voigt=False, apply_constraint=False))) * float(atoms.get_volume())
+    if not isinstance(atoms.calc, RigidPotential):
+        centres = np.empty((len(atoms), 3))
+        centres[bodies.order] = np.repeat(dynamics.state.centres, np.diff(bodies.starts), axis=0)
+        virial -= float(np.sum((atoms.positions - centres) * atoms.get_forces(apply_constraint=False)))
+    kinetic = 2.0 * dynamics.kinetic().translation_ev
+    return EV_PER_ANGSTROM3_BAR * (virial + kinetic) / (3.0 * float(atoms.get_volume()))
+
+
+class _Run:
+    """A run under way: its rows, its files, where its last checkpoint is."""
+
+    def __init__(self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs) -> None:
+        self.dynamics, self.settings, self.outputs = dynamics, settings, outputs
+        self.rows: list[list[float]] = []
+        self._csv: TextFile | None = None
+        self._frames: list[ExtendedXyz | AseTrajectory] = []
+        self._lengths: dict[str, int] = {}
+        self._saved_at: int | None = None
+
+    @contextmanager
+    def files(self) -> Iterator[None]:
+        """Open the growing files, new or where the checkpoint left them."""
+        outputs, lengths = self.outputs, self._lengths
+        with ExitStack() as open_files:
+            for path in outputs.trajectories:
+                file = trajectory_file(path, lengths.get(str(path)))
+                self._frames.append(open_files.enter_context(closing(file)))
+            if outputs.csv is not None:
+                self._csv = open_files.enter_context(closing(TextFile(outputs.csv, lengths.get("csv"))))
+                if lengths.get("csv") is None:
+                    self._csv.add(",".join(COLUMNS) + "\n")
+            yield
+
+    def go(self, progress: Progress) -> None:
+        """All steps that are left."""
+        dynamics, steps = self.dynamics, self.settings.steps
+        first, started, shown = dynamics.nsteps, time.perf_counter(), 0.0
+        try:
+            if self._saved_at is None:
+                self._write()
+                self._save()
+            while dynamics.nsteps < steps:
+                dynamics.step()
+                dynamics.nsteps += 1
+                self._write()
+                if dynamics.nsteps % self.outputs.checkpoint_every == 0 or dynamics.nsteps == steps:
+                    self._save()
+                now = time.perf_counter() - started
+                if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
+                    shown = now
+                    progress(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
+        except (ValueError, FloatingPointError) as error:
+            where = f"step {dynamics.nsteps + 1} of {steps}, {self.settings.step_fs:g} fs each"
+            raise RunStopped(f"{error} ({where}){self._named_checkpoint()}") from error
+        except OSError as error:
+            what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+            raise RunStopped(
+                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._named_checkpoint()}"
+            ) from error
+
+    def record(self) -> FluidRecord:
+        """All rows as a table."""
+        columns = np.array(self.rows, dtype=np.float64).reshape(-1, len(COLUMNS)).T
+        return FluidRecord(*columns)
+
+    def restore_from(self, path: str | os.PathLike[str]) -> None:
+        """The state of a checkpoint's file; ValueError where it is none, or one of another box or run."""
+        try:
+            self.restore(read_checkpoint(path))
+        except (KeyError, TypeError, AttributeError) as error:  # its keys and arrays are not those of a checkpoint
+            raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """State, thermostat, rows and lengths of files as they were; ValueError for another box or run."""
+        about, arrays, path = checkpoint.about, checkpoint.arrays, self.outputs.checkpoint
+        if about["box"] != self._box():
+            raise ValueError(f"{path}: was written for another box (other atoms, masses, shapes or cell)")
+        mine = asdict(self.settings)
+        for name, value in about["settings"].items():
+            if name not in MAY_CHANGE and mine.get(name) != value:
+                raise ValueError(f"{path}: was written by a run with {name} = {value}, not {mine.get(name)}")
+        if list(about["files"]) != self._names():
+            before = ", ".join(about["files"]) or "none"
+            raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
+        if about["step"] > self.settings.steps:
+            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps of this run")
+        state = State(*(np.array(arrays[name]) for name in ("centres", "momentum", "spin", "carry")))
+        if self.dynamics.thermostat is not None:
+            self.dynamics.thermostat.restore(about["thermostat"])
+        self.dynamics.restore(state, about["step"])
+        self._lengths = dict(about["files"])
+        self._saved_at = about["step"]
+        csv = self.outputs.csv
+        self.rows = arrays["rows"].tolist() if csv is None else read_rows(csv, about["files"]["csv"])
+
+    def _write(self) -> None:
+        """A row and frames, where it is their turn."""
+        dynamics, every = self.dynamics, self.settings.every
+        time_ps = dynamics.nsteps * self.settings.step_fs * 1e-3
+        if dynamics.nsteps % every == 0:
+            self.rows.append(self._row(time_ps))
+            if self._csv is not None:
+                self._csv.add(csv_line(self.rows[-1]))
+        if dynamics.nsteps % (self.outputs.frames_every or every) == 0:
+            for file in self._frames:
+                file.add(dynamics.atoms, time_ps)
+
+    def _row(self, time_ps: float) -> list[float]:
+        dynamics = self.dynamics
+        kinetic, heat = dynamics.kinetic(), dynamics.temperatures()
+        return [
+            time_ps,
+            float(dynamics.atoms.get_potential_energy()),
+            kinetic.translation_ev,
+            kinetic.rotation_ev,
+            dynamics.conserved_energy(),
+            heat.all_k,
+            heat.translation_k,
+            heat.rotation_k,
+            pressure_bar(dynamics),
+        ]
+
+    def _save(self) -> None:
+        """A checkpoint, after which the calculator begins afresh."""
+        path, dynamics = self.outputs.checkpoint, self.dynamics
+        if path is None:
+            return
+        state, thermostat = dynamics.state, dynamics.thermostat
+        files = [*([] if self._csv is None else [self._csv]), *self._frames]
+        arrays = {"centres": state.centres, "momentum": state.momentum, "spin": state.spin, "carry": state.carry}
+        if self._csv is None:
+            arrays["rows"] = np.array(self.rows).reshape(-1, len(COLUMNS))
+        about = {
+            "box": self._box(),
+            "settings": asdict(self.settings),
+            "step": dynamics.nsteps,
+            "thermostat": None if thermostat is None else thermostat.state_dict(),
+            "files": {name: file.sync() for name, file in zip(self._names(), files, strict=True)},
+        }
+        Checkpoint(arrays, about).write(path)
+        self._saved_at = dynamics.nsteps
+        dynamics.refresh()
+
+    def _names(self) -> list[str]:
+        """Names of the growing files of this run."""
+        return [*(["csv"] if self.outputs.csv is not None else []), *map(str, self.outputs.trajectories)]
+
+    def _box(self) -> str:
+        """A fingerprint of what does not change."""
+        bodies, atoms = self.dynamics.bodies, self.dynamics.atoms
+        parts = (atoms.numbers, bodies.order, bodies.starts, bodies.masses, bodies.sites, atoms.cell.array, atoms.pbc)
+        return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
+
+    def _named_checkpoint(self) -> str:
+        if self._saved_at is None or self.outputs.checkpoint is None:
+            return ""
+        return f"; {self.outputs.checkpoint} is of step {self._saved_at}, resume from it"
+
+
+def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
+    """How fast steps went."""
+    return steps * settings.step_fs * 1e-6 * 86400.0 / seconds if seconds > 0.0 else 0.0
+
+
+@contextmanager
+def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
+    """Where progress goes: the caller's function, else a bar on a terminal, else nowhere."""
+    if progress is not None or not sys.stderr.isatty():
+        yield progress or (lambda step, steps, speed: None)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    text = TextColumn("{task.completed} of {task.total} steps, {task.fields[speed]:.3g} ns/day")
+    with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=steps, speed=0.0)
+        yield lambda step, steps, speed: bar.update(task, completed=step, speed=speed)

@@ -1,0 +1,69 @@
+"""Means of a run with their errors, as correlated data have them, and how well the conserved energy was conserved."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fluids.record import FluidRecord
+from rotor.statistics.equipartition import statistical_inefficiency
+from rotor.units import KJ_PER_MOL_EV
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean, its standard error √(var g/n), and n/g, g the statistical inefficiency; nan where rows are too few."""
+
+    quantity: str
+    unit: str
+    mean: float
+    error: float
+    effective_samples: float
+
+
+def mean_of(quantity: str, unit: str, values: Floats) -> Mean:
+    """The mean of a correlated series (n,).
+
+    >>> noise = np.random.default_rng(1).normal(size=4000)
+    >>> round(mean_of("x", "K", noise).error, 3)
+    0.016
+    """
+    if len(values) < 2 or not np.isfinite(values).all():
+        return Mean(quantity, unit, float(np.mean(values)) if len(values) else math.nan, math.nan, math.nan)
+    samples = len(values) / statistical_inefficiency(values[:, None])
+    return Mean(quantity, unit, float(values.mean()), float(values.std(ddof=1) / math.sqrt(samples)), samples)
+
+
+def means(record: FluidRecord, molecules: int, share: float = 0.5) -> list[Mean]:
+    """Means over the last `share` of a record; energies per molecule, and the ratio of both temperatures.
+
+    What there is not (the temperature of rotations of atoms, a pressure without a cell) has no row.
+    """
+    first = math.floor(len(record) * (1.0 - share))
+    last = {name: column[first:] for name, column in record.columns.items()}
+    per_mole = KJ_PER_MOL_EV / molecules
+    table = [mean_of("potential energy", "kJ/mol", last["potential_ev"] * per_mole)]
+    for name, column in (
+        ("temperature", "temperature_k"),
+        ("of translation", "translation_k"),
+        ("of rotation", "rotation_k"),
+    ):
+        if np.isfinite(last[column]).all():
+            table.append(mean_of(name, "K", last[column]))
+    if np.isfinite(last["rotation_k"]).all() and np.all(last["translation_k"] > 0.0):
+        table.append(mean_of("rotation over translation", "", last["rotation_k"] / last["translation_k"].mean()))
+    if np.isfinite(last["pressure_bar"]).all():
+        table.append(mean_of("pressure", "bar", last["pressure_bar"]))
+    return table
+
+
+def conserved(record: FluidRecord) -> tuple[float, float]:
+    """Root mean square of the conserved energy about its mean, eV, and its drift by least squares, eV/ns."""
+    if len(record) < 2:
+        return math.nan, math.nan
+    time_ns = (record.time_ps - record.time_ps.mean()) * 1e-3
+    away = record.total_ev - record.total_ev.mean()
+    return float(np.sqrt(np.mean(away**2))), float(time_ns @ away / (time_ns @ time_ns))

@@ -1,0 +1,230 @@
+"""A request for a classical gas of free molecules, and what answers it: the test of equipartition, correlation functions.
+
+Distortion, everything quantum, and what molecules do to each other are neglected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.checks import require_between, require_positive, require_top, require_whole
+from rotor.classical.gas.correlations import ShortTime, plateau, short_time
+from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.estimates.limits import OF_SPINS, model_limits, model_sizes, populated_j
+from rotor.statistics.degrees_of_freedom import count_degrees
+from rotor.statistics.equipartition import Equipartition, equipartition
+from rotor.table import TextOf
+from rotor.thermodynamics.classical_onset import classical_above_if_known
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+MOST_MOLECULES = 10_000_000
+MOST_TIMES = 100_000
+DEFAULT_TIMES = 101
+SETTLED = 12.0  # root mean square turns, in radians, after which the correlation functions are shown no further
+TESTED_AT_PS = 10.0
+
+
+@dataclass(frozen=True)
+class GasRequest:
+    """A classical gas to draw and move; every field is checked when the request is made.
+
+    molecules: how many are drawn. seed: of the random numbers. confidence: of the test of equipartition. times_ps: of the
+    correlation functions C1 and C2; None: none; see `settling_times_ps`.
+    """
+
+    top: Top
+    molecules: int = 20_000
+    temperature_k: float = 300.0
+    seed: int = 1
+    confidence: float = 0.99
+    times_ps: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        require_top(self.top)
+        require_whole("molecules", self.molecules, 2, MOST_MOLECULES)
+        require_whole("seed", self.seed, 0)
+        require_positive("temperature_k", self.temperature_k, "K")
+        require_between("confidence", self.confidence, 0, 1)
+        if self.times_ps is not None:
+            if not 0 < len(self.times_ps) <= MOST_TIMES:
+                raise ValueError(
+                    f"times_ps: {len(self.times_ps)} times: at most {MOST_TIMES} times in one run; ask for fewer"
+                )
+            if not np.isfinite(self.times_ps).all():
+                raise ValueError("times_ps: expected finite times")
+
+    @property
+    def kt(self) -> float:
+        """kT in eV."""
+        return units.EV_PER_K * self.temperature_k
+
+    @property
+    def tested_at_ps(self) -> float:
+        """The time at which equipartition is tested: the last one of the correlation functions, else 10 ps."""
+        return TESTED_AT_PS if self.times_ps is None else max(self.times_ps)
+
+
+@dataclass(frozen=True)
+class Probes:
+    """What C1 and C2 are of: a unit vector (3,) and a tensor (3, 3) in principal axes, and where they are from."""
+
+    vector: Floats
+    vector_source: str
+    tensor: Floats
+    tensor_source: str
+
+
+@dataclass(frozen=True, repr=False)
+class GasAnswer(TextOf):
+    """The gas after it has moved, the verdict on equipartition, and the correlation functions with times in ps."""
+
+    shown = "test"
+
+    request: GasRequest
+    ensemble: Ensemble
+    test: Equipartition
+    correlations: Correlations | None
+
+    @cached_property
+    def probes(self) -> Probes:
+        """What the correlation functions are of."""
+        return probes_of(self.request.top)
+
+    @property
+    def short_time(self) -> ShortTime:
+        """How the correlation functions begin, in closed form and the units of the motion."""
+        top, probes = self.request.top, self.probes
+        return short_time(top.moments_u_angstrom2, self.request.kt, probes.vector, probes.tensor)
+
+    @property
+    def left_out(self) -> list[str]:
+        """What a classical gas of free rigid tops leaves out: quantum mechanics, distortion, and what the molecule shows signs of."""
+        top = self.request.top
+        j, effects = populated_j(top, self.request.temperature_k), effects_of(top, hyperfine=False)
+        above_k = classical_above_if_known(top, 0.01)
+        where = "" if above_k is None else f": the heat capacity is classical within 1 % above {above_k:.3g} K"
+        quantum = f"quantum mechanics{where}"
+        sizes = [one for one in model_sizes(top, j, effects) if one.present and one.name == "centrifugal distortion"]
+        distortion = [f"{one.name}: {one.size_mhz:.2g} MHz of a level at J = {j}" for one in sizes]
+        seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in OF_SPINS]
+        return [f"collisions; vibrations; {quantum}", *distortion, *seen]
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        request, test = self.request, self.test
+        one = count_degrees([request.top.moments_u_angstrom2])
+        half_kt = 0.5 * test.kt * units.CM_PER_EV
+        return {
+            **top_facts(request.top),
+            "temperature_k": request.temperature_k,
+            "molecules": request.molecules,
+            "seed": request.seed,
+            "confidence": request.confidence,
+            "degrees_of_freedom": {
+                "translation": one.translation,
+                "rotation": one.rotation,
+                "total": one.total,
+                "gas": round(self.ensemble.kinetic.total),
+            },
+            "tested_at_ps": request.tested_at_ps,
+            "accepted": test.accepted,
+            "p_value": test.p_value,
+            "chi2": test.chi2,
+            "chi2_degrees": test.chi2_degrees,
+            "chi2_p": test.chi2_p,
+            "ks_p": test.ks_p,
+            "failing": list(test.failing),
+            "degrees": [asdict(d) | {"energy_cm": half_kt * d.mean, "expected_cm": half_kt} for d in test.degrees],
+            **self._facts_of_correlations(),
+            "left_out": self.left_out,
+        }
+
+    def _facts_of_correlations(self) -> dict[str, Any]:
+        names = ("vector_abc", "vector_source", "tensor_source", "short_time_per_ps2", "c1_plateau")
+        if self.correlations is None:
+            return dict.fromkeys(names)
+        probes, start = self.probes, self.short_time
+        per_ps2 = {"c1": start.m2 / units.ASE_TIME_PS**2, "c2": start.n2 / units.ASE_TIME_PS**2}
+        last = plateau(self.request.top.moments_u_angstrom2, probes.vector)
+        values = (probes.vector, probes.vector_source, probes.tensor_source, per_ps2, last)
+        return dict(zip(names, values, strict=True))
+
+
+def answer_gas(
+    request: GasRequest,
+    executor: ThreadPoolExecutor | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> GasAnswer:
+    """The gas of a request, moved and tested, and its correlation functions where times were asked for.
+
+    executor: threads that the molecules of the correlation functions are spread over; the answer does not depend on it.
+    progress: called with how many of these molecules are done.
+
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_gas(GasRequest(Top.from_constants("A=10 B=6 C=4 GHz"), molecules=1000))
+    >>> answer.test.accepted, len(answer.test.degrees)  # no translations: bare constants have no mass
+    (True, 3)
+    """
+    top, rng = request.top, np.random.default_rng(request.seed)
+    start = thermal_ensemble(top.moments_u_angstrom2, request.kt, request.molecules, rng=rng, mass=top.mass_u)
+    gas = start.moved(request.tested_at_ps / units.ASE_TIME_PS)
+    test = equipartition(gas.kinetic, request.kt, confidence=request.confidence)
+    return GasAnswer(request, gas, test, _correlations(request, executor, progress))
+
+
+def _correlations(
+    request: GasRequest, executor: ThreadPoolExecutor | None, progress: Callable[[int], object] | None
+) -> Correlations | None:
+    """C1 and C2, times in ps, of molecules of their own (another stream of the same seed)."""
+    if request.times_ps is None:
+        return None
+    probes, times = probes_of(request.top), np.array(request.times_ps)
+    curves = free_gas_correlations(
+        request.top.moments_u_angstrom2,
+        request.kt,
+        times / units.ASE_TIME_PS,
+        vector=probes.vector,
+        tensor=probes.tensor,
+        molecules=request.molecules,
+        rng=np.random.default_rng([request.seed, 1]),
+        executor=executor,
+        progress=progress,
+    )
+    return replace(curves, times=times)
+
+
+def probes_of(top: Top) -> Probes:
+    """The dipole and the polarizability of a top where they are known and turn with it, else its figure axis."""
+    axis = 2 if top.kind == "oblate" else 0
+    vector, vector_source = np.eye(3)[axis], f"axis {'abc'[axis]}, as there is no dipole that is known"
+    if top.dipole_abc_debye is not None and any(top.dipole_abc_debye):
+        vector, vector_source = np.array(top.dipole_abc_debye), "the dipole"
+        vector = vector / np.linalg.norm(vector)
+    tensor, tensor_source = np.outer(vector, vector), f"the second Legendre polynomial of {vector_source.split(',')[0]}"
+    known = top.polarizability_abc_angstrom3
+    if known is not None:
+        alpha = np.array(known)
+        if np.linalg.norm(alpha - np.trace(alpha) / 3 * np.eye(3)) > 1e-6 * np.linalg.norm(alpha):
+            tensor, tensor_source = alpha, "the anisotropic polarizability"
+    return Probes(vector, vector_source, tensor, tensor_source)
+
+
+def settling_times_ps(top: Top, temperature_k: float) -> tuple[float, ...]:
+    """Times in ps over which the correlation functions of a free gas settle: 12 rad of root mean square turning."""
+    probes = probes_of(top)
+    start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, probes.vector, probes.tensor)
+    last = SETTLED / math.sqrt(max(start.m2, start.n2 / 3)) * units.ASE_TIME_PS
+    return tuple(np.linspace(0.0, last, DEFAULT_TIMES).tolist())

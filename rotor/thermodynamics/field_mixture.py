@@ -1,0 +1,251 @@
+"""Thermal mixtures of states in a static field: populations, mean orientation and alignment, mean dipole along the field.
+
+Two mixtures are meant: that of a gas in equilibrium in the field, and that of a beam that came out of equilibrium without field and
+went into it adiabatically, each state with the population of its free level. In equilibrium the mean dipole is kT ∂lnQ/∂E; far above
+the energies of the rotor it is the function of Langevin, coth x - 1/x of x = μE/kT.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats
+from rotor.checks import require_between, require_one_of, require_positive
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.stark import checked_direction, stark_map
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.fields.block_states import BlockStates
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.table import Table
+from rotor.thermodynamics.level_sums import lowest_level_k
+from rotor.thermodynamics.partition import partition_function
+from rotor.units import MHZ_PER_K
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+POPULATIONS = ("equilibrium", "adiabatic")
+MOST_J = 60
+
+
+class Populations(NamedTuple):
+    """of_block: population of one state, for each block (fields, states). q: at each field, from the lowest free level (fields,)."""
+
+    of_block: list[Floats]
+    q: Floats
+
+
+def populations_in_field(
+    top: Top,
+    solved: Sequence[BlockStates],
+    temperature_k: float,
+    populations: str,
+    effects: Sequence[QuantumEffect] = (),
+) -> Populations:
+    """Populations of the states of blocks that hold every M.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    solved : sequence of BlockStates
+        Energies (f, states) in MHz of each block at the same fields.
+    temperature_k : float
+        Of the gas.
+    populations : str
+        "adiabatic": each state has the population of the level it comes from; else equilibrium in the field.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian of a top with spins.
+
+    Returns
+    -------
+    Populations
+        (f, states) of each block, and Q (f,).
+
+    Notes
+    -----
+    In equilibrium Q is that of the free top and what the states given differ by in the field. Neglected: those above
+    them are shifted by amounts whose sum over M is 0 to second order.
+    """
+    kt = temperature_k * MHZ_PER_K
+    ground = lowest_level_k(top, [top.spin_weights])[0] * MHZ_PER_K
+    if effects:
+        levels = solved[0].block.levels
+        ground = float(levels.energy_mhz[levels.weight > 0].min())
+    free, factors = [], []
+    for one in solved:
+        levels = one.block.levels
+        weight = levels.weight[one.rows]
+        free.append(np.broadcast_to(weight * np.exp(-(levels.energy_mhz[one.rows] - ground) / kt), one.energies.shape))
+        factors.append(weight * np.exp(-(one.energies - ground) / kt))
+    q = np.full(len(solved[0].energies), partition_function(top, temperature_k, effects=tuple(effects) or SEMI_RIGID).q)
+    if populations == "adiabatic":
+        return Populations([one / q[:, None] for one in free], q)
+    for one, before, now in zip(solved, free, factors, strict=True):
+        q = q + one.block.copies * (now - before).sum(axis=1)
+    return Populations([one / q[:, None] for one in factors], q)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldMixture(Table):
+    """Means of a thermal mixture against the field.
+
+    field_kv_per_cm: (n,). energy_mhz: above the lowest free level. mu_eff_debye: mean dipole along the field. cosines: by name (n,).
+    left_out: population above the states that were followed, which counts as isotropic. states: all states, copies apart.
+    """
+
+    temperature_k: float
+    populations: str
+    field_kv_per_cm: Floats
+    energy_mhz: Floats
+    mu_eff_debye: Floats
+    cosines: dict[str, Floats]
+    q: Floats
+    left_out: float
+    states: int
+    j_highest: int
+    map: FieldMap
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """field_kv_per_cm, energy_mhz, mu_eff_debye, the cosines, q."""
+        start = {"field_kv_per_cm": self.field_kv_per_cm, "energy_mhz": self.energy_mhz}
+        return {**start, "mu_eff_debye": self.mu_eff_debye, **self.cosines, "q": self.q}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Temperature, populations, what is left out, and the provenance of the map."""
+        return {
+            "temperature_k": self.temperature_k,
+            "populations": self.populations,
+            "left_out": self.left_out,
+            "states": self.states,
+            "j_highest": self.j_highest,
+            **self.map.provenance,
+        }
+
+
+def field_mixture(
+    top: Top,
+    fields_kv_per_cm: ArrayLike,
+    temperature_k: float,
+    *,
+    populations: str = "equilibrium",
+    left_out: float = 1e-3,
+    intensity_w_per_cm2: float = 0.0,
+    direction: Sequence[float] = (0.0, 0.0, 1.0),
+    tolerance_mhz: float = 1e-2,
+    executor: Executor | None = None,
+) -> FieldMixture:
+    """Mean energy, dipole and cosines of a thermal mixture of states against a static field.
+
+    Parameters
+    ----------
+    top : Top
+        With `dipole_abc_debye`.
+    fields_kv_per_cm : (n,)
+        Each once, in rising order.
+    temperature_k : float
+        Of the mixture.
+    populations : str
+        "equilibrium" in the field, or "adiabatic": of the free top, each state followed into the field.
+    left_out : float
+        Population of the free top that may lie above the J that are followed.
+    intensity_w_per_cm2, direction : optional
+        As in `stark_map`.
+    tolerance_mhz : float
+        Of energies.
+    executor : Executor, optional
+        Blocks are spread over it.
+
+    Returns
+    -------
+    FieldMixture
+
+    Raises
+    ------
+    ValueError
+        As `stark_map`; where states above J = 60 would have to be followed.
+
+    Notes
+    -----
+    What is left out counts as isotropic, with the energy of the free top neglected.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
+    >>> round(float(field_mixture(rod, [0.0, 30.0], 1.0).cosines["costheta"][1]), 4)
+    0.1512
+    """
+    require_positive("temperature_k", temperature_k, "K")
+    require_between("left_out", left_out, 1e-9, 0.5)
+    require_one_of("populations", populations, POPULATIONS)
+    checked_direction(direction)
+    j, q, ground = _followed_j(top, temperature_k, left_out)
+    states = stark_map(
+        top,
+        fields_kv_per_cm,
+        j_highest=j,
+        intensity_w_per_cm2=intensity_w_per_cm2,
+        direction=direction,
+        tolerance_mhz=tolerance_mhz,
+        executor=executor,
+    )
+    return _means(states, temperature_k, populations, (j, q, ground))
+
+
+def _followed_j(top: Top, temperature_k: float, left_out: float) -> tuple[int, float, float]:
+    """The J above which less than `left_out` of the population of the free top lies; Q; and the lowest energy in MHz."""
+    from rotor.quantum.solve import solve_levels
+
+    q = partition_function(top, temperature_k).q
+    ground = lowest_level_k(top, [top.spin_weights])[0] * MHZ_PER_K
+    levels = solve_levels(top, MOST_J, vectors=False)
+    each = levels.degeneracy * np.exp(-(levels.energy_mhz - ground) / (temperature_k * MHZ_PER_K))
+    by_j = np.cumsum(np.bincount(levels.rotational, each, MOST_J + 1)) / q
+    enough = np.flatnonzero(by_j >= 1 - left_out)
+    if not len(enough):
+        raise ValueError(
+            f"{temperature_k:g} K: {1 - by_j[-1]:.2g} of the population is above J = {MOST_J}, which is as far as states in a field are "
+            "followed; take a lower temperature or a larger share to leave out"
+        )
+    return int(enough[0]), float(q), float(ground)
+
+
+def _means(states: FieldMap, temperature_k: float, populations: str, known: tuple[int, float, float]) -> FieldMixture:
+    j, q_free, ground = known
+    kt, count = temperature_k * MHZ_PER_K, len(states.fields)
+    shape = (-1, count)
+    energy, copies = states.energy_mhz.reshape(shape), states.copies.reshape(shape)
+    weight = copies * states.weight.reshape(shape)
+    before = weight * np.exp(-(states.free_mhz.reshape(shape) - ground) / kt)
+    now = weight * np.exp(-(energy - ground) / kt)
+    if populations == "adiabatic":
+        share, q = before / q_free, np.full(count, q_free)
+    else:
+        q = q_free + (now - before).sum(axis=0)
+        share = now / q
+    rest = 1 - share.sum(axis=0)
+
+    def mean(values: Floats, isotropic: float) -> Floats:
+        return np.asarray((share * values.reshape(shape)).sum(axis=0) + rest * isotropic)
+
+    isotropic = {"costheta": 0.0, "cos2theta": 1 / 3}
+    return FieldMixture(
+        temperature_k=temperature_k,
+        populations=populations,
+        field_kv_per_cm=states.fields,
+        energy_mhz=mean(energy - ground, 0.0),
+        mu_eff_debye=mean(states.slope, 0.0),
+        cosines={name: mean(values, isotropic[name]) for name, values in states.cosines.items()},
+        q=q,
+        left_out=float(rest.max()),
+        states=int(copies[:, 0].sum()),
+        j_highest=j,
+        map=states,
+    )

@@ -1,0 +1,353 @@
+"""Thermodynamic functions of a gas of tops: rotation by the quantum sum and classically, vibration, and the ideal gas.
+
+Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest level that
+exists in the molecule, whatever its species, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
+
+Species that are frozen in a ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), whose last
+part is the entropy of mixing. `normal` is the ratio of high temperature, where species are as frequent as their spin
+functions: 3:1 of ortho and para hydrogen. `equilibrium` is the sum over all levels at every temperature.
+
+The ideal gas has translation too (O. Sackur and H. Tetrode 1911-12; Mayer and Mayer, chapter 5),
+
+    S_tr = R ln[(2πmkT/h²)^(3/2) kT/p] + 5R/2,    H - H(0) = U_rot + U_vib + 5RT/2,    C_p = C_rot + C_vib + 5R/2,
+
+and leaves R ln of the number of nuclear-spin functions out of S and of -(G - H(0))/T, as published tables do. Neglected:
+that rotational constants differ between vibrational states, electronic states, and forces between molecules.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.table import Table
+from rotor.thermodynamics.classical_limit import classical_limit
+from rotor.thermodynamics.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
+from rotor.thermodynamics.species import implied_symmetry_number, spin_species
+from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
+from rotor.tops.spins.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+GAS_CONSTANT = units.BOLTZMANN_J_PER_K * units.AVOGADRO_PER_MOL  # J/(mol K), exact
+
+
+@dataclass(frozen=True)
+class IdealGas:
+    """What translation and vibration make of the rotational functions, at one pressure.
+
+    cp_j_per_mol_k, entropy_j_per_mol_k, enthalpy_j_per_mol (H - H(0)), gibbs_j_per_mol_k (-(G - H(0))/T): (n,); nuclear
+    spin is left out of the last and of the entropy.
+    """
+
+    pressure_bar: float
+    mass_u: float
+    cp_j_per_mol_k: Floats
+    entropy_j_per_mol_k: Floats
+    enthalpy_j_per_mol: Floats
+    gibbs_j_per_mol_k: Floats
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ThermoFunctions(Table):
+    """Thermodynamic functions of a top at n temperatures; every array is (n,).
+
+    species: what it is a gas of. fractions: how the species are mixed, empty unless frozen. symmetry_number, spin_factor: how
+    many rotations and how many nuclear-spin functions the classical q = spin_factor/symmetry_number · ... counts; the second
+    is of weights divided by their common divisor. q_rot, energy_j_per_mol, entropy_j_per_mol_k, cv_over_r: the quantum
+    sum. q_rot_classical, cv_over_r_classical: the classical limit. q_rot_corrected, cv_over_r_corrected: that with its
+    first quantum corrections and distortion, from the lowest level as q_rot, NaN where these are large.
+    jmax, relative_error: of the sums (-1 where the
+    classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
+    vibrational states are given. gas: with translation. hyperfine: how
+    spins were counted, by the keys of docs/command_line.md; None without spins.
+    """
+
+    top: Top
+    species: str
+    fractions: Mapping[str, float]
+    symmetry_number: int
+    spin_factor: float
+    temperature_k: Floats
+    q_rot: Floats
+    q_rot_classical: Floats
+    q_rot_corrected: Floats
+    energy_j_per_mol: Floats
+    entropy_j_per_mol_k: Floats
+    cv_over_r: Floats
+    cv_over_r_classical: Floats
+    cv_over_r_corrected: Floats
+    jmax: NDArray[np.int64]
+    relative_error: Floats
+    vibrations: VibrationalStates | None = None
+    q_vib: Floats | None = None
+    cv_vib_over_r: Floats | None = None
+    gas: IdealGas | None = None
+    hyperfine: dict[str, Any] | None = None
+
+    def __len__(self) -> int:
+        return len(self.temperature_k)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the functions were made from: the top and its sources, species, vibration, pressure, errors of the sums."""
+        return (
+            self.top.provenance
+            | {
+                "species": self.species,
+                "fractions": dict(self.fractions),
+                "symmetry_number": self.symmetry_number,
+                "spin_factor": self.spin_factor,
+                "vibrations": self.vibrations.text if self.vibrations is not None else None,
+                "pressure_bar": self.gas.pressure_bar if self.gas is not None else None,
+                "mass_u": self.gas.mass_u if self.gas is not None else None,
+                "jmax": int(self.jmax.max()),
+                "relative_error": float(self.relative_error.max()),
+                "rows": len(self),
+            }
+            | ({} if self.hyperfine is None else {"hyperfine": self.hyperfine})
+        )
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The functions by name, those of vibration and of the gas only where there are some."""
+        names = (
+            "temperature_k", "q_rot", "q_rot_classical", "q_rot_corrected", "energy_j_per_mol", "entropy_j_per_mol_k",
+            "cv_over_r", "cv_over_r_classical", "cv_over_r_corrected",
+        )  # fmt: skip
+        out = {name: getattr(self, name) for name in names}
+        if self.q_vib is not None and self.cv_vib_over_r is not None:
+            out |= {"q_vib": self.q_vib, "cv_vib_over_r": self.cv_vib_over_r}
+        if self.gas is not None:
+            of_gas = ("cp_j_per_mol_k", "entropy_j_per_mol_k", "enthalpy_j_per_mol", "gibbs_j_per_mol_k")
+            out |= {f"gas_{name}": getattr(self.gas, name) for name in of_gas}
+        return out
+
+
+def species_names(top: Top) -> list[str]:
+    """What `thermodynamic_functions` takes as species of this top.
+
+    >>> from rotor.tops.top import Top
+    >>> species_names(Top.from_constants("B=60 cm-1", spin_weights={"even": 1, "odd": 3}))
+    ['equilibrium', 'normal', 'para', 'ortho']
+    """
+    known = list(spin_species(top.spin_weights))
+    return ["equilibrium"] if known == ["all"] else ["equilibrium", "normal", *known]
+
+
+def thermodynamic_functions(
+    top: Top,
+    temperatures_k: ArrayLike,
+    *,
+    species: str = "equilibrium",
+    vibrations: VibrationalStates | None = None,
+    pressure_bar: float | None = None,
+    relative_error: float = 1e-6,
+    progress: Progress | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> ThermoFunctions:
+    """Partition function, energy, entropy and heat capacity of a top at many temperatures, quantum and classical.
+
+    Parameters
+    ----------
+    top : Top
+    temperatures_k : (n,) above 0 K, in any order.
+    species : "equilibrium", "normal" (frozen in the ratio of high temperature), or one nuclear-spin species: "para",
+        "ortho", or a class of the spin weights such as "E"; see `species_names`.
+    vibrations : vibrational states; none: vibration is left out.
+    pressure_bar : of an ideal gas, whose functions are then given too; the top must have a mass.
+    relative_error : of Q, U and C_v, asked; larger, up to 10 %, where levels count that the distortion constants do not
+        serve: `ThermoFunctions.relative_error` says what was reached.
+    progress : called as `progress(j, last)` as a long sum goes on.
+    effects : what the Hamiltonian consists of; with spins Q counts their functions, see `rotor.thermodynamics.spin_sums`.
+
+    Returns
+    -------
+    ThermoFunctions
+
+    Raises
+    ------
+    ValueError
+        A temperature not above 0 K, a species that the molecule has not, no mass; distortion beyond its reach.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> found = thermodynamic_functions(Top.from_constants("B=10 cm-1"), [5.0, 300.0])
+    >>> [round(float(x), 4) for x in found.cv_over_r]  # 3x² e⁻ˣ/(1 + 3e⁻ˣ)², x = 2Θ/T; 1 + (Θ/T)²/45
+    [0.3088, 1.0001]
+    """
+    parts, fractions = _parts(top, species)
+    temperatures = checked_temperatures(temperatures_k)
+    effects = tuple(effects)
+    if any(effect.spins(top) for effect in effects):
+        rotation = _with_spins(top, species, parts, fractions, temperatures, relative_error, effects, progress)
+    else:
+        sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress, effects=effects)
+        rotation = _rotation(top, species, parts, fractions, sums, effects)
+    return _with_gas(_with_vibration(rotation, vibrations), pressure_bar)
+
+
+def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, float]]:
+    """The spin weights of each species in the gas, and the fractions in which they are frozen, if they are."""
+    known = spin_species(top.spin_weights)
+    if species == "equilibrium":
+        return {species: top.spin_weights}, {}
+    if known.keys() == {"all"}:
+        raise ValueError(f"species {species!r}: all levels of {top.name or 'this top'} are of one nuclear-spin species")
+    if species == "normal":
+        means = {name: one.mean for name, one in known.items()}
+        return known, {name: mean / sum(means.values()) for name, mean in means.items()}
+    if species not in known:
+        raise ValueError(f"species {species!r}: {top.name or 'this top'} has {', '.join(species_names(top))}")
+    return {species: known[species]}, {}
+
+
+def _tunnelling_components(top: Top) -> int:
+    """States that the spin weights of the geometry take together: they are what tunnelling between equivalent forms makes of one."""
+    return len(top.states.weights) if top.states is not None and 0 in top.states.weights else 1
+
+
+def refuse_species_of_totals(top: Top, species: str, effects: Sequence[QuantumEffect]) -> None:
+    """ValueError for a single species, or a frozen mixture, of a top with nuclei that are coupled to a total spin."""
+    if species != "equilibrium" and any(spin.total for effect in effects for spin in effect.spins(top)):
+        raise ValueError(
+            f"species: {species!r}: with nuclei that are coupled to a total spin species are not separated; expected equilibrium"
+        )
+
+
+def _with_spins(
+    top: Top,
+    species: str,
+    parts: dict[str, SpinWeights],
+    fractions: dict[str, float],
+    temperatures: Floats,
+    relative_error: float,
+    effects: tuple[QuantumEffect, ...],
+    progress: Progress | None,
+) -> ThermoFunctions:
+    """The functions of rotation with spins."""
+    from rotor.quantum.spins.method import EXACT, HyperfineMethod
+    from rotor.thermodynamics.spin_factor import spin_functions
+    from rotor.thermodynamics.spin_sums import spin_sums
+
+    refuse_species_of_totals(top, species, effects)
+    found = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
+    counted = found.split.any()
+    method = next((one.method for one in effects if isinstance(one, HyperfineMethod)), EXACT)
+    hyperfine = {
+        "spin_functions": spin_functions(top, effects),
+        "splitting_mhz": found.splitting_mhz,
+        "summed_up_to_k": float(temperatures[found.split].max()) if counted else None,
+        "method": method,
+    }
+    return replace(_rotation(top, species, parts, fractions, found.sums, effects), hyperfine=hyperfine)
+
+
+def _rotation(
+    top: Top,
+    species: str,
+    parts: dict[str, SpinWeights],
+    fractions: dict[str, float],
+    sums: list[LevelSums],
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
+) -> ThermoFunctions:
+    """The functions of rotation alone, with the functions of spins where the effects have some."""
+    from rotor.thermodynamics.spin_factor import spin_functions
+
+    ground_k, temperatures = lowest_level_k(top, [top.spin_weights], effects)[0], sums[0].temperatures_k
+    shares = np.array(list(fractions.values()) or [1.0])
+    ln_q, mean, cv = _mixed(sums, ground_k, shares)
+
+    limit = classical_limit(top, next(iter(parts.values())) if len(parts) == 1 else None)
+    means = np.array([classical_limit(top, one).mean_weight for one in parts.values()])
+    mean_weight = float(np.exp(shares @ np.log(means / shares)))
+    limit = replace(limit, mean_weight=mean_weight * spin_functions(top, effects))
+    of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
+    corrected_q, _, corrected_cv = limit.corrected(temperatures)
+    above = np.where(np.isfinite(corrected_q), ground_k / temperatures, 0.0)
+    symmetry_number = top.symmetry.symmetry_number if top.symmetry else implied_symmetry_number(top.spin_weights)
+    return ThermoFunctions(
+        top=top,
+        species=species,
+        fractions=fractions,
+        symmetry_number=symmetry_number,
+        spin_factor=of_nuclei * symmetry_number * _tunnelling_components(top),
+        temperature_k=temperatures,
+        q_rot=np.exp(ln_q),
+        q_rot_classical=limit.q(temperatures),
+        q_rot_corrected=corrected_q * np.exp(above),  # from the lowest level, as Q
+        energy_j_per_mol=GAS_CONSTANT * temperatures * mean,
+        entropy_j_per_mol_k=GAS_CONSTANT * (ln_q + mean),
+        cv_over_r=cv,
+        cv_over_r_classical=np.full(len(temperatures), limit.degrees / 2),
+        cv_over_r_corrected=corrected_cv,
+        jmax=np.max([one.jmax for one in sums], axis=0),
+        relative_error=np.max([(one.error_q, one.error_energy, one.error_cv) for one in sums], axis=(0, 1)),
+    )
+
+
+def _mixed(sums: Sequence[LevelSums], ground_k: float, shares: Floats) -> tuple[Floats, Floats, Floats]:
+    """ln q = Σ x ln(q/x), U/RT and C_v/R of species mixed in fixed shares, energies from a common zero in K."""
+    ln_q, mean, cv = 0.0, 0.0, 0.0
+    for one, share in zip(sums, shares.tolist(), strict=True):
+        above = (one.ground_k - ground_k) / one.temperatures_k
+        ln_q = ln_q + share * (np.log(one.q) - above - math.log(share))
+        mean = mean + share * (one.energy_over_rt + above)
+        cv = cv + share * one.cv_over_r
+    return np.asarray(ln_q), np.asarray(mean), np.asarray(cv)
+
+
+def _with_vibration(rotation: ThermoFunctions, vibrations: VibrationalStates | None) -> ThermoFunctions:
+    if vibrations is None:
+        return rotation
+    ln_q, _, cv = vibrational_functions(vibrations, rotation.temperature_k)
+    return replace(rotation, vibrations=vibrations, q_vib=np.exp(ln_q), cv_vib_over_r=cv)
+
+
+def _with_gas(found: ThermoFunctions, pressure_bar: float | None) -> ThermoFunctions:
+    """The same with the functions of the ideal gas at a pressure, if one is given."""
+    if pressure_bar is None:
+        return found
+    if not (math.isfinite(pressure_bar) and pressure_bar > 0):
+        raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
+    if found.top.mass_u is None:
+        raise ValueError("the ideal gas needs the mass of the molecule, and bare constants have none; give a molecule")
+    t, rt = found.temperature_k, GAS_CONSTANT * found.temperature_k
+    ln_q_vib, mean_vib, cv_vib = np.zeros((3, len(t)))
+    if found.vibrations is not None:
+        ln_q_vib, mean_vib, cv_vib = vibrational_functions(found.vibrations, t)
+    enthalpy = found.energy_j_per_mol + rt * (mean_vib + 2.5)
+    entropy = found.entropy_j_per_mol_k - GAS_CONSTANT * math.log(found.spin_factor)
+    entropy = entropy + GAS_CONSTANT * (ln_q_vib + mean_vib) + translational_entropy(t, found.top.mass_u, pressure_bar)
+    gas = IdealGas(
+        pressure_bar=pressure_bar,
+        mass_u=found.top.mass_u,
+        cp_j_per_mol_k=GAS_CONSTANT * (found.cv_over_r + cv_vib + 2.5),
+        entropy_j_per_mol_k=entropy,
+        enthalpy_j_per_mol=enthalpy,
+        gibbs_j_per_mol_k=entropy - enthalpy / t,
+    )
+    return replace(found, gas=gas)
+
+
+def translational_entropy(temperatures_k: ArrayLike, mass_u: float, pressure_bar: float) -> Floats:
+    """Entropy of an ideal gas of point masses in J/(mol K), by the equation of Sackur and Tetrode, (n,).
+
+    >>> round(float(translational_entropy([298.15], 39.948, 1.0)[0]), 2)  # argon: 154.85 in the tables of CODATA
+    154.85
+    """
+    kt = units.BOLTZMANN_J_PER_K * np.asarray(temperatures_k, dtype=np.float64)
+    per_volume = (2 * math.pi * mass_u * units.ATOMIC_MASS_KG * kt) ** 1.5 / units.PLANCK_J_S**3
+    return np.asarray(GAS_CONSTANT * (np.log(per_volume * kt / (pressure_bar * 1e5)) + 2.5))

@@ -1,0 +1,370 @@
+"""Sums over rotational levels, J by J: the partition function, and the mean and spread of the energy with it.
+
+With x = E/kT, E from the lowest level that exists, and g = g_I (2J+1),
+
+    Q = Σ g e⁻ˣ,      U/RT = Σ g x e⁻ˣ / Q,      C_v/R = Σ g x² e⁻ˣ / Q - (U/RT)²
+
+(J. E. Mayer and M. Goeppert Mayer, Statistical Mechanics, Wiley 1940, chapter 6). What is left out beyond the last J is
+estimated by a series that falls at least as fast as a geometric one: the same terms with every level weighing as much as
+the heaviest class of nuclear spin does, which are smooth in J whatever the spin weights leave out.
+
+Levels that the distortion constants do not serve count with energies of simpler constants, see `trusted_levels`, and what
+the sum would gain if these were as low as they might be is added to the error.
+
+Where the classical limit with its corrections is as good as what was asked, and the sum would be long, no level is solved.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
+from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.solve import solve_levels
+from rotor.thermodynamics.classical_limit import classical_limit
+from rotor.thermodynamics.species import of_species
+from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
+from rotor.tops.spins.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+STRIDE = 8  # J are solved by so many at a time
+LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
+MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
+MOST_J_DISTORTED = {
+    "asymmetric": 800
+}  # with distortion, whose levels are all solved, and up to two simpler forms of them
+HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
+JMAX_LIMIT = 4000
+AT_WORST = 0.1  # estimated relative error above which a sum is refused
+LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels that do not exist may lie below the lowest that does; e³⁰⁰ is enough
+ENDLESS = 1e150  # stands for a tail that is not known because the terms still grow
+NOT_SUMMED = -1  # stands for J max where the classical limit was taken
+DIMENSIONS = {"A": 1, "E": 2, "F": 3, "G": 4, "H": 5}
+
+Progress = Callable[[int, int], object]
+
+
+class OutOfReachError(ValueError):
+    """The levels that count at a temperature lie beyond the reach of the constants or of a sum."""
+
+
+@dataclass(frozen=True)
+class LevelSums:
+    """What the levels of one set of spin weights sum to at n temperatures.
+
+    ground_k: energy of its lowest level over k, from the Hamiltonian's zero, in K. q: (n,), from that level. energy_over_rt,
+    cv_over_r: (n,), from that level. jmax: (n,), the last J that was added, -1 where the classical limit was taken.
+    error_q, error_energy, error_cv: (n,), estimated relative errors, of truncation and of levels that are not trusted.
+    """
+
+    temperatures_k: Floats
+    ground_k: float
+    q: Floats
+    energy_over_rt: Floats
+    cv_over_r: Floats
+    jmax: Ints
+    error_q: Floats
+    error_energy: Floats
+    error_cv: Floats
+
+
+def checked_temperatures(temperatures_k: ArrayLike) -> Floats:
+    """Temperatures as (n,); ValueError where one is not above 0 K."""
+    temperatures = np.atleast_1d(np.asarray(temperatures_k, dtype=np.float64)).ravel()
+    for t in temperatures.tolist():
+        if not (math.isfinite(t) and t > 0):
+            raise ValueError(f"temperature {t} K: a temperature is above 0 K")
+    return temperatures
+
+
+def level_sums(
+    top: Top,
+    weights: Sequence[SpinWeights],
+    temperatures_k: ArrayLike,
+    relative_error: float = 1e-8,
+    *,
+    energies: bool = True,
+    at_worst: float = AT_WORST,
+    refuse: bool = True,
+    progress: Progress | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> list[LevelSums]:
+    """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
+
+    Parameters
+    ----------
+    top : Top
+    weights : sequence of SpinWeights
+    temperatures_k : array_like
+        (n,), above 0 K.
+    relative_error : float
+        Asked of Q, and with `energies` of U and C_v too. The sum at each temperature goes on until its tail is below it;
+        where a sum would need more than J = 60 and the classical limit with corrections is as good, that is taken.
+    energies : bool
+        Whether U and C_v count for the error.
+    at_worst : float
+        Estimated error up to which a sum is given at all.
+    refuse : bool
+        False gives the sums with a larger error too, for a caller that looks at the errors; see `refusal`.
+    progress : callable, optional
+        Called as `progress(j, last)` whenever more levels are solved, with the J that the sum is expected to end at.
+    effects : sequence of QuantumEffect
+        What the Hamiltonian consists of. With others than the semi-rigid ones every level is solved and trusted.
+
+    Returns
+    -------
+    list of LevelSums
+        One for each set of weights. Their errors say what was reached, which is less than what was asked where the
+        distortion constants do not serve the levels that count.
+
+    Raises
+    ------
+    ValueError
+        A temperature not above 0 K; an error above `at_worst`, unless `refuse` is False.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("B=60 GHz")
+    >>> sums = level_sums(top, [top.spin_weights], [300.0])[0]
+    >>> round(float(sums.q[0]), 4), round(float(sums.cv_over_r[0]), 6)  # T/Θ + 1/3 + ..., 1 + (Θ/T)²/45 + ...
+    (104.5171, 1.000002)
+    """
+    temperatures, kinds = checked_temperatures(temperatures_k), 3 if energies else 1
+    ladder = _Ladder(top, tuple(weights), tuple(effects), progress)
+    longest = ladder.longest
+    expected = _last_j(top, temperatures, relative_error)
+    errors = np.array([classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0) for one in weights])
+    limit_serves = (expected > LONG_SUM) & (errors <= relative_error) | (expected > longest) & (errors <= at_worst)
+    limit_serves &= ladder.semi_rigid
+    ladder.reach(temperatures[~limit_serves.all(axis=0)].max(initial=0.0))
+    found = []
+    for s, classical in enumerate(limit_serves):
+        parts = np.zeros((7, len(temperatures)))
+        parts[:, classical] = _expanded(ladder, s, temperatures[classical])
+        if not classical.all():
+            hottest = expected[~classical].max()
+            ladder.last = int(min(hottest, longest))
+            enough = (relative_error, 2 * at_worst)
+            parts[:, ~classical] = _summed(ladder, s, temperatures[~classical], enough, kinds)
+        found.append(_as_sums(temperatures, ladder.ground[s][0], parts))
+        if refuse:
+            _refuse_inexact(found[-1], kinds, at_worst)
+    return found
+
+
+def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
+    q, energy, cv, jmax, error_q, error_energy, error_cv = parts
+    return LevelSums(temperatures, ground_k, q, energy, cv, jmax.astype(np.int64), error_q, error_energy, error_cv)
+
+
+def lowest_level_k(
+    top: Top, weights: Sequence[SpinWeights], effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> list[float]:
+    """E/k of the lowest level that exists by each set of spin weights, from the Hamiltonian's zero, in K."""
+    return [energy for energy, _ in _Ladder(top, tuple(weights), tuple(effects)).ground]
+
+
+def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:
+    """The J that a sum will end at, about: where J² Θ of the smallest constant over T is ln(1/error) and some."""
+    least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
+    return np.sqrt((3.0 - math.log(min(relative_error, 0.1))) * temperatures / least_k)
+
+
+def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
+    """ValueError for the first temperature where the error is too large for the sum to mean anything."""
+    worst = np.max([sums.error_q, sums.error_energy, sums.error_cv][:kinds], axis=0)
+    for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
+        good = sums.temperatures_k[worst <= at_worst]
+        others = f"; of those asked for the sum can be had up to {good.max():g} K" if len(good) else ""
+        raise OutOfReachError(refusal(t, error, at_worst) + others)
+
+
+def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> str:
+    """Why a sum with this estimated relative error is not given, and what to do."""
+    how_much = f"{error:.1e} of it" if error < 1 else "all of it"
+    return (
+        f"Q({temperature_k:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum "
+        f"(estimated error {how_much}, above {at_worst:g}); lower the temperature, or give Q"
+    )
+
+
+class Shell(NamedTuple):
+    """The levels of one J: energies (n,) in K, degeneracies (n,) without spin and (sets, n) with.
+
+    lower: energies (n,) in K that untrusted levels might have; None where all are trusted.
+    """
+
+    kelvin: Floats
+    plain: Floats
+    spin: Floats
+    lower: Floats | None
+
+
+class _Ladder:
+    """Levels J by J, solved when first asked for."""
+
+    def __init__(
+        self,
+        top: Top,
+        weights: tuple[SpinWeights, ...],
+        effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
+        progress: Progress | None = None,
+    ) -> None:
+        self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
+        self.semi_rigid = effects == SEMI_RIGID and top.states is None
+        self._rigid = self.semi_rigid and top.level_table is None and not centrifugal_operators(top.constants)
+        self.longest = (MOST_J if self._rigid else MOST_J_DISTORTED).get(top.kind, JMAX_LIMIT)
+        self._below_mhz = math.inf
+        self._by_j: list[Shell] = []
+        self.last = 0
+        others = [] if top.states is None else list(top.states.weights.values())
+        self.heaviest = [max(heaviest_component(each) for each in (one, *others)) for one in weights]
+        self.ground = [self._lowest(s) for s in range(len(weights))]
+
+    def reach(self, hottest_k: float) -> None:
+        """Levels that do not count at this temperature, and J that are not solved yet, are left out from here on."""
+        if self._rigid:
+            ground = max(energy for energy, _ in self.ground)
+            self._below_mhz = (ground + HIGHEST_KT * hottest_k) * units.MHZ_PER_K
+
+    def at(self, j: int) -> Shell:
+        """The levels of one J."""
+        while len(self._by_j) <= j:
+            self._solve_more()
+        return self._by_j[j]
+
+    def _solve_more(self) -> None:
+        first = len(self._by_j)
+        last = first + max(STRIDE, first // 8) - 1
+        if self._progress is not None:
+            self._progress(first, max(self.last, first))
+        levels = solve_levels(
+            self.top, last, jmin=first, effects=self._effects, vectors=False, below_mhz=self._below_mhz
+        )
+        plain = levels.states.astype(np.float64)
+        spin = np.array([levels.multiplicity * self._weights(levels, one) for one in self.weights], dtype=float)
+        energies = lower = levels.energy_mhz
+        if self.semi_rigid:
+            energies, lower = trusted_energies_mhz(self.top, levels)
+        order = np.argsort(levels.rotational, kind="stable")
+        order = order[energies[order] <= self._below_mhz]
+        starts = np.searchsorted(levels.rotational[order], np.arange(first, last + 2))
+        for start, stop in itertools.pairwise(starts.tolist()):
+            here = order[start:stop]
+            kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
+            self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
+
+    def _weights(self, levels: Levels, one: SpinWeights) -> Ints:
+        """The weights of levels by one set; of several states by their own, where the set has the level's class at all."""
+        if "v" not in levels.quanta or self.top.states is None:
+            return weights_of_levels(levels, one)
+        total = np.zeros(len(levels), dtype=np.int64)
+        for v in range(self.top.states.count):
+            own = self.top.states.weights.get(v)
+            weights = weights_of_levels(levels, one if own is None else of_species(own, one))
+            total = np.where(levels.quanta["v"] == v, weights, total)
+        return total
+
+    def _lowest(self, s: int) -> tuple[float, int]:
+        """Energy in K and J of the lowest level that exists, among those of the J solved by then."""
+        while True:
+            self._solve_more()
+            found = [
+                (one.kelvin[one.spin[s] > 0].min(), j) for j, one in enumerate(self._by_j) if (one.spin[s] > 0).any()
+            ]
+            if found:
+                energy, j = min(found)
+                return float(energy), j
+
+
+def heaviest_component(weights: SpinWeights) -> float:
+    """The largest weight that one component of a level can have."""
+    if weights.rule == "irrep":
+        return max(value / DIMENSIONS[name[0]] for name, value in zip(weights.classes, weights.values, strict=True))
+    return float(max(weights.values))
+
+
+def _expanded(ladder: _Ladder, s: int, temperatures: Floats) -> Floats:
+    """Rows Q, U/RT, C_v/R, J max and three errors (7, n) of the classical limit with its corrections, from the ground level."""
+    limit = classical_limit(ladder.top, ladder.weights[s])
+    q, energy, cv = limit.corrected(temperatures)
+    below = ladder.ground[s][0] / temperatures
+    unsummed = np.full(len(temperatures), float(NOT_SUMMED))
+    return np.array([q * np.exp(below), energy - below, cv, unsummed, *limit.errors(temperatures)])
+
+
+def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, float], kinds: int) -> Floats:
+    """The same rows of the sum; each temperature leaves the loop at the J where its tail is small enough.
+
+    enough: the relative error asked for, and that of untrusted levels from which on there is no hope.
+    """
+    longest = ladder.longest
+    ground, ground_j = ladder.ground[s]
+    n = len(temperatures)
+    moments, doubts, tails = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, n))
+    before, jmax, going = np.zeros((3, n)), np.full(n, longest), np.arange(n)
+    for j in range(longest + 1):
+        shell, t = ladder.at(j), temperatures[going, None]
+        terms = _terms((shell.kelvin - ground) / t)
+        moments[:, going] += terms @ shell.spin[s]
+        if shell.lower is not None:
+            doubts[:, going] += np.abs(_terms((shell.lower - ground) / t) - terms) @ shell.spin[s]
+        smooth = ladder.heaviest[s] * (np.abs(terms) @ shell.plain)
+        tails[:, going], before[:, going] = _tail(smooth, before[:, going]), smooth
+        if j < max(3, ground_j + 2):
+            continue
+        if not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min():  # the series has turned over
+            tails[:, going] = ENDLESS
+            break
+        errors = relative_errors(moments[:, going], tails[:, going])[:kinds]
+        done = errors.max(axis=0) < enough[0]
+        done |= doubts[0, going] > enough[1] * moments[0, going]
+        jmax[going[done]] = j
+        going = going[~done]
+        if not len(going):
+            break
+    mean, square = moments[1] / moments[0], moments[2] / moments[0]
+    return np.array([moments[0], mean, square - mean**2, jmax, *relative_errors(moments, tails + doubts)])
+
+
+def _terms(x: Floats) -> Floats:
+    """e⁻ˣ, x e⁻ˣ and x² e⁻ˣ of energies over kT, stacked."""
+    x = np.clip(x, LOWEST_X, HIGHEST_X)
+    return np.asarray(np.exp(-x) * np.array([np.ones_like(x), x, x * x]))
+
+
+def _tail(terms: Floats, before: Floats) -> Floats:
+    """What follows the last of terms that fall at least as fast as a geometric series, t r/(1 - r); endless while they grow."""
+    falls = terms < before
+    tail = terms * (terms / np.where(falls, before - terms, 1.0))
+    return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
+
+
+def relative_errors(moments: Floats, tails: Floats) -> Floats:
+    """Relative errors (3, n) of Q, U and C_v, from moments of x and what may be missing of them, (3, n).
+
+    To first order in the tails t: δ⟨x⟩ ≤ (t₁ + ⟨x⟩ t₀)/Q and δC ≤ (t₂ + 2⟨x⟩ t₁ + |2⟨x⟩² - ⟨x²⟩| t₀)/Q. Nothing left out of
+    nothing is no error.
+    """
+    q = moments[0]
+    mean, square = moments[1] / q, moments[2] / q
+    t0, t1, t2 = tails / q
+    absolute = np.array([t0, t1 + mean * t0, t2 + 2 * mean * t1 + np.abs(2 * mean**2 - square) * t0])
+    values = np.array([np.ones_like(q), mean, square - mean**2])
+    ratio = np.full_like(absolute, np.inf)
+    np.divide(absolute, values, out=ratio, where=values > 0)
+    return np.where(absolute == 0, 0.0, ratio)

@@ -1,0 +1,196 @@
+"""The rotational partition function Q(T) at one temperature or many, with how it was found and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.table import Table
+from rotor.thermodynamics.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
+from rotor.thermodynamics.spin_factor import without_spins
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class PartitionFunction:
+    """Q at one temperature: the value, the J it was summed to, its estimated relative error, how it was found.
+
+    jmax: None where no sum was made.
+    """
+
+    temperature_k: float
+    q: float
+    jmax: int | None
+    relative_error: float
+    source: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartitionFunctions(Table):
+    """Q at n temperatures, every array (n,); `[i]` and a loop give each as a `PartitionFunction`.
+
+    jmax: the J that Q was summed to, -1 where the classical limit with corrections was taken. relative_error: estimated.
+    source: in words.
+    """
+
+    temperature_k: Floats
+    q: Floats
+    jmax: Ints
+    relative_error: Floats
+    source: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __getitem__(self, i: int) -> PartitionFunction:
+        j = int(self.jmax[i])
+        last = None if j == NOT_SUMMED else j
+        return PartitionFunction(
+            float(self.temperature_k[i]), float(self.q[i]), last, float(self.relative_error[i]), self.source[i]
+        )
+
+    def __iter__(self) -> Iterator[PartitionFunction]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How each sum came, in words, and how many there are."""
+        return {"source": list(self.source), "rows": len(self)}
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Temperature, Q, J max and error by name."""
+        names = ("temperature_k", "q", "jmax", "relative_error")
+        return {name: getattr(self, name) for name in names}
+
+
+@overload
+def partition_function(
+    top: Top, temperature_k: float, relative_error: float = 1e-6, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> PartitionFunction: ...
+
+
+@overload
+def partition_function(
+    top: Top,
+    temperature_k: Sequence[float] | Floats,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> PartitionFunctions: ...
+
+
+def partition_function(
+    top: Top,
+    temperature_k: float | Sequence[float] | Floats,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> PartitionFunction | PartitionFunctions:
+    """Q(T) of a top: one for a number, a table of arrays for a list or an array of temperatures.
+
+    Summed over levels until the tail is below `relative_error` of it, or, where the sum would be long and that is as
+    good, the classical limit with its corrections; see `rotor.thermodynamics.level_sums`.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    temperature_k : float or (n,) array
+        One temperature or many.
+    relative_error : float, optional
+        Asked of Q.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    PartitionFunction or PartitionFunctions
+        Q with J max, error and source. The error is larger than what was asked where levels count that the distortion
+        constants do not serve.
+
+    Raises
+    ------
+    ValueError
+        For an error above 10 %, and for a temperature not above 0 K.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("B=57635.968 MHz")
+    >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
+    (108.79, [3.97, 108.79])
+    """
+    found = partition_functions(top, temperature_k, relative_error, effects)
+    return found if np.ndim(temperature_k) else found[0]
+
+
+def partition_functions(
+    top: Top,
+    temperatures_k: ArrayLike,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    *,
+    refuse: bool = True,
+    progress: Progress | None = None,
+) -> PartitionFunctions:
+    """Q at several temperatures from one set of levels; see `partition_function`.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    temperatures_k : (n,) array
+        Above 0 K.
+    relative_error : float, optional
+        Asked of Q.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+    refuse : bool, optional
+        False gives sums with an error above 10 % too, for a caller that looks at the errors.
+    progress : callable, optional
+        Called as `progress(j, last)` whenever more levels are solved; see `level_sums`.
+
+    Returns
+    -------
+    PartitionFunctions
+        (n,) arrays of Q, J max and error, with the source of each.
+
+    Raises
+    ------
+    ValueError
+        For an error above 10 %, unless `refuse` is False, and for a temperature not above 0 K.
+    """
+    temperatures = checked_temperatures(temperatures_k)
+    weights = [top.spin_weights]
+    spinless, factor = without_spins(top, effects)
+    settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
+    if factor == 1:
+        sums = level_sums(top, weights, temperatures, relative_error, effects=spinless, **settings)[0]
+    else:  # from the lowest level that spins split, as energies of levels count
+        from rotor.thermodynamics.spin_sums import spin_sums
+
+        sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]
+    return PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+
+
+def _sources(sums: LevelSums, relative_error: float) -> tuple[str, ...]:
+    """How each Q was found, and its error: the one asked for, or the larger one that was reached."""
+    rows = zip(sums.jmax.tolist(), sums.error_q.tolist(), strict=True)
+    return tuple(
+        f"{_means(j)}, relative error {f'below {relative_error:g}' if error <= relative_error else f'about {error:.0e}'}"
+        for j, error in rows
+    )
+
+
+def _means(jmax: int) -> str:
+    return "classical with corrections" if jmax == NOT_SUMMED else f"summed from levels to J = {jmax}"

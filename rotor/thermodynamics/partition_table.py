@@ -1,0 +1,68 @@
+"""Q(T) of a top beside its classical limit, as plain records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.thermodynamics.classical_limit import classical_partition_function
+from rotor.thermodynamics.level_sums import AT_WORST, Progress, refusal
+from rotor.thermodynamics.partition import PartitionFunction, partition_function, partition_functions
+from rotor.thermodynamics.spin_factor import spin_functions
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+_KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
+
+
+def partition_facts(
+    top: Top, partition: PartitionFunction, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> dict[str, Any]:
+    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md; both count the spins of the effects."""
+    return {
+        "temperature_k": partition.temperature_k,
+        "q": partition.q,
+        "classical": spin_functions(top, effects) * classical_partition_function(top, partition.temperature_k),
+        "jmax": partition.jmax,
+        "relative_error": partition.relative_error,
+        "source": partition.source,
+    }
+
+
+def partition_table(
+    top: Top, temperatures_k: Sequence[float], progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Q summed and classical at each temperature; where there is no sum, `q` is None and `source` says why.
+
+    >>> from rotor.tops.top import Top
+    >>> [round(row["q"], 2) for row in partition_table(Top.from_constants("B=57635.968 MHz"), [10.0, 300.0])]
+    [3.97, 108.79]
+    """
+    try:
+        found = partition_functions(top, temperatures_k, refuse=False, progress=progress)
+        return [_unless_refused(partition_facts(top, one)) for one in found]
+    except ValueError:  # levels of one of them cannot be solved: each for itself
+        return [_row_alone(top, temperature) for temperature in temperatures_k]
+
+
+def _unless_refused(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts of one temperature, without a sum whose error is too large for it to mean anything."""
+    if facts["relative_error"] <= AT_WORST:
+        return facts
+    return _without_sum(facts, refusal(facts["temperature_k"], facts["relative_error"]))
+
+
+def _row_alone(top: Top, temperature_k: float) -> dict[str, Any]:
+    try:
+        return partition_facts(top, partition_function(top, temperature_k))
+    except ValueError as error:
+        known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
+        return _without_sum(known, str(error))
+
+
+def _without_sum(facts: dict[str, Any], reason: str) -> dict[str, Any]:
+    unknown = {"q": None, "jmax": None, "relative_error": None, "source": reason}
+    return {name: unknown.get(name, facts.get(name)) for name in _KEYS}

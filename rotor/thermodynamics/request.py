@@ -1,0 +1,135 @@
+"""A request for thermodynamic functions of rotation, and what answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from rotor.checks import require_positive, require_top
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.table import TextOf
+from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
+from rotor.thermodynamics.classical_onset import classical_above_if_known
+from rotor.thermodynamics.functions import (
+    ThermoFunctions,
+    refuse_species_of_totals,
+    species_names,
+    thermodynamic_functions,
+)
+from rotor.thermodynamics.level_sums import Progress
+from rotor.thermodynamics.vibration import VibrationalStates
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+TEMPERATURES_K = (
+    5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0, 298.15, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1000.0,
+)  # fmt: skip
+CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
+
+
+@dataclass(frozen=True)
+class ThermoRequest:
+    """Thermodynamic functions to compute; every field is checked when the request is made.
+
+    temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None leaves
+    vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass.
+    relative_error: of Q, U and C_v. effects: what the Hamiltonian consists of, spins among it where Q is to count them.
+    """
+
+    top: Top
+    temperatures_k: Sequence[float] = TEMPERATURES_K
+    species: str = "equilibrium"
+    vibrations: VibrationalStates | None = None
+    pressure_bar: float | None = None
+    relative_error: float = 1e-6
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+
+    def __post_init__(self) -> None:
+        require_top(self.top)
+        if not len(self.temperatures_k):
+            raise ValueError("temperatures_k: expected at least one temperature")
+        for temperature in self.temperatures_k:
+            require_positive("temperatures_k", temperature, "K")
+        require_positive("relative_error", self.relative_error)
+        known = species_names(self.top)
+        if self.species not in known:
+            only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
+            raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
+        refuse_species_of_totals(self.top, self.species, self.effects)
+        if self.pressure_bar is not None:
+            require_positive("pressure_bar", self.pressure_bar, "bar")
+            if self.top.mass_u is None:
+                raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
+
+
+@dataclass(frozen=True, repr=False)
+class ThermoAnswer(TextOf):
+    """The functions that a request asked for, and what follows from the top."""
+
+    shown = "functions"
+
+    request: ThermoRequest
+    functions: ThermoFunctions
+
+    @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """What the Hamiltonian consists of, further states of the top among it."""
+        asked = self.request.effects
+        return effects_of(self.request.top, hyperfine=False) if asked == SEMI_RIGID else asked
+
+    @cached_property
+    def classical_above_k(self) -> float | None:
+        """The temperature above which the heat capacity is classical within 1 %; None where no sum over levels reaches so far."""
+        return classical_above_if_known(self.request.top, CLASSICAL_TOLERANCE)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        functions = self.functions
+        top, limit = functions.top, classical_limit(functions.top)
+        gas, vibrations = functions.gas, functions.vibrations
+        return {
+            **top_facts(top),
+            "rotational_temperatures_k": rotational_temperatures_k(top),
+            "classical_above_k": self.classical_above_k,
+            "classical_tolerance": CLASSICAL_TOLERANCE,
+            "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d, "e_per_k2": limit.e},
+            "species": functions.species,
+            "species_known": species_names(top),
+            "fractions": dict(functions.fractions),
+            "symmetry_number_counted": functions.symmetry_number,
+            "spin_factor": functions.spin_factor,
+            "jmax": int(functions.jmax.max()),
+            "relative_error": float(functions.relative_error.max()),
+            "vibrations": vibrations.text if vibrations is not None else None,
+            "pressure_bar": gas.pressure_bar if gas is not None else None,
+            "hyperfine": functions.hyperfine,
+            **limit_facts(top, populated_j(top, float(functions.temperature_k.max())), self.effects),
+        }
+
+
+def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> ThermoAnswer:
+    """The functions of a request; ValueError where a sum over levels gives no answer. progress: see `level_sums`.
+
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_thermo(ThermoRequest(Top.from_constants("B=10 cm-1"), (300.0,)))
+    >>> round(float(answer.functions.cv_over_r[0]), 4)  # 1 + (Θ/T)²/45
+    1.0001
+    """
+    functions = thermodynamic_functions(
+        request.top,
+        request.temperatures_k,
+        species=request.species,
+        vibrations=request.vibrations,
+        pressure_bar=request.pressure_bar,
+        relative_error=request.relative_error,
+        progress=progress,
+        effects=request.effects,
+    )
+    return ThermoAnswer(request, functions)

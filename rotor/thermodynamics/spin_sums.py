@@ -1,0 +1,197 @@
+"""Sums over levels that spins split: level by level where the splittings matter, as a product where they do not.
+
+    Q = Σ_rot e^(-E/kT) Σ_F (2F+1) e^(-δ_F/kT),      Σ_F (2F+1) δ_F = 0 of a traceless coupling,
+
+so that with x = δ/kT of the largest splitting Q is Π(2I+1) Q_rot to x²/2 of itself, and U/RT and C_v/R are those of the rotation to x²:
+C_v has the x² of a Schottky anomaly. Where that is more than was asked, the split levels are summed themselves. Energies count from the
+lowest split level at every temperature. With an unpaired electron the split levels are always summed (`spin_factor`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.estimates.limits import populated_j
+from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.solve import solve_levels
+from rotor.thermodynamics.level_sums import LevelSums, Progress, level_sums, lowest_level_k
+from rotor.thermodynamics.spin_factor import without_spins
+from rotor.tops.spins.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+_NONE_OF_J_0 = {
+    "nuclear quadrupole",
+    "spin-rotation",
+    "hyperfine method",
+}  # effects that shift J = 0 in second order alone
+
+
+@dataclass(frozen=True)
+class SpinSums:
+    """Sums of each set of spin weights, and how they were made.
+
+    splitting_mhz: the largest size of the couplings. split: (n,) temperatures at which split levels were summed.
+    """
+
+    sums: list[LevelSums]
+    splitting_mhz: float
+    split: NDArray[np.bool_]
+
+
+def spin_sums(
+    top: Top,
+    weights: Sequence[SpinWeights],
+    temperatures_k: Floats,
+    relative_error: float,
+    effects: Sequence[QuantumEffect],
+    progress: Progress | None = None,
+    *,
+    energies: bool = True,
+    refuse: bool = True,
+) -> SpinSums:
+    """Q, U/RT and C_v/R of levels with spins for each of several sets of spin weights.
+
+    Parameters
+    ----------
+    top : Top
+    weights : sequence of SpinWeights
+    temperatures_k : (n,) array
+        Above 0 K.
+    relative_error : float
+        Asked of Q, U and C_v.
+    effects : sequence of QuantumEffect
+        What the Hamiltonian consists of, spins among it.
+    progress : callable, optional
+    energies : bool
+    refuse : bool
+        As in `level_sums`.
+
+    Returns
+    -------
+    SpinSums
+
+    Raises
+    ------
+    ValueError
+        As `level_sums` does.
+    """
+    spinless, functions = without_spins(top, effects)
+    size = splitting_mhz(top, effects, float(temperatures_k.max()))
+    plainly: dict[str, Any] = {"progress": progress, "energies": energies, "refuse": refuse}
+    settings = plainly | {"effects": effects}
+    if functions == 1:
+        found = level_sums(top, weights, temperatures_k, relative_error, **settings)
+        return SpinSums(found, size, np.ones(len(temperatures_k), dtype=np.bool_))
+    rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
+    ground = _lowest_split_k(top, weights, rotation, effects, size, relative_error / 10)
+    product = [times_functions(one, functions, lowest, size) for one, lowest in zip(rotation, ground, strict=True)]
+    split = np.any(
+        [
+            _worst(one, energies) > _worst(plain, energies) + relative_error
+            for one, plain in zip(product, rotation, strict=True)
+        ],
+        axis=0,
+    )
+    if not split.any():
+        return SpinSums(product, size, split)
+    summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)
+    return SpinSums([_placed(one, split, own) for one, own in zip(product, summed, strict=True)], size, split)
+
+
+def _lowest_split_k(
+    top: Top,
+    weights: Sequence[SpinWeights],
+    rotation: list[LevelSums],
+    effects: Sequence[QuantumEffect],
+    size_mhz: float,
+    share: float,
+) -> list[float]:
+    """E/k of the lowest split level by each set of weights.
+
+    That of J = 0 and 1 where no rigid level of J = 2 is within twice the size of the couplings of the ground level; of J = 0 alone
+    where it exists and none of J = 1 is. J = 0 has a shift of second order in χ and C alone, V²/ΔE; below `share` of kT it is left out.
+    """
+    ground_mhz, least = max(one.ground_k for one in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
+    reach = ground_mhz + 2 * size_mhz
+    if top.states is not None or len(weights) > 1 or 6 * least < reach:
+        return lowest_level_k(top, weights, effects)
+    alone = 2 * least > max(reach, 2 * ground_mhz)
+    coldest_mhz = rotation[0].temperatures_k.min() * units.MHZ_PER_K
+    second_order = {effect.name for effect in effects if effect.spins(top)} <= _NONE_OF_J_0
+    if alone and second_order and size_mhz**2 / (2 * least) < share * coldest_mhz:
+        return [rotation[0].ground_k]
+    levels = solve_levels(top, 0 if alone else 1, effects=tuple(effects), vectors=False)
+    exists = weights_of_levels(levels, weights[0]) > 0
+    return [float(levels.energy_mhz[exists].min()) / units.MHZ_PER_K]
+
+
+def splitting_mhz(top: Top, effects: Sequence[QuantumEffect], temperature_k: float) -> float:
+    """The sizes of all couplings of spins, added, at the J that is the most populated one."""
+    j = max(populated_j(top, temperature_k), 1)
+    return sum(effect.size_mhz(top, j) for effect in effects if effect.spins(top))
+
+
+def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_mhz: float) -> LevelSums:
+    """The sums without spins times their functions, from the lowest split level, with what the splittings may change.
+
+    Parameters
+    ----------
+    rotation : LevelSums
+        Without spins.
+    functions : int
+        Π(2I+1).
+    ground_k : float
+        The lowest split level over k.
+    size_mhz : float
+        The largest splitting.
+
+    Returns
+    -------
+    LevelSums
+    """
+    above, x2 = (rotation.ground_k - ground_k) / rotation.temperatures_k, _squared(size_mhz, rotation.temperatures_k)
+    energy = rotation.energy_over_rt + above
+    with np.errstate(divide="ignore", over="ignore"):  # where the rotation is frozen, all of C_v is that of the spins
+        return replace(
+            rotation,
+            ground_k=ground_k,
+            q=functions * rotation.q * np.exp(-above),
+            energy_over_rt=energy,
+            error_q=rotation.error_q + x2 / 2,
+            error_energy=rotation.error_energy + _over(x2, energy),
+            error_cv=rotation.error_cv + _over(x2, rotation.cv_over_r),
+        )
+
+
+def _squared(size_mhz: float, temperatures_k: Floats) -> Floats:
+    return np.asarray((size_mhz / (units.MHZ_PER_K * temperatures_k)) ** 2)
+
+
+def _over(x2: Floats, value: Floats) -> Floats:
+    """What splittings may change, over a function; nothing where there are none."""
+    return np.asarray(np.divide(x2, value, out=np.zeros_like(x2), where=x2 > 0))
+
+
+def _worst(sums: LevelSums, energies: bool) -> Floats:
+    errors = [sums.error_q, sums.error_energy, sums.error_cv]
+    return np.asarray(np.max(errors if energies else errors[:1], axis=0))
+
+
+def _placed(whole: LevelSums, where: NDArray[np.bool_], some: LevelSums) -> LevelSums:
+    """The sums with others at some of the temperatures."""
+    columns = {}
+    for name in ("q", "energy_over_rt", "cv_over_r", "jmax", "error_q", "error_energy", "error_cv"):
+        columns[name] = getattr(whole, name).copy()
+        columns[name][where] = getattr(some, name)
+    return replace(whole, **columns)
