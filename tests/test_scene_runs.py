@@ -347,11 +347,10 @@ def test_a_killed_sweep_goes_on(folder):
 
 
 HEAVY = ("rotor.fluids", "rotor.alignment", "rotor.fitting", "rotor.structures", "rotor.classical", "rotor.classical.gas",
-"rotor.spectra.raman",
-         "rotor.classical.effects.drag", "rotor.classical.effects.rolling", "rotor.spectra.emission", "rotor.quantum.effects.stark",
+         "rotor.spectra.raman", "rotor.classical.effects.drag", "rotor.classical.effects.rolling",
+         "rotor.spectra.emission", "rotor.quantum.effects.stark",
          "rotor.quantum.effects.zeeman", "rotor.quantum.spins.blocks", "rotor.spectra", "rotor.thermodynamics.functions",
-         "matplotlib", "ase",
-         "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask")  # fmt: skip
+         "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask")  # fmt: skip
 LOADED = {  # of HEAVY, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermodynamics.functions"},
     "levels": set(),
