@@ -1,0 +1,1 @@
+"""Functions labelled by quantum numbers, and the elements of operators between them."""

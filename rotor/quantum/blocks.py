@@ -1,0 +1,216 @@
+"""The linear block Hamiltonian H_b(c) = Σ_i c_i O_i,b over labelled functions.
+
+Elements of every term are made once, from an operator algebra (`operators`) or by a writer of elements. Blocks are the connected parts of
+what the terms connect, so that symmetries need not be named. At any values c the blocks are summed and solved; a fit is the same blocks at
+other values, a field strength is one of the c, and
+
+    ∂E/∂c_i = ⟨ψ|O_i|ψ⟩
+
+is one contraction with the eigenvectors. Eigenvectors keep their meaning without a phase convention: nothing here depends on it.
+
+A level is named by its block and its rank in it, and stands in all arrays at the row of that function of the block which has this rank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.elements import ROUND_OFF, Elements
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
+
+
+class Functions(Protocol):
+    """A set of labelled functions that operators have elements between."""
+
+    @property
+    def labels(self) -> Mapping[str, Ints]:
+        """Quantum numbers by name."""
+
+    def elements(self, operators: Sequence[Operator]) -> Elements:
+        """Elements of operators on their common pattern."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Blocks of one size: rows of their functions (blocks, size), and where their matrices stand in the flat array of all."""
+
+    functions: Ints
+    place: slice
+
+    @property
+    def size(self) -> int:
+        """Functions in one block."""
+        return int(self.functions.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBlocks:
+    """H_b(c) = Σ_i c_i O_i,b.
+
+    names: of the terms. labels: quantum numbers of the functions. rows, columns, values: elements (terms, entries) of the lower triangles
+    in the order of functions in a block. block, rank: (functions,) number of each function's block, and its place in it; -1 for functions
+    of blocks that are left out. stacks: the blocks by size.
+    """
+
+    names: tuple[str, ...]
+    labels: dict[str, Ints]
+    rows: Ints
+    columns: Ints
+    values: NDArray[Any]
+    block: Ints
+    rank: Ints
+    stacks: tuple[Stack, ...]
+    _position: Ints
+
+    def solve(self, coefficients: ArrayLike, lowest: int | None = None) -> SolvedBlocks:
+        """All blocks solved at coefficients (terms,); with `lowest` that many states of each block."""
+        states = [eigenstates(matrices, lowest) for matrices in self.matrices(coefficients)]
+        return SolvedBlocks(self, tuple(states))
+
+    def energies(self, coefficients: ArrayLike) -> Floats:
+        """Energies (functions,) at coefficients (terms,), without vectors; nan for blocks that are left out."""
+        energies = np.full(len(self.block), np.nan)
+        for stack, matrices in zip(self.stacks, self.matrices(coefficients), strict=True):
+            energies[stack.functions] = eigenvalues(matrices)
+        return energies
+
+    def matrices(self, coefficients: ArrayLike) -> list[NDArray[Any]]:
+        """The matrices (blocks, size, size) of each stack at coefficients (terms,), their lower triangles."""
+        flat = np.zeros(self.stacks[-1].place.stop if self.stacks else 0, dtype=self.values.dtype)
+        flat[self._position] = np.asarray(coefficients, dtype=float) @ self.values
+        return [flat[stack.place].reshape(-1, stack.size, stack.size) for stack in self.stacks]
+
+    @cached_property
+    def by_block(self) -> dict[int, slice]:
+        """Where the elements of each block stand: they are sorted by block."""
+        blocks = self.block[self.rows]
+        numbers, starts = np.unique(blocks, return_index=True)
+        stops = np.append(starts[1:], len(blocks))
+        return {int(n): slice(int(a), int(b)) for n, a, b in zip(numbers, starts, stops, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedBlocks:
+    """Linear blocks solved at some values: energies (blocks, n) and vectors (blocks, size, n) of each stack."""
+
+    linear: LinearBlocks
+    states: tuple[tuple[Floats, NDArray[Any]], ...]
+
+    @cached_property
+    def energies(self) -> Floats:
+        """Energies (functions,) at the row of the function of the same rank; nan for states that were not solved."""
+        energies = np.full(len(self.linear.block), np.nan)
+        for stack, (values, _) in zip(self.linear.stacks, self.states, strict=True):
+            energies[stack.functions[:, : values.shape[1]]] = values
+        return energies
+
+    def vectors(self, block: int) -> tuple[Ints, NDArray[Any]]:
+        """The rows of a block's functions, and its eigenvectors in columns."""
+        stack, place = self._places[block]
+        return self.linear.stacks[stack].functions[place], self.states[stack][1][place]
+
+    def slopes(self, levels: Ints) -> Floats:
+        """∂E/∂c (levels, terms) of the levels at these rows."""
+        linear = self.linear
+        slopes = np.zeros((len(levels), len(linear.names)))
+        blocks = linear.block[levels]
+        for block in np.unique(blocks).tolist():
+            chosen = np.flatnonzero(blocks == block)
+            _, vectors = self.vectors(block)
+            vectors = vectors[:, linear.rank[levels[chosen]]]
+            entries = linear.by_block.get(block)
+            if entries is None:
+                continue
+            rows, columns = linear.rank[linear.rows[entries]], linear.rank[linear.columns[entries]]
+            density = vectors[rows].conj() * vectors[columns]
+            density[rows != columns] *= 2
+            slopes[chosen] = (linear.values[:, entries] @ density).real.T
+        return slopes
+
+    @cached_property
+    def _places(self) -> dict[int, tuple[int, int]]:
+        block = self.linear.block
+        return {
+            int(number): (i, place)
+            for i, stack in enumerate(self.linear.stacks)
+            for place, number in enumerate(block[stack.functions[:, 0]].tolist())
+        }
+
+
+def linear_blocks(functions: Functions, terms: Mapping[str, Operator]) -> LinearBlocks:
+    """H_b(c) = Σ_i c_i O_i,b of named operators over a basis.
+
+    >>> from rotor.quantum.basis.labelled import Basis, rotation_labels
+    >>> from rotor.quantum.operators.rotation import j_x, j_y, j_z
+    >>> top = linear_blocks(Basis(rotation_labels(1)), {"A": j_z(2), "B": j_x() @ j_x(), "C": j_y() @ j_y()})
+    >>> top.energies([10.0, 6.0, 4.0]).round(9).tolist()  # 0, and B + C, A + C, A + B
+    [0.0, 14.0, 10.0, 16.0]
+    """
+    return blocks_of_elements(tuple(terms), functions.labels, functions.elements(list(terms.values())))
+
+
+def blocks_of_elements(
+    names: Sequence[str], labels: Mapping[str, Ints], elements: Elements, wanted: NDArray[np.bool_] | None = None
+) -> LinearBlocks:
+    """The connected parts of elements that are written already.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The terms.
+    labels : mapping of str to (n,) array
+        Quantum numbers of the functions; inside a block functions are in the order of these.
+    elements : Elements
+        Both triangles of Hermitian matrices.
+    wanted : (n,) array of bool, optional
+        Blocks without a wanted function are left out.
+
+    Returns
+    -------
+    LinearBlocks
+    """
+    count = elements.count
+    part = connected_parts(count, elements.rows, elements.columns)
+    present = np.ones(count, dtype=bool) if wanted is None else np.isin(part, part[wanted])
+    order = np.flatnonzero(present)
+    keys = [np.asarray(column)[order] for column in labels.values()]
+    order = order[np.lexsort([*keys[::-1], part[order]])]
+    numbers, starts, counts = np.unique(part[order], return_index=True, return_counts=True)
+    rank, size = np.full(count, -1), np.zeros(count, dtype=np.int64)
+    rank[order] = np.arange(len(order)) - np.repeat(starts, counts)
+    size[order] = np.repeat(counts, counts)
+    block = np.where(present, part, -1)
+    stacks, offsets, start = [], np.zeros(int(part.max(initial=0)) + 1, dtype=np.int64), 0
+    for width in np.unique(counts).tolist():
+        members = np.flatnonzero(counts == width)
+        stop = start + width * width * len(members)
+        offsets[numbers[members]] = np.arange(start, stop, width * width)
+        stacks.append(Stack(order[starts[members][:, None] + np.arange(width)], slice(start, stop)))
+        start = stop
+    lower = np.flatnonzero((rank[elements.rows] >= rank[elements.columns]) & present[elements.rows])
+    lower = lower[np.argsort(block[elements.rows[lower]], kind="stable")]
+    rows, columns, values = elements.rows[lower], elements.columns[lower], elements.values[:, lower]
+    if np.iscomplexobj(values) and np.abs(values.imag).max(initial=0.0) <= ROUND_OFF * np.abs(values).max(initial=0.0):
+        values = np.ascontiguousarray(values.real)
+    position = offsets[block[rows]] + size[rows] * rank[rows] + rank[columns]
+    return LinearBlocks(
+        tuple(names), {name: np.asarray(column) for name, column in labels.items()}, rows, columns, values, block, rank,
+        tuple(stacks), position,
+    )  # fmt: skip
+
+
+def connected_parts(count: int, rows: Ints, columns: Ints) -> Ints:
+    """The number of the connected part of each of `count` functions that elements connect."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

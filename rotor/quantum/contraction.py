@@ -1,0 +1,437 @@
+"""Solved parts as the basis of the next factor: coupled angular momenta, spins, and fields.
+
+A *space* is a set of sectors, each with a total angular momentum and energies, and tensor operators by reduced matrix elements between
+sectors. The eigenfunctions of linear blocks make a space (`contracted`); a space times a spin is a space again, with (Edmonds, Angular
+Momentum in Quantum Mechanics, 1957, eqs. 7.1.5, 7.1.6)
+
+    ⟨(a b)F|A^k·B^k|(a' b')F⟩ = (-1)^(a'+b+F) {F b a; k a' b'} ⟨a‖A‖a'⟩⟨b‖B‖b'⟩,
+    ⟨(a b)F‖[A^k1 × B^k2]^k‖(a' b')F'⟩ = √((2F+1)(2F'+1)(2k+1)) {a a' k1; b b' k2; F F' k} ⟨a‖A‖a'⟩⟨b‖B‖b'⟩,
+
+and in a field along z (eq. 5.4.1) ⟨F M|T^k_0|F' M⟩ = (-1)^(F-M) (F k F'; -M 0 M) ⟨F‖T^k‖F'⟩. Coupled terms and fields make linear blocks
+again, so that fits, fields and further spins need nothing else.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.elements import Elements, merged
+from rotor.quantum.basis.phases import with_real_phases
+from rotor.quantum.blocks import Functions, LinearBlocks, SolvedBlocks, blocks_of_elements, connected_parts
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.solvers.hermitian import eigenstates
+from rotor.quantum.wigner import nine_j, six_j, three_j
+
+NEGLIGIBLE = 1e-12  # of the largest element of an operator between two sectors: round-off of zero
+
+Pair = tuple[int, int]  # row and column of sectors
+
+
+@dataclass(frozen=True, eq=False)
+class Sector:
+    """States with one total angular momentum, twice which is `twice_j`: energies (n,), and labels that name their origin."""
+
+    twice_j: int
+    energies: Floats
+    labels: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.energies)
+
+
+@dataclass(frozen=True, eq=False)
+class Tensor:
+    """A tensor operator of a rank: reduced matrix elements by pairs of sectors."""
+
+    rank: int
+    blocks: Mapping[Pair, NDArray[Any]]
+
+
+class Entry(NamedTuple):
+    """factor · A ⊗ B between two sectors of a product, A and B being shared by all total angular momenta."""
+
+    factor: float
+    first: NDArray[Any]
+    second: NDArray[Any]
+
+    def matrix(self) -> NDArray[Any]:
+        """The product written out."""
+        if self.second.shape == (1, 1):
+            return np.asarray(self.factor * self.second[0, 0] * self.first)
+        return np.asarray(self.factor * np.kron(self.first, self.second))
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Sectors, and tensors between them by name."""
+
+    sectors: tuple[Sector, ...]
+    tensors: Mapping[str, Tensor]
+
+    def __len__(self) -> int:
+        return sum(len(sector) for sector in self.sectors)
+
+    @property
+    def unit(self) -> Tensor:
+        """The unit operator as a tensor of rank 0: ⟨F‖1‖F⟩ = √(2F+1)."""
+        return Tensor(0, {(i, i): np.sqrt(s.twice_j + 1) * np.eye(len(s)) for i, s in enumerate(self.sectors)})
+
+    def starts(self) -> Ints:
+        """Row of the first state of each sector, and the number of all states."""
+        return np.cumsum([0, *[len(sector) for sector in self.sectors]])
+
+    def labels(self) -> dict[str, Ints]:
+        """Twice the total angular momentum, sector and rank of each state."""
+        sizes = [len(sector) for sector in self.sectors]
+        return {
+            "twice_j": np.repeat([sector.twice_j for sector in self.sectors], sizes),
+            "sector": np.repeat(np.arange(len(sizes)), sizes),
+            "rank": np.concatenate([np.arange(size) for size in sizes]),
+        }
+
+
+def contracted(solved: SolvedBlocks, functions: Functions, tensors: Mapping[str, tuple[int, Operator]]) -> Space:
+    """The eigenfunctions of linear blocks as a space.
+
+    Parameters
+    ----------
+    solved : SolvedBlocks
+        Blocks of one J each, over functions with a label J.
+    functions : Functions
+        The functions of the blocks.
+    tensors : mapping of str to (int, Operator)
+        Rank and operator of each tensor; the operator gives reduced elements.
+
+    Returns
+    -------
+    Space
+        One sector for each block, in the order of their numbers.
+    """
+    elements = {name: (rank, functions.elements([operator])) for name, (rank, operator) in tensors.items()}
+    return contracted_elements(solved, elements)
+
+
+def contracted_elements(solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]]) -> Space:
+    """The same, of reduced elements that are written already."""
+    linear = solved.linear
+    present = [int(n) for n in np.unique(linear.block) if n >= 0]
+    number = {block: i for i, block in enumerate(present)}
+    states = [solved.vectors(block) for block in present]
+    sectors = []
+    for block, (rows, vectors) in zip(present, states, strict=True):
+        energies = solved.energies[rows[: vectors.shape[1]]]
+        labels = {"block": block, "functions": rows[: vectors.shape[1]]}
+        sectors.append(Sector(2 * int(linear.labels["J"][rows[0]]), energies, labels))
+    reduced = {
+        name: Tensor(rank, _between_blocks(linear, states, number, elements))
+        for name, (rank, elements) in tensors.items()
+    }
+    return Space(tuple(sectors), reduced)
+
+
+def _between_blocks(
+    linear: LinearBlocks, states: Sequence[tuple[Ints, NDArray[Any]]], number: Mapping[int, int], elements: Elements
+) -> dict[Pair, NDArray[Any]]:
+    """V† O V of each pair of blocks that an operator connects."""
+    rows, columns, values = elements.rows, elements.columns, elements.values[0]
+    kept = (linear.block[rows] >= 0) & (linear.block[columns] >= 0)
+    rows, columns, values = rows[kept], columns[kept], values[kept]
+    pair = linear.block[rows] * (int(linear.block.max()) + 1) + linear.block[columns]
+    order = np.argsort(pair, kind="stable")
+    bounds = np.flatnonzero(np.diff(pair[order], prepend=-1, append=-1))
+    blocks = {}
+    for start, stop in pairwise(bounds.tolist()):
+        entries = order[start:stop]
+        up = number[int(linear.block[rows[entries[0]]])]
+        low = number[int(linear.block[columns[entries[0]]])]
+        left, right = states[up][1], states[low][1]
+        matrix = np.zeros((len(left), len(right)), dtype=values.dtype)
+        matrix[linear.rank[rows[entries]], linear.rank[columns[entries]]] = values[entries]
+        blocks[up, low] = left.conj().T @ (matrix @ right)
+    return blocks
+
+
+def spin_space(twice_i: int, name: str = "") -> Space:
+    """A spin: one state, with the tensors "I" + name and, for I ≥ 1, "Q" + name = [I × I]² / 2I(2I-1) (see `spin_quadrupole`).
+
+    >>> float(spin_space(2).tensors["I"].blocks[0, 0][0, 0] ** 2)  # I(I+1)(2I+1)
+    6.000000000000001
+    """
+    i = twice_i / 2
+    tensors = {"I" + name: Tensor(1, {(0, 0): np.full((1, 1), np.sqrt(i * (i + 1) * (2 * i + 1)))})}
+    if twice_i > 1:
+        tensors["Q" + name] = Tensor(2, {(0, 0): np.full((1, 1), spin_quadrupole(twice_i))})
+    return Space((Sector(twice_i, np.zeros(1)),), tensors)
+
+
+def spin_quadrupole(twice_i: int) -> float:
+    """⟨I‖T²(I, I)‖I⟩/(2I(2I-1)), so that T²(χ)·T²(I, I)/(2I(2I-1)) = I·χ·I/(2I(2I-1)), the quadrupole coupling.
+
+    T²_0(I, I) = (3 I_z² - I²)/√6 in the state M = I, over the 3j symbol of eq. 5.4.1.
+    """
+    i = twice_i / 2
+    stretched = float(three_j(i, 2, i, -i, 0, i))
+    return float((3 * i * i - i * (i + 1)) / np.sqrt(6) / stretched / (2 * i * (2 * i - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledSpace:
+    """A product of two spaces by total angular momentum, its scalar terms not yet solved.
+
+    space: the product functions with the tensors that were carried along, written out when asked for. terms: of each scalar product the
+    entries of the lower triangle of sectors.
+    """
+
+    sectors: tuple[Sector, ...]
+    terms: Mapping[str, Mapping[Pair, Entry]]
+    tensors: Mapping[str, tuple[int, Mapping[Pair, Entry]]]
+
+    def linear(self) -> LinearBlocks:
+        """Linear blocks of the energies before coupling ("energy") and of the coupled terms."""
+        space = Space(self.sectors, {})
+        start, count = space.starts(), len(space)
+        diagonal = np.arange(count)
+        energies = np.concatenate([sector.energies for sector in self.sectors])
+        names = ["energy", *self.terms]
+        pieces = [(diagonal, diagonal, 0, energies)]
+        for i, entries in enumerate(self.terms.values(), 1):
+            for (a, b), entry in entries.items():
+                matrix = entry.matrix()
+                r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(matrix).max(initial=0.0))
+                pieces.append((start[a] + r, start[b] + c, i, matrix[r, c]))
+                if a != b:
+                    pieces.append((start[b] + c, start[a] + r, i, matrix[r, c].conj()))
+        return blocks_of_elements(
+            names, space.labels(), with_real_phases(_elements(count, len(names), pieces)).elements
+        )
+
+    def solve(self, coefficients: Mapping[str, float], lowest: int | None = None) -> Space:
+        """The space of eigenfunctions of the energies plus Σ c_i (A_i·B_i)."""
+        parts = _connected_sectors(len(self.sectors), self.terms)
+        states, where = _solved_parts(self, parts, coefficients, lowest)
+        tensors = {name: Tensor(rank, _moved(entries, states, where)) for name, (rank, entries) in self.tensors.items()}
+        return Space(tuple(sector for sector, _ in states), tensors)
+
+
+def _elements(count: int, terms: int, pieces: Iterable[tuple[Ints, Ints, int, NDArray[Any]]]) -> Elements:
+    """Elements of pieces (rows, columns, number of the term, values)."""
+    rows, columns, term, values = zip(*pieces, strict=True)
+    number = np.repeat(term, [len(piece) for piece in rows])
+    joined = np.concatenate(values)
+    table = np.zeros((terms, len(joined)), dtype=joined.dtype)
+    table[number, np.arange(len(joined))] = joined
+    return merged(count, np.concatenate(rows), np.concatenate(columns), table)
+
+
+def coupled(
+    first: Space,
+    second: Space,
+    scalars: Mapping[str, tuple[str, str]],
+    carried: Mapping[str, tuple[str | None, str | None, int]],
+    totals: Sequence[int],
+    allowed: Callable[[Sector, Sector], bool] = lambda a, b: True,
+) -> CoupledSpace:
+    """The product of two spaces, coupled to the doubled total angular momenta `totals`.
+
+    Parameters
+    ----------
+    first, second : Space
+        Factors.
+    scalars : mapping of str to (str, str)
+        Scalar products A·B: the name of each term, and those of A and B.
+    carried : mapping of str to (str or None, str or None, int)
+        Tensors [A × B]^k of the product for later use: A, B (None: the unit operator) and k.
+    totals : sequence of int
+        Twice the total angular momenta.
+    allowed : callable, optional
+        Whether the product of two sectors exists: the statistics of like nuclei.
+
+    Returns
+    -------
+    CoupledSpace
+    """
+    sectors: list[Sector] = []
+    rows: dict[Pair, dict[int, int]] = {}
+    for (i, a), (j, b) in product(enumerate(first.sectors), enumerate(second.sectors)):
+        if not allowed(a, b):
+            continue
+        rows[i, j] = {}
+        for total in totals:
+            if (
+                abs(a.twice_j - b.twice_j) <= total <= a.twice_j + b.twice_j
+                and (a.twice_j + b.twice_j - total) % 2 == 0
+            ):
+                rows[i, j][total] = len(sectors)
+                energies = (a.energies[:, None] + b.energies).ravel()
+                sectors.append(Sector(total, energies, {"factors": (i, j)}))
+    terms = {}
+    for name, (left, right) in scalars.items():
+        terms[name] = _scalar(first, second, first.tensors[left], second.tensors[right], rows)
+    tensors = {}
+    for name, (one, other, rank) in carried.items():
+        left_tensor = first.tensors[one] if one else first.unit
+        right_tensor = second.tensors[other] if other else second.unit
+        tensors[name] = rank, _product(first, second, left_tensor, right_tensor, rank, rows)
+    return CoupledSpace(tuple(sectors), terms, tensors)
+
+
+def _pairs(
+    first: Tensor, second: Tensor, rows: Mapping[Pair, Mapping[int, int]]
+) -> Iterable[tuple[Pair, Pair, NDArray[Any], NDArray[Any]]]:
+    """(bra sectors, ket sectors, A, B) of all products of blocks of two tensors."""
+    for (a, c), left in first.blocks.items():
+        for (b, d), right in second.blocks.items():
+            if (a, b) in rows and (c, d) in rows:
+                yield (a, b), (c, d), left, right
+
+
+def _scalar(
+    first: Space, second: Space, left: Tensor, right: Tensor, rows: Mapping[Pair, Mapping[int, int]]
+) -> dict[Pair, Entry]:
+    """A·B in the coupled functions (Edmonds 7.1.6), the lower triangle of sectors."""
+    places, numbers, factors = [], [], []
+    for bra, ket, a, b in _pairs(left, right, rows):
+        j = [first.sectors[bra[0]].twice_j, second.sectors[bra[1]].twice_j,
+             first.sectors[ket[0]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
+        for total, row in rows[bra].items():
+            column = rows[ket].get(total)
+            if column is not None and column <= row:
+                places.append((row, column))
+                numbers.append((total, j[1], j[0], 2 * left.rank, j[2], j[3], (j[2] + j[1] + total) // 2))
+                factors.append((a, b))
+    if not places:
+        return {}
+    twice = np.array(numbers)
+    symbols = six_j(*(twice[:, :6].T / 2)) * np.where(twice[:, 6] % 2, -1.0, 1.0)
+    return {
+        place: Entry(symbol, a, b)
+        for place, symbol, (a, b) in zip(places, symbols.tolist(), factors, strict=True)
+        if symbol
+    }
+
+
+def _product(
+    first: Space, second: Space, left: Tensor, right: Tensor, rank: int, rows: Mapping[Pair, Mapping[int, int]]
+) -> dict[Pair, Entry]:
+    """[A × B]^k in the coupled functions (Edmonds 7.1.5)."""
+    places, numbers, factors = [], [], []
+    for bra, ket, a, b in _pairs(left, right, rows):
+        j = [first.sectors[bra[0]].twice_j, first.sectors[ket[0]].twice_j,
+             second.sectors[bra[1]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
+        for total, row in rows[bra].items():
+            for other, column in rows[ket].items():
+                if abs(total - other) <= 2 * rank <= total + other:
+                    places.append((row, column))
+                    numbers.append(
+                        [[j[0], j[1], 2 * left.rank], [j[2], j[3], 2 * right.rank], [total, other, 2 * rank]]
+                    )
+                    factors.append((a, b))
+    if not places:
+        return {}
+    twice = np.array(numbers)
+    roots = np.sqrt((twice[:, 2, 0] + 1.0) * (twice[:, 2, 1] + 1) * (2 * rank + 1))
+    symbols = roots * nine_j(twice / 2)
+    return {
+        place: Entry(symbol, a, b)
+        for place, symbol, (a, b) in zip(places, symbols.tolist(), factors, strict=True)
+        if symbol
+    }
+
+
+def _connected_sectors(count: int, terms: Mapping[str, Mapping[Pair, Entry]]) -> list[list[int]]:
+    """Sectors that the terms connect."""
+    pairs = np.array([pair for entries in terms.values() for pair in entries], dtype=np.int64).reshape(-1, 2)
+    members: dict[int, list[int]] = defaultdict(list)
+    for sector, part in enumerate(connected_parts(count, pairs[:, 0], pairs[:, 1]).tolist()):
+        members[part].append(sector)
+    return list(members.values())
+
+
+def _solved_parts(
+    space: CoupledSpace, parts: Sequence[Sequence[int]], coefficients: Mapping[str, float], lowest: int | None
+) -> tuple[list[tuple[Sector, NDArray[Any]]], dict[int, tuple[int, slice]]]:
+    """Sectors of eigenfunctions with their vectors, and (part, rows) of each sector of the product."""
+    where: dict[int, tuple[int, slice]] = {}
+    matrices: list[NDArray[Any]] = []
+    for number, part in enumerate(parts):
+        start = 0
+        for sector in part:
+            where[sector] = number, slice(start, start + len(space.sectors[sector]))
+            start += len(space.sectors[sector])
+        matrices.append(np.diag(np.concatenate([space.sectors[sector].energies for sector in part])))
+    for name, value in coefficients.items():
+        for (a, b), entry in space.terms[name].items():
+            number, up = where[a]
+            matrix = value * entry.matrix()
+            if np.iscomplexobj(matrix) and not np.iscomplexobj(matrices[number]):
+                matrices[number] = matrices[number].astype(complex)
+            matrices[number][up, where[b][1]] += matrix
+    by_size: dict[tuple[int, bool], list[int]] = defaultdict(list)
+    for number, matrix in enumerate(matrices):
+        by_size[len(matrix), np.iscomplexobj(matrix)].append(number)
+    solved: dict[int, tuple[Sector, NDArray[Any]]] = {}
+    for numbers in by_size.values():
+        energies, vectors = eigenstates(np.stack([matrices[number] for number in numbers]), lowest)
+        for number, e, v in zip(numbers, energies, vectors, strict=True):
+            labels = {"sectors": tuple(parts[number])}
+            solved[number] = Sector(space.sectors[parts[number][0]].twice_j, e, labels), v
+    return [solved[number] for number in range(len(parts))], where
+
+
+def _moved(
+    entries: Mapping[Pair, Entry], states: Sequence[tuple[Sector, NDArray[Any]]], where: Mapping[int, tuple[int, slice]]
+) -> dict[Pair, NDArray[Any]]:
+    """V† T V over the eigenfunctions."""
+    blocks: dict[Pair, NDArray[Any]] = {}
+    for (a, b), entry in entries.items():
+        (up, rows), (low, columns) = where[a], where[b]
+        moved = states[up][1][rows].conj().T @ (entry.matrix() @ states[low][1][columns])
+        blocks[up, low] = blocks[up, low] + moved if (up, low) in blocks else moved
+    return blocks
+
+
+def in_field(space: Space, twice_m: int, components: Mapping[str, str]) -> LinearBlocks:
+    """A space in static fields along z: linear blocks of one M, a field strength being a coefficient.
+
+    Parameters
+    ----------
+    space : Space
+        Solved without fields.
+    twice_m : int
+        Twice the projection M.
+    components : mapping of str to str
+        Name of each term, and the tensor whose component along the field it is.
+
+    Returns
+    -------
+    LinearBlocks
+        Of the terms "energy" and `components`; H = energy + Σ field · T_0, signs as the tensors have them.
+    """
+    start, count = space.starts(), len(space)
+    projects = np.repeat([s.twice_j >= abs(twice_m) for s in space.sectors], np.diff(start))
+    diagonal = np.arange(count)
+    pieces: list[tuple[Ints, Ints, int, NDArray[Any]]] = [
+        (diagonal, diagonal, 0, np.concatenate([sector.energies for sector in space.sectors]))
+    ]
+    for number, name in enumerate(components.values(), 1):
+        tensor = space.tensors[name]
+        pairs = [pair for pair in tensor.blocks if min(space.sectors[p].twice_j for p in pair) >= abs(twice_m)]
+        if not pairs:
+            continue
+        up, low = (np.array([space.sectors[pair[side]].twice_j for pair in pairs]) for side in (0, 1))
+        m = twice_m / 2
+        factors = np.where((up - twice_m) // 2 % 2, -1.0, 1.0) * three_j(up / 2, tensor.rank, low / 2, -m, 0, m)
+        for (a, b), factor in zip(pairs, factors.tolist(), strict=True):
+            matrix = factor * tensor.blocks[a, b]
+            r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(tensor.blocks[a, b]).max(initial=0.0))
+            pieces.append((start[a] + r, start[b] + c, number, matrix[r, c]))
+    elements = with_real_phases(_elements(count, 1 + len(components), pieces)).elements
+    return blocks_of_elements(["energy", *components], space.labels(), elements, projects)

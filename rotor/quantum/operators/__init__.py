@@ -1,0 +1,1 @@
+"""Operators on labelled functions: an algebra of shift operators, and the factors that the terms of a Hamiltonian are built from."""

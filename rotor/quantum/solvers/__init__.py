@@ -1,0 +1,1 @@
+"""Eigenvalue solvers: they see matrices, never what these stand for."""

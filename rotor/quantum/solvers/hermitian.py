@@ -1,0 +1,54 @@
+"""Eigenvalues and eigenvectors of many Hermitian matrices of one size, by the solver that their shape calls for.
+
+| shape | solver |
+|---|---|
+| size 1 | the element itself |
+| small matrices, many of them | one stacked call |
+| large, and only the lowest few states wanted | LAPACK's relatively robust representations, for these states alone |
+| other | LAPACK's divide and conquer |
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+
+FEW = 0.34  # share of the states up to which computing these alone is faster
+LARGE = 100  # size from which it is
+
+
+def eigenstates(matrices: NDArray[Any], lowest: int | None = None) -> tuple[Floats, NDArray[Any]]:
+    """Energies (blocks, n), rising, and eigenvectors (blocks, size, n) in columns.
+
+    Parameters
+    ----------
+    matrices : (blocks, size, size) array
+        Hermitian; the lower triangles are read.
+    lowest : int, optional
+        How many of the lowest states of each matrix; all by default.
+
+    Returns
+    -------
+    energies, vectors : arrays
+        Of n = min(size, lowest) states.
+    """
+    size = matrices.shape[1]
+    count = size if lowest is None else min(size, lowest)
+    if size == 1:
+        return matrices[:, 0].real.copy(), np.ones_like(matrices)
+    if size < LARGE or count > FEW * size:
+        energies, vectors = np.linalg.eigh(matrices)
+        return energies[:, :count], vectors[:, :, :count]
+    from scipy.linalg import eigh
+
+    solved = [eigh(matrix, subset_by_index=(0, count - 1), driver="evr", check_finite=False) for matrix in matrices]
+    return np.stack([energies for energies, _ in solved]), np.stack([vectors for _, vectors in solved])
+
+
+def eigenvalues(matrices: NDArray[Any]) -> Floats:
+    """Energies (blocks, size), rising."""
+    return matrices[:, 0].real.copy() if matrices.shape[1] == 1 else np.linalg.eigvalsh(matrices)
