@@ -1,0 +1,90 @@
+"""Tables of species of the JPL and CDMS catalogues, catdir.cat: tag, name, number of lines, log10 Q at some temperatures.
+
+CDMS prints eleven temperatures from 1000 to 2.725 K and `0.0` where Q is unknown (0.0000 is log10 of 1); JPL prints seven from 300 to
+9.375 K and a version behind them (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998); C. P. Endres et al.,
+J. Mol. Spectrosc. 327, 95 (2016)).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotor.formats.packed import load
+from rotor.observed.partition import PartitionTable
+
+CDMS_K = (1000.0, 500.0, 300.0, 225.0, 150.0, 75.0, 37.5, 18.75, 9.375, 5.0, 2.725)
+JPL_K = (300.0, 225.0, 150.0, 75.0, 37.5, 18.75, 9.375)
+UNKNOWN = "0.0"
+_NUMBER = r"-?\d*\.\d+"
+_CDMS = re.compile(rf"\s*(\d+)\s+(\S.*?)\s+(\d+)((?:\s+{_NUMBER}){{11}})\s*$")
+_JPL = re.compile(rf"\s*(\d+)\s+(\S.*?)\s+(\d+)((?:\s*{_NUMBER}){{7}})\s*(\S*)\s*$")
+
+
+@dataclass(frozen=True)
+class CatdirEntry:
+    """A species: tag, name, number of lines, Q(T) where a temperature is known, and the database by its temperatures."""
+
+    tag: int
+    name: str
+    lines: int
+    partition: PartitionTable | None
+    database: str
+
+
+def read_catdir(source: str | os.PathLike[str] | bytes) -> dict[int, CatdirEntry]:
+    """Species by tag; ValueError with file and line for a line that is neither CDMS's nor JPL's.
+
+    >>> entries = read_catdir(b" 28001 CO    91 2.0369 1.9123 1.7370 1.4386 1.1429 0.8526 0.5733 4*\\n")
+    >>> entries[28001].name, round(entries[28001].partition.at(300.0), 2)
+    ('CO', 108.87)
+    """
+    text, name = load(source)
+    entries: dict[int, CatdirEntry] = {}
+    for number, line in enumerate(text.decode("latin-1").splitlines(), start=1):
+        if line.strip():
+            entry = _entry(line, f"{name}, line {number}")
+            entries[entry.tag] = entry
+    return entries
+
+
+def _entry(line: str, where: str) -> CatdirEntry:
+    for pattern, temperatures, database in ((_CDMS, CDMS_K, "CDMS"), (_JPL, JPL_K, "JPL")):
+        if match := pattern.match(line):
+            tag, name, count, values = match.group(1, 2, 3, 4)
+            return CatdirEntry(
+                int(tag),
+                name,
+                int(count),
+                _table(re.findall(_NUMBER, values), temperatures, f"{database} catdir"),
+                database,
+            )
+    raise ValueError(
+        f"{where}: expected tag, name, number of lines and log10 Q at 11 (CDMS) or 7 (JPL) temperatures: {line.strip()[:60]!r}"
+    )
+
+
+def _table(texts: list[str], temperatures: tuple[float, ...], source: str) -> PartitionTable | None:
+    known = [(t, 10.0 ** float(text)) for text, t in zip(texts, temperatures, strict=True) if text != UNKNOWN]
+    if not known:
+        return None
+    kelvin, q = np.array(sorted(known)).T
+    return PartitionTable(kelvin, q, source)
+
+
+def catdir_beside(path: Path) -> dict[int, CatdirEntry]:
+    """Species of the catdir files in the folder of a catalogue and the one above it; empty where there are none."""
+    entries: dict[int, CatdirEntry] = {}
+    for folder in (path.resolve().parent.parent, path.resolve().parent):
+        for file in sorted(folder.glob("catdir*.cat")):
+            entries |= read_catdir(file)
+    return entries
+
+
+def is_catdir(path: Path) -> bool:
+    """Whether a .cat file is a table of species, by its name."""
+    return path.name.lower().startswith("catdir")

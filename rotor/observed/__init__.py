@@ -1,0 +1,1 @@
+"""Observed spectra: LTE models of radio sources and gas cells, fits, line identification."""

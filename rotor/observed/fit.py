@@ -1,0 +1,393 @@
+"""LTE fits of observed spectra: least squares of brightness, its statistics, and what each component contributes.
+
+χ² = Σ (T_obs - T_model)²/σ² is made least by `rotor.statistics.least_squares`, in ln N, ln T, v, ln Δv, ln θ (`variables`). Standard
+errors follow from the noise of the channels, and are multiplied by √(χ²/(n - m)) where that is above 1 (the model is then not all there
+is). Frequencies and intensities of catalogues have errors of their own: a line whose frequency is off by δ shifts the model by
+δ ∂T/∂ν, which enters the noise as one more term, of the size of the catalogue's error (`catalogue_noise`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.observed.model import Component, Sight, model
+from rotor.observed.spectrum import KELVIN, ObservedSpectrum
+from rotor.observed.variables import DEFAULT_FREE, Variables, variables
+from rotor.statistics.least_squares import Iteration, Minimum, minimise
+from rotor.statistics.regression import Regression, regression
+from rotor.table import Table, counted
+
+NEEDED = 9.0  # gain in χ² for a component, beyond 2 for every parameter of its own
+
+
+@dataclass(frozen=True)
+class FitChoices:
+    """How a spectrum is fitted.
+
+    free, shared: parameters, see `variables`. fixed: parameters of single components that stay. calibration: relative error of the
+    intensity scale and of the catalogues' intensities, added to the noise as a fraction of the model. most_iterations: of the search.
+    """
+
+    free: tuple[str, ...] = DEFAULT_FREE
+    shared: tuple[str, ...] = ()
+    fixed: tuple[tuple[int, str], ...] = ()
+    calibration: float = 0.0
+    most_iterations: int = 60
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SourceFit(Table):
+    """A fitted source.
+
+    components: at the minimum. variables, values, statistics: of the search, the errors from the noise alone. spectrum, model_k: channels
+    that were fitted and the brightness of the model there. minimum: how the search ended. sight, choices, start: what it began with.
+    """
+
+    spectrum: ObservedSpectrum
+    components: tuple[Component, ...]
+    variables: Variables
+    values: Floats
+    statistics: Regression
+    minimum: Minimum
+    model_k: Floats
+    noise: Floats
+    sight: Sight
+    choices: FitChoices
+    start: tuple[Component, ...]
+
+    @property
+    def chi_squared(self) -> float:
+        """Σ (T_obs - T_model)²/σ²."""
+        return float(self.minimum.residuals @ self.minimum.residuals)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Channels less determined parameters."""
+        return len(self.spectrum) - self.statistics.rank
+
+    @property
+    def reduced_chi_squared(self) -> float:
+        """χ²/(n - m); nan without a degree of freedom."""
+        return self.chi_squared / self.degrees_of_freedom if self.degrees_of_freedom > 0 else math.nan
+
+    @property
+    def scale(self) -> float:
+        """Factor of the errors: √(χ²/(n - m)) where that is above 1."""
+        return math.sqrt(max(1.0, self.reduced_chi_squared)) if self.degrees_of_freedom > 0 else 1.0
+
+    @cached_property
+    def parameters(self) -> list[dict[str, Any]]:
+        """Every free parameter: name, value, error (symmetric, to first order), interval of 68 %, and whether it is determined."""
+        out = []
+        errors = self.statistics.errors * self.scale
+        for name, variable, value, error in zip(
+            self.variables.names(self.components),
+            self.variables.items,
+            self.values.tolist(),
+            errors.tolist(),
+            strict=True,
+        ):
+            centre = variable.back(value)
+            known = math.isfinite(error) and (not variable.logarithmic or error < 5.0)
+            low, high = (variable.back(value - error), variable.back(value + error)) if known else (math.nan, math.nan)
+            symmetric = (centre * error if variable.logarithmic else error) if known else math.inf
+            out.append(
+                {
+                    "name": name,
+                    "parameter": variable.name,
+                    "components": list(variable.components),
+                    "value": centre,
+                    "error": symmetric,
+                    "interval": (low, high),
+                    "determined": known,
+                }
+            )
+        return out
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The free parameters: name, value, error, low and high of the interval of 68 %."""
+        rows = self.parameters
+        table: dict[str, Any] = {key: np.array([row[key] for row in rows]) for key in ("name", "value", "error")}
+        for place, key in enumerate(("low", "high")):
+            table[key] = np.array([row["interval"][place] for row in rows])
+        return table
+
+    @property
+    def residuals_k(self) -> Floats:
+        """Observed less modelled brightness (n,)."""
+        return self.spectrum.intensity - self.model_k
+
+    def facts(self) -> dict[str, Any]:
+        """Everything but the arrays, as plain numbers, texts, lists and dictionaries."""
+        return {
+            "components": [component_facts(one) for one in self.components],
+            "parameters": [
+                {
+                    "name": row["name"],
+                    "value": row["value"],
+                    "error": row["error"] if row["determined"] else None,
+                    "low": row["interval"][0] if row["determined"] else None,
+                    "high": row["interval"][1] if row["determined"] else None,
+                }
+                for row in self.parameters
+            ],
+            "channels": len(self.spectrum),
+            "chi_squared": self.chi_squared,
+            "reduced_chi_squared": self.reduced_chi_squared,
+            "rms_k": float(np.sqrt(np.mean(self.residuals_k**2))),
+            "noise_k": float(np.median(self.spectrum.noise)),
+            "status": self.minimum.status,
+            "undetermined": [one.text for one in self.statistics.undetermined],
+        }
+
+
+def component_facts(component: Component) -> dict[str, Any]:
+    """The numbers of a component."""
+    names = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s", "size_arcsec", "layer")
+    return {"species": component.species.name, **{name: getattr(component, name) for name in names}}
+
+
+def fit_source(
+    spectrum: ObservedSpectrum,
+    components: Sequence[Component],
+    sight: Sight | None = None,
+    choices: FitChoices | None = None,
+    *,
+    progress: Callable[[Iteration], None] | None = None,
+) -> SourceFit:
+    """Column densities, temperatures, velocities and widths that describe a spectrum best, from a start.
+
+    Parameters
+    ----------
+    spectrum : ObservedSpectrum
+        In K, its continuum subtracted.
+    components : sequence of Component
+        The start; `start_values` makes one from the spectrum.
+    sight : Sight, optional
+        Background, beam, redshift, dust.
+    choices : FitChoices, optional
+    progress : callable, optional
+        Called with every iteration.
+
+    Returns
+    -------
+    SourceFit
+
+    Raises
+    ------
+    ValueError
+        For a spectrum in another unit, a component without a line in its range, and fewer channels than parameters.
+
+    Notes
+    -----
+    A minimum may be a local one; velocities must begin within a width of the lines.
+    """
+    sight, choices = sight or Sight(), choices or FitChoices()
+    _refuse(spectrum, components, sight)
+    free = variables(components, choices.free, choices.shared, choices.fixed)
+    if len(spectrum) <= len(free):
+        raise ValueError(f"{len(spectrum)} channels for {len(free)} parameters; fit fewer of them, or more channels")
+    noise = total_noise(spectrum, components, sight, choices)
+    minimum = minimum_of(spectrum, components, free, sight, noise, choices.most_iterations, progress)
+    best = free.applied(components, minimum.parameters)
+    seen = model(best, spectrum.frequency_mhz, sight)
+    return SourceFit(
+        spectrum=spectrum,
+        components=tuple(best),
+        variables=free,
+        values=minimum.parameters,
+        statistics=regression(minimum.jacobian, free.names(components)),
+        minimum=minimum,
+        model_k=seen.brightness_k,
+        noise=noise,
+        sight=sight,
+        choices=choices,
+        start=tuple(components),
+    )
+
+
+def minimum_of(
+    spectrum: ObservedSpectrum,
+    components: Sequence[Component],
+    free: Variables,
+    sight: Sight,
+    noise: Floats,
+    most_iterations: int = 60,
+    progress: Callable[[Iteration], None] | None = None,
+) -> Minimum:
+    """Where the search for the least χ² ends."""
+
+    def evaluate(values: Floats) -> tuple[Floats, Floats]:
+        now = free.applied(components, values)
+        seen = model(now, spectrum.frequency_mhz, sight, slopes=True)
+        assert seen.slopes is not None
+        return (spectrum.intensity - seen.brightness_k) / noise, free.jacobian(now, seen.slopes) / noise[:, None]
+
+    return minimise(
+        evaluate, free.values(components), most_iterations=most_iterations, progress=progress, tolerance=1e-3
+    )
+
+
+def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> None:
+    if spectrum.unit != KELVIN:
+        raise ValueError(
+            f"{spectrum.source or 'spectrum'}: in {spectrum.unit}; a fit needs brightness in K (`in_kelvin`)"
+        )
+    if not components:
+        raise ValueError("a fit needs a component")
+    first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
+    for one in components:
+        if not len(one.species.between(first, last)):
+            raise ValueError(
+                f"{one.species.name}: no lines from {first:.10g} to {last:.10g} MHz in {one.species.source or 'its list'}"
+            )
+
+
+def total_noise(
+    spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight, choices: FitChoices
+) -> Floats:
+    """Noise of the channels with the errors of calibration and of the catalogues' frequencies, at the start of a fit, (n,)."""
+    variance = spectrum.noise**2
+    if choices.calibration:
+        variance = variance + (choices.calibration * spectrum.intensity.clip(min=0.0)) ** 2
+    return np.sqrt(variance + catalogue_noise(components, spectrum.frequency_mhz, sight) ** 2)
+
+
+def catalogue_noise(components: Sequence[Component], grid_mhz: Floats, sight: Sight) -> Floats:
+    """What errors δ of catalogue frequencies do to the brightness: |∂T_B/∂ν| δ, (n,).
+
+    Every line is shifted by its own error; where lines overlap the shifted spectra differ by the sum, an upper bound.
+    """
+    if not any((one.species.error_mhz > 0).any() for one in components):
+        return np.zeros(len(grid_mhz))
+    shifted = [replace(one, species=_moved(one)) for one in components]
+    return np.asarray(
+        np.abs(model(shifted, grid_mhz, sight).brightness_k - model(components, grid_mhz, sight).brightness_k)
+    )
+
+
+def _moved(component: Component) -> Any:
+    """Lines at their frequencies plus their errors, of at most a third of a width each: farther off a line is not fitted at all."""
+    species = component.species
+    third = species.frequency_mhz * component.fwhm_km_s / 299792.458 / 3
+    moved = species.frequency_mhz + np.minimum(species.error_mhz, third)
+    order = np.argsort(moved, kind="stable")
+    return replace(species.where(order), frequency_mhz=moved[order])
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What a component does for a fit: gain of χ² (Δχ²) and whether it is needed; its upper limit where it is not.
+
+    signal: Δχ² of the component against the same fit without it. limit_per_cm2: column density below which it stays at 3 standard
+    deviations, at the temperature, velocity and width of the component; None where it is needed.
+    """
+
+    species: str
+    signal: float
+    needed: bool
+    limit_per_cm2: float | None
+
+
+def contributions(fit: SourceFit) -> list[Contribution]:
+    """Of every component, what the others, fitted again without it, do not explain."""
+    out = []
+    for k, component in enumerate(fit.components):
+        others = _without(fit, k)
+        residuals = (fit.spectrum.intensity - others) / fit.noise
+        signal = (float(residuals @ residuals) - fit.chi_squared) / fit.scale**2
+        own = sum(variable.components == (k,) for variable in fit.variables.items)
+        needed = signal > NEEDED + 2 * own
+        out.append(
+            Contribution(component.species.name, signal, needed, None if needed else upper_limit(fit, k, others))
+        )
+    return out
+
+
+def _without(fit: SourceFit, k: int) -> Floats:
+    """Brightness of the other components, fitted without component k."""
+    rest = [one for i, one in enumerate(fit.components) if i != k]
+    if not rest:
+        return np.zeros(len(fit.spectrum))
+    fixed = tuple((i - (i > k), name) for i, name in fit.choices.fixed if i != k)
+    free = variables(rest, fit.choices.free, fit.choices.shared, fixed)
+    minimum = minimum_of(fit.spectrum, rest, free, fit.sight, fit.noise, fit.choices.most_iterations)
+    return model(free.applied(rest, minimum.parameters), fit.spectrum.frequency_mhz, fit.sight).brightness_k
+
+
+def upper_limit(fit: SourceFit, k: int, others_k: Floats | None = None, deviations: float = 3.0) -> float:
+    """Column density of a component at which χ² is `deviations`² above its least value.
+
+    At the temperature with which the fit began (that of a species without lines means nothing), at the fitted velocity and width.
+    others_k: brightness (n,) of the other components, by default as they are in the fit.
+    """
+    if others_k is None:
+        others = [one for i, one in enumerate(fit.components) if i != k]
+        others_k = model(others, fit.spectrum.frequency_mhz, fit.sight).brightness_k if others else None
+    component = replace(fit.components[k], excitation_k=fit.start[k].excitation_k)
+    return limit_of(fit.spectrum, fit.noise * fit.scale, component, fit.sight, others_k, deviations)
+
+
+def limit_of(
+    spectrum: ObservedSpectrum,
+    noise: Floats,
+    component: Component,
+    sight: Sight | None = None,
+    others_k: Floats | None = None,
+    deviations: float = 3.0,
+) -> float:
+    """Upper limit of a column density from the residuals of a spectrum, see `upper_limit`."""
+    seen = sight or Sight()
+    left = spectrum.intensity if others_k is None else spectrum.intensity - others_k
+    thin = replace(component, column_per_cm2=1.0)
+    slope = model([thin], spectrum.frequency_mhz, seen, slopes=True).slopes
+    assert slope is not None
+    weighted = slope[0, 0] / noise
+    if not (squared := float(weighted @ weighted)) > 0:
+        raise ValueError(f"{component.species.name}: no line in the spectrum's range, so that nothing limits it")
+    best = max(float(weighted @ (left / noise)) / squared, 0.0)
+    first = best + deviations / math.sqrt(squared)
+    return _thick_limit(left, noise, thin, seen, spectrum, first, deviations)
+
+
+def _thick_limit(
+    left: Floats,
+    noise: Floats,
+    thin: Component,
+    sight: Sight,
+    spectrum: ObservedSpectrum,
+    first: float,
+    deviations: float,
+) -> float:
+    """The limit with saturation: the column at which χ² has risen above the least one over all columns."""
+
+    def chi_squared(column: float) -> float:
+        seen = model([replace(thin, column_per_cm2=column)], spectrum.frequency_mhz, sight).brightness_k
+        return float(np.sum(((left - seen) / noise) ** 2))
+
+    trials = first * np.geomspace(1e-3, 1e3, 49)
+    values = np.array([chi_squared(column) for column in trials])
+    least = min(float(np.sum((left / noise) ** 2)), float(values.min()))
+    above = np.flatnonzero(values - least <= deviations**2)
+    last = int(above[-1]) if len(above) else 0
+    if last == len(trials) - 1:
+        return math.inf
+    low, high = trials[last], trials[last + 1]
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if chi_squared(middle) - least <= deviations**2 else (low, middle)
+    return float(low)
+
+
+def fit_text(fit: SourceFit) -> str:
+    """A fit in a few lines, for notebooks."""
+    head = f"{counted(len(fit.components), 'component')}, {counted(len(fit.spectrum), 'channel')}, χ²/ν = {fit.reduced_chi_squared:.3g}"
+    return "\n".join([head, *(f"{row['name']}: {row['value']:.4g} ± {row['error']:.2g}" for row in fit.parameters)])

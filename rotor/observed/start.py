@@ -1,0 +1,180 @@
+"""Where a fit begins: velocity and width by correlation, temperatures and column densities by linear least squares.
+
+The spectrum is correlated with the thin spectrum of all species on a grid even in ln ν, where a velocity is a shift. At the best shift
+column densities that are not negative follow from linear least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares Problems,
+1974, chapter 23, as `scipy.optimize.nnls`) for each of a few temperatures, one species after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
+from rotor.observed.species import SpeciesLines
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.spectra.emission import planck_k
+
+TEMPERATURES_K = (10.0, 20.0, 40.0, 80.0, 160.0, 300.0)
+WIDTHS_KM_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+WIDEST_SHIFT_KM_S = 200.0
+_UNIT_COLUMN = 1e6  # thin for every line; templates are per column density
+_MIDDLE_K = 80.0
+_MOST_POINTS = 1 << 20
+
+
+def start_components(
+    spectrum: ObservedSpectrum,
+    species: Sequence[SpeciesLines],
+    sight: Sight | None = None,
+    *,
+    velocity_km_s: float | None = None,
+    fwhm_km_s: float | None = None,
+    excitation_k: float | None = None,
+    size_arcsec: float | None = None,
+) -> list[Component]:
+    """A component for each species, to begin a fit with.
+
+    Parameters
+    ----------
+    spectrum : ObservedSpectrum
+        In K.
+    species : sequence of SpeciesLines
+    sight : Sight, optional
+    velocity_km_s, fwhm_km_s, excitation_k : float, optional
+        Where they are known; otherwise estimated from the spectrum, one velocity and width for all species.
+    size_arcsec : float, optional
+        Of every component.
+
+    Returns
+    -------
+    list of Component
+        Of species that show nothing the column density is that of a third of the noise.
+    """
+    sight = sight or Sight()
+    velocity, width = velocity_and_width(spectrum, species, velocity_km_s, fwhm_km_s, sight)
+    kelvin = [one for one in TEMPERATURES_K if excitation_k is None] or [float(excitation_k or 0.0)]
+    templates = [thin_templates(spectrum, one, kelvin, velocity, width, sight) for one in species]
+    chosen, columns = best_temperatures(spectrum, templates)
+    out = []
+    for one, bank, t, column in zip(species, templates, chosen, columns, strict=True):
+        t = min(range(len(kelvin)), key=lambda i: abs(kelvin[i] - _MIDDLE_K)) if column == 0 else t
+        peak = float(
+            np.max(np.abs(bank[t] * spectrum.noise))
+        )  # templates are over the noise; peak in K per column density
+        floor = float(np.median(spectrum.noise)) / 3 / peak if peak > 0 else 1e12
+        temperature = float(np.clip(kelvin[t], *one.partition.range_k))
+        out.append(Component(one, max(float(column), floor), temperature, velocity, width, size_arcsec))
+    return out
+
+
+def thin_templates(
+    spectrum: ObservedSpectrum,
+    species: SpeciesLines,
+    temperatures_k: Sequence[float],
+    velocity: float,
+    width: float,
+    sight: Sight,
+) -> Floats:
+    """Thin brightness per column density over the noise, at each temperature, (t, n); 0 where Q(T) is not known."""
+    grid = spectrum.frequency_mhz * (1 + sight.redshift)
+    out = np.zeros((len(temperatures_k), len(grid)))
+    low, high = species.partition.range_k
+    for place, t in enumerate(temperatures_k):
+        if low <= t <= high or low == high:
+            depth = component_depth(Component(species, _UNIT_COLUMN, t, velocity, width), grid)[0]
+            out[place] = (
+                depth * (planck_k(grid, t) - planck_k(grid, sight.background_k)) / _UNIT_COLUMN / spectrum.noise
+            )
+    return out
+
+
+def best_temperatures(
+    spectrum: ObservedSpectrum, templates: Sequence[Floats], rounds: int = 2
+) -> tuple[list[int], Floats]:
+    """For each species the temperature with the least χ² while the others stay, and the column densities at the end."""
+    from scipy.optimize import nnls
+
+    data = spectrum.intensity / spectrum.noise
+    middle = len(templates[0]) // 2
+    chosen = [middle] * len(templates)
+    for _ in range(rounds):
+        for k, bank in enumerate(templates):
+            errors = []
+            for t in range(len(bank)):
+                matrix, norms = _unit_columns([templates[i][t if i == k else chosen[i]] for i in range(len(templates))])
+                errors.append(nnls(matrix, data)[1] if norms[k] > 0 else np.inf)
+            chosen[k] = int(np.argmin(errors))
+    matrix, norms = _unit_columns([bank[t] for bank, t in zip(templates, chosen, strict=True)])
+    return chosen, np.asarray(nnls(matrix, data)[0] / np.where(norms > 0, norms, 1.0))
+
+
+def _unit_columns(rows: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Templates as columns of unit length, and their lengths."""
+    matrix = np.array(rows).T
+    norms = np.linalg.norm(matrix, axis=0)
+    return matrix / np.where(norms > 0, norms, 1.0), norms
+
+
+def velocity_and_width(
+    spectrum: ObservedSpectrum,
+    species: Sequence[SpeciesLines],
+    velocity_km_s: float | None = None,
+    fwhm_km_s: float | None = None,
+    sight: Sight | None = None,
+) -> tuple[float, float]:
+    """Velocity and width (km/s) at which the spectrum correlates best with the lines of all species; what is given stays.
+
+    The correlation Σ T t/√(Σ t²) is the length of the spectrum along a template t of one width: the largest is the best fit.
+    """
+    if velocity_km_s is not None and fwhm_km_s is not None:
+        return velocity_km_s, fwhm_km_s
+    sight = sight or Sight()
+    step, grid, data = _even_in_log(spectrum)
+    widths = [one for one in WIDTHS_KM_S if one > 1.5 * step * KM_PER_S] or [3 * step * KM_PER_S]
+    widths = widths if fwhm_km_s is None else [fwhm_km_s]
+    reach = min(int(WIDEST_SHIFT_KM_S / (step * KM_PER_S)), len(grid) // 2)
+    shifts = np.arange(-reach, reach + 1)
+    if velocity_km_s is not None:
+        shifts = np.array([round(velocity_km_s / (step * KM_PER_S))])
+    best = (-np.inf, 0.0, widths[0])
+    for width in widths:
+        template = _template(grid * (1 + sight.redshift), species, width)
+        norm = float(np.linalg.norm(template))
+        if norm == 0:
+            continue
+        value = _correlation(data, template, shifts) / norm
+        place = int(np.argmax(value))
+        best = max(best, (float(value[place]), float(shifts[place] * step * KM_PER_S), width))
+    return (best[1] if velocity_km_s is None else velocity_km_s), best[2]
+
+
+def _even_in_log(spectrum: ObservedSpectrum) -> tuple[float, Floats, Floats]:
+    """Step in ln ν, frequencies and intensities over the noise on an even grid."""
+    x = np.log(spectrum.frequency_mhz)
+    step = max(float(np.median(np.diff(x))), (x[-1] - x[0]) / _MOST_POINTS)
+    even = np.arange(x[0], x[-1], step)
+    data = np.interp(even, x, spectrum.intensity / spectrum.noise)
+    gap = np.diff(x)[np.clip(np.searchsorted(x, even) - 1, 0, len(x) - 2)] > 4 * step
+    return step, np.exp(even), np.where(gap, 0.0, data)
+
+
+def _template(grid: Floats, species: Sequence[SpeciesLines], width: float) -> Floats:
+    """Thin spectra of all species at a middle temperature, each of the same length."""
+    total = np.zeros(len(grid))
+    for one in species:
+        t = float(np.clip(_MIDDLE_K, *one.partition.range_k))
+        depth = component_depth(Component(one, 1.0, t, 0.0, width), grid)[0]
+        length = float(np.linalg.norm(depth))
+        total += depth / length if length > 0 else 0.0
+    return total
+
+
+def _correlation(data: Floats, template: Floats, shifts: np.ndarray) -> Floats:
+    """Σ_n data(n) template(n + shift): a receding source has its lines at lower frequencies."""
+    from scipy.signal import correlate
+
+    full = correlate(template, data, mode="full", method="fft")
+    return np.asarray(full[len(data) - 1 + shifts])
