@@ -41,7 +41,7 @@ def test_blends_are_fitted_together_and_a_wrong_species_is_not_needed() -> None:
     species = [artificial(f"species {i}", rng, 100e3, 100.3e3) for i in range(3)]
     grid = np.arange(100e3, 100.3e3, 0.1)
     true = [
-        Component(one, 10.0**c, t, 2.0, 2.0) for one, c, t in zip(species[:2], (13.8, 13.5), (40.0, 120.0), strict=True)
+        Component(one, 10.0**c, t, 2.0, 2.0) for one, c, t in zip(species[:2], (14.6, 14.8), (40.0, 120.0), strict=True)
     ]
     spectrum = injected(true, grid, 0.02, rng)
     fit = fit_source(
