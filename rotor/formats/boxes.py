@@ -12,16 +12,14 @@ if TYPE_CHECKING:
 
 def read_box(path: str | os.PathLike[str]) -> Atoms:
     """The last frame of a file, without its calculator; ValueError for what cannot be read and for a box without a cell."""
-    from ase.io import read
+    from rotor.molecules.readers.ase_files import structures
 
     if not Path(path).is_file():
         raise ValueError(f"{path}: no such file")
-    try:
-        atoms: Any = read(Path(path))
-    except Exception as error:  # ASE's readers fail with any class
-        raise ValueError(f"{path}: cannot be read as a box of atoms ({str(error) or type(error).__name__})") from error
-    if atoms is None:
+    frames = structures(Path(path), "-1")
+    if not frames:
         raise ValueError(f"{path}: no structure in it; give a file with a box of atoms")
+    atoms: Any = frames[-1]
     atoms.calc = None
     if not atoms.pbc.any():
         raise ValueError(f"{path}: has no cell that repeats; a box has one (in extended xyz, Lattice and pbc)")

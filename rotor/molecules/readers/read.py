@@ -115,20 +115,16 @@ def _output_without_cclib(path: Path) -> Molecule:
 
 def _read_with_ase(path: Path) -> Molecule:
     """The last structure of a file in one of ASE's formats (of an optimisation that is the optimised one)."""
-    import ase.io
+    from rotor.molecules.readers.ase_files import structures
 
-    try:
-        structures = ase.io.read(path, index=":")
-    except Exception as reason:  # ASE's readers fail with any class; all mean that the file is not what it should be
-        why = str(reason).strip().splitlines()[0] if str(reason).strip() else type(reason).__name__
-        raise ValueError(f"{path}: ASE cannot read it ({why}); give an xyz, mol or sdf file") from reason
-    if not structures:
+    frames = structures(path)
+    if not frames:
         raise ValueError(f"{path}: no structure in it; give a file with one")
     try:
-        molecule = from_ase(structures[-1])
+        molecule = from_ase(frames[-1])
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
-    several = (f"{path} holds {len(structures)} structures: the last one was taken",) if len(structures) > 1 else ()
+    several = (f"{path} holds {len(frames)} structures: the last one was taken",) if len(frames) > 1 else ()
     return replace(molecule, source=f"{path}, read with ASE", notes=(*several, *molecule.notes))
 
 
