@@ -96,7 +96,7 @@ def test_other_models_and_a_file_without_velocities(call, folder):
         (("water", "--molecules", "8", "--cutoff", "3", "--resume"), "name the checkpoint"),
         (("open.xyz",), "open.xyz: has no cell that repeats"),
         (("overlap.xyz", "--csv", "a.csv", "--cutoff", "4"), "on top of each other"),
-        (("text.xyz",), "text.xyz: cannot be read as a box of atoms"),
+        (("text.xyz",), "give a box of atoms in extended xyz"),
     ],
 )
 def test_mistakes_are_one_line_and_nothing_is_written(call, folder, arguments, said):

@@ -16,7 +16,7 @@ def read_box(path: str | os.PathLike[str]) -> Atoms:
 
     if not Path(path).is_file():
         raise ValueError(f"{path}: no such file")
-    frames = structures(Path(path), "-1")
+    frames = structures(Path(path), "-1", "give a box of atoms in extended xyz, with Lattice and pbc")
     if not frames:
         raise ValueError(f"{path}: no structure in it; give a file with a box of atoms")
     atoms: Any = frames[-1]

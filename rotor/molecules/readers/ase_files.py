@@ -23,7 +23,7 @@ _SERVERS = ("mysql", "postgresql")  # formats that ASE reads from a database ser
 _LOOPS_AT_END = ("cp2k-restart",)  # readers that wait for a closing word beyond the end of the file
 
 
-def structures(path: Path, index: str = ":") -> list[Atoms]:
+def structures(path: Path, index: str = ":", remedy: str = "give an xyz, mol or sdf file") -> list[Atoms]:
     """The structures of a file in one of ASE's formats.
 
     Parameters
@@ -32,6 +32,8 @@ def structures(path: Path, index: str = ":") -> list[Atoms]:
         An existing file, in a format that ASE knows by its suffix, name or first bytes.
     index : str, optional
         Which of them, in ASE's notation: all, or `"-1"` the last.
+    remedy : str, optional
+        What the error of an unreadable file says would do.
 
     Returns
     -------
@@ -57,7 +59,7 @@ def structures(path: Path, index: str = ":") -> list[Atoms]:
             return _read(str(readable), kind, index)
     except Exception as reason:  # ASE's readers fail with any class; all mean that the file is not what it should be
         why = str(reason).strip().splitlines()[0] if str(reason).strip() else type(reason).__name__
-        raise ValueError(f"{path}: ASE cannot read it ({why}); give an xyz, mol or sdf file") from reason
+        raise ValueError(f"{path}: ASE cannot read it ({why}); {remedy}") from reason
 
 
 def _read(source: Any, kind: str, index: str) -> list[Atoms]:
