@@ -52,7 +52,7 @@ level energies with six. "Same text" are lines that agree in all 80 characters.
 |---|---|---|---|---|---|---|---|
 """
 SPINS = """
-With spins and several states, in the exact basis of the program (`as_spcat`: no K above its KNMAX), F and v in the labels:
+With spins and several states, in the basis of the files (no K above KNMAX), F and v in the labels:
 
 | case | what | lines | same text | worst Δν, MHz | worst ΔLGINT | worst ΔE″, cm⁻¹ | levels | worst ΔE, cm⁻¹ |
 |---|---|---|---|---|---|---|---|---|
@@ -169,7 +169,7 @@ def q_row_of(case: str, folder: Path, ours: Prediction) -> str:
 def page(shared: Path) -> str:
     """The whole page."""
     folders = {case: shared / "reference" / "spcat" / case for case in (*CASES, *COUPLED, DOUBLETS)}
-    found = {case: predict_file(folder / f"{case}.int", as_spcat=case not in CASES) for case, folder in folders.items()}
+    found = {case: predict_file(folder / f"{case}.int") for case, folder in folders.items()}
     first = "".join(f"| {case} | {row_of(case, folders[case], found[case])}" for case in CASES)
     spins = "".join(f"| {case} | {what} | {row_of(case, folders[case], found[case])}" for case, what in COUPLED.items())
     states = doublets(folders[DOUBLETS], found[DOUBLETS])

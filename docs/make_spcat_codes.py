@@ -100,7 +100,7 @@ KNMIN, KNMAX, sign and digits of SPIND, sign of NVIB, signs of couplings, weight
 tests/oracles/kinds, and 14 of each of 19 kinds of published files with other random constants, with 48 more of the terms of l-doubled
 states and of linear and spherical tops. Before repairs 29 more differed or were refused: quantum numbers of a spinless file whose SPIND has
 the other sign, a linear molecule in the oblate basis, a dipole of a spherical top, constants that do not follow A ≥ B ≥ C, parameters of
-spins that SPIND does not name (left out with `--as-spcat`, with a note), DIAG below 0 (refused with `--as-spcat`), .egy lists of 10,000
+spins that SPIND does not name (left out, with a note), DIAG below 0 (refused with `--as-spcat`), .egy lists of 10,000
 levels or of more than six quanta, line 2 whose full columns abut, CHR in apostrophes. Of the four variations of ch2cl2_2quad that have 1 to
 5 intensities off by 2e-4 to 1.3e-3 of LGINT each is equal in every line to the program in long double. A public file of ClONO2 (one spin
 3/2, chi_ab, N to 101; 79,032 lines) has 2,200 lines off between levels that coincide, the program in long double 1,516 and with fused
@@ -292,7 +292,7 @@ def option_rows() -> list[str]:
         ("SPIND: up to nine spins, two digits each with a last 0", "a 3520 1 0 20 0 1 1 1 0 1 0"),
         ("SPIND: a digit 1 before others, a spin of size 0", "a 161 1 0 20 0 1 1 1 0 1 0"),
         ("NVIB: states, each with an option line of its own where VSYM < 0", "a 1 3 0 20 0 1 1 1 0 1 0"),
-        ("KNMIN, KNMAX; above KNMAX K is left out with --as-spcat alone", "a 1 1 1 1 0 1 1 1 0 1 0"),
+        ("KNMIN, KNMAX; --full-basis lifts both, unless they are equal", "a 1 1 1 1 0 1 1 1 0 1 0"),
         *((f"IAX {n}", f"a 1 1 0 20 0 {n} 1 1 0 1 0") for n in range(1, 12)),
         *((f"IAX -{n} with two spins of one size: I_tot", f"a 22 1 0 20 0 -{n} 1 1 0 1 0") for n in (1, 2, 3)),
         ("IAX -6 with three spins of one size: I_tot", "a 222 1 0 20 0 -6 1 1 0 0 0"),

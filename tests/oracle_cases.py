@@ -73,8 +73,8 @@ def lines_of_case(case: dict[str, Any]) -> Lines:
 
 @cache
 def prediction(folder: Path) -> Prediction:
-    """What the case's .int and .var predict; of spins and states with K above KNMAX left out, as the program does."""
-    return predict_file(folder / f"{folder.name}.int", as_spcat=folder.name in COUPLED)
+    """What the case's .int and .var predict."""
+    return predict_file(folder / f"{folder.name}.int")
 
 
 def read_case(folder: Path) -> dict[str, Any]:

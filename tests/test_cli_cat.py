@@ -41,7 +41,7 @@ def test_options_that_the_files_answer_are_refused_and_silences_told(call, tmp_p
     (tmp_path / "so2.var").write_text(text.replace("a 1 1 0 60 ", "a 1 1 0 20 "))
     code, _, err = call("spectrum", "so2.int", "--top", "0")
     assert code == 0
-    assert err.startswith("note: KNMAX = 20 is below FEND = 60")
+    assert err.startswith("note: KNMAX = 20 of state 0: as the file says, other K are left out")
     (tmp_path / "so2.var").unlink()
     assert call("spectrum", "so2.int")[0] == 2
 

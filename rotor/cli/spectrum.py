@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +37,7 @@ from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
+    from rotor.formats.spcat.text.egy import LevelList
     from rotor.spectra.lines import Lines
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
@@ -75,7 +78,10 @@ class Options:
         None, metavar="D", help="Show components of one rotational line that are closer (MHz) as one line."
     )
     as_spcat: bool = option(
-        False, "--as-spcat", help="Of an .int file: K above KNMAX is left out of the basis, as SPCAT leaves it out."
+        False, "--as-spcat", help="Of an .int file: SPCAT's own numbers also where the program errs (notes say where)."
+    )
+    full_basis: bool = option(
+        False, "--full-basis", help="Of an .int file: every K is in the basis, whatever KNMIN and KNMAX say."
     )
     top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
     tag: int = option(0, metavar="N", help="Tag of the species in --cat.")
@@ -125,7 +131,7 @@ def command(
     _refuse_profile_without_file(settings, files)
     hitran = _hitran_numbers(outputs, settings["temperature_k"])
 
-    prediction = spcat.prediction_asked(context, given.source, options.as_spcat)
+    prediction = spcat.prediction_asked(context, given.source, options.as_spcat, options.full_basis)
     if prediction is None and outputs.egy is not None:
         raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
     with inputs.fields_as_options(**NAMES):
@@ -148,7 +154,10 @@ def command(
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
-        writers |= _program_files(prediction, content, str(given.source), options.as_spcat, files)
+        levels = partial(
+            _levels, prediction, str(given.source), as_spcat=options.as_spcat, full_basis=options.full_basis
+        )
+        writers |= _program_files(prediction, content, levels, files)
     deliver(
         files,
         writers,
@@ -238,13 +247,13 @@ def _why_none(answer: SpectrumAnswer, range_text: str | None = None) -> str:
 
 
 def _program_files(
-    prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool, files: Files
+    prediction: Prediction, content: dict[str, Any], levels: Callable[[], LevelList], files: Files
 ) -> dict[str, Writer]:
     """How the files are written that SPCAT writes itself: the catalogue, and the levels where they are asked for."""
     writers = {"--cat": _program_catalogue(prediction, content)}
     if "--egy" in files.paths:
         with answering():
-            writers["--egy"] = _program_levels(prediction, content, source, as_spcat)
+            writers["--egy"] = _program_levels(prediction, content, levels())
     return writers
 
 
@@ -262,14 +271,18 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
     return write
 
 
-def _program_levels(prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool) -> Writer:
-    """What writes the levels as SPCAT lists them; they are computed here, before any file is begun."""
-    from rotor.formats.provenance import record_of, write_beside
+def _levels(prediction: Prediction, source: str, **basis: bool) -> LevelList:
+    """The levels as SPCAT lists them."""
     from rotor.formats.spcat.predict import levels_of_file
-    from rotor.formats.spcat.text.egy import write_egy
 
-    found = prediction.levels
-    levels = levels_of_file(source, as_spcat=as_spcat) if found is None else found
+    listed = prediction.levels
+    return levels_of_file(source, **basis) if listed is None else listed
+
+
+def _program_levels(prediction: Prediction, content: dict[str, Any], levels: LevelList) -> Writer:
+    """What writes the levels as SPCAT lists them; they are computed before any file is begun."""
+    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.spcat.text.egy import write_egy
 
     def write(path: Path) -> None:
         """The file, with what it was made from."""

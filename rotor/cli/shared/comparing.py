@@ -39,7 +39,9 @@ class CompareOptions:
         None, metavar="1=2H", help="Another isotope of the molecule to predict, by atom number or element; repeatable."
     )
     as_spcat: bool = option(
-        False, "--as-spcat", help="OTHER, an .int, is predicted with its KNMAX as SPCAT takes it, see rotor spectrum."
+        False,
+        "--as-spcat",
+        help="OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum.",
     )
 
     @property

@@ -49,18 +49,17 @@ def is_request(source: str | None) -> bool:
     return source is not None and source.lower().endswith(".int")
 
 
-def prediction_asked(context: typer.Context, source: str | None, as_spcat: bool) -> Prediction | None:
+def prediction_asked(context: typer.Context, source: str | None, as_spcat: bool, full_basis: bool) -> Prediction | None:
     """The prediction of an .int file, None for any other source."""
     if is_request(source):
-        return prediction_of(context, str(source), as_spcat)
-    if as_spcat:
-        raise ValueError(
-            "--as-spcat: what SPCAT leaves out of its basis stands in an .int and a .var file; give the .int"
-        )
+        return prediction_of(context, str(source), as_spcat, full_basis)
+    if as_spcat or full_basis:
+        option = "--as-spcat" if as_spcat else "--full-basis"
+        raise ValueError(f"{option}: expected with an .int file, which SPCAT reads with the .var beside it")
     return None
 
 
-def prediction_of(context: typer.Context, source: str, as_spcat: bool) -> Prediction:
+def prediction_of(context: typer.Context, source: str, as_spcat: bool, full_basis: bool) -> Prediction:
     """The prediction of an .int file; its notes go to standard error. Options that the files answer themselves are refused."""
     for name, field in FIELDS.items():
         given = context.get_parameter_source(name)
@@ -71,7 +70,7 @@ def prediction_of(context: typer.Context, source: str, as_spcat: bool) -> Predic
             )
     from rotor.formats.spcat.predict import predict_file
 
-    prediction = predict_file(source, as_spcat=as_spcat)
+    prediction = predict_file(source, as_spcat=as_spcat, full_basis=full_basis)
     for text in prediction.notes:
         note(text)
     return with_names(prediction, Path(source))

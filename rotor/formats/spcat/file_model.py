@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, of_their_spins
+from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, with_their_spins
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, coded_lines, real_ones
@@ -23,7 +23,7 @@ from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
-from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.states import EVERY_K, StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
     SpeciesPairs,
     forbidden,
@@ -44,8 +44,6 @@ from rotor.tops.top import Top
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-_EVERY_K = 10**6
-
 
 @dataclass(frozen=True)
 class Group:
@@ -58,7 +56,7 @@ class Group:
     top: Top
     effect: FileEffect
     oblate: bool
-    axial_kmax: int = _EVERY_K
+    axial_kmax: int = EVERY_K
     diag: int = 0
 
     @property
@@ -133,23 +131,35 @@ def line_names(file: ParameterFile) -> tuple[str, ...]:
     return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
-def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> list[Group]:
-    """The groups of connected states, by their lowest numbers.
+def groups_of(
+    file: ParameterFile,
+    intensities: IntensityFile,
+    *,
+    as_spcat: bool = False,
+    full_basis: bool = False,
+    highest_n: int | None = None,
+) -> list[Group]:
+    """The groups of connected states, by their lowest numbers; the basis has K from KNMIN to KNMAX.
 
-    as_spcat: K beyond KNMAX is left out of the basis, as SPCAT does; else every K to N is in it, unless KNMIN = KNMAX.
+    as_spcat: moments are those that SPCAT computes where it errs. full_basis: the basis has every K to N, unless KNMIN = KNMAX, where K
+    is a quantum number of the state, such as l. highest_n: of the levels to be solved, so that a larger KNMAX is not looked at.
     """
     states = states_of(file)
+    if full_basis:
+        states = tuple(state.with_every_k() for state in states)
+    elif highest_n is not None:
+        states = tuple(state.with_k_to(highest_n) for state in states)
     first = file.options[0]
     doubled = pairs_of(states)
-    members, oblate = _members(doubled), first.nvib < 0
+    members, oblate = members_of_pairs(doubled), first.nvib < 0
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     phases = phases_of(file, len(states), members)
-    own_axes = _within_states(dipoles, others, states, members)
+    own_axes = moments_within_states(dipoles, others, states, members)
     phases = with_dipoles(phases, own_axes, oblate, as_spcat and bool(phases.odd))
     lines = _acting(file, states, doubled, phases.odd)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
-    lines = of_their_spins(lines, states, as_spcat)[0]
+    lines = with_their_spins(lines, states)[0]
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
@@ -158,7 +168,7 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
 
 
 class Light(NamedTuple):
-    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `_within_states`.
+    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `moments_within_states`.
 
     Where no more electric moments within states are of odd order (a dipole, with TYP 0, 3, 4, ...) than of even order, the program
     takes each between two states times i.
@@ -171,7 +181,7 @@ class Light(NamedTuple):
     own_axes: list[tuple[int, bool]]
 
 
-def _within_states(
+def moments_within_states(
     dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], states: tuple[StateOptions, ...], members: frozenset[int]
 ) -> list[tuple[int, bool]]:
     """The axes of the electric moments within one state that join levels of one weight, and whether they are of even order."""
@@ -186,15 +196,15 @@ def _within_states(
     ]
 
 
-def left_out(file: ParameterFile, *, as_spcat: bool = False) -> list[str]:
-    """A sentence for every parameter that the declared symmetry forbids, and with `as_spcat` for one of spins that are not there."""
+def left_out(file: ParameterFile) -> list[str]:
+    """A sentence for every parameter that the declared symmetry forbids or whose spins SPIND does not name."""
     states = states_of(file)
     doubled = pairs_of(states)
-    lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), _members(doubled)).odd)
-    return reasons + (of_their_spins(lines, states, True)[1] if as_spcat else [])
+    lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), members_of_pairs(doubled)).odd)
+    return reasons + with_their_spins(lines, states)[1]
 
 
-def _members(doubled: list[Pair]) -> frozenset[int]:
+def members_of_pairs(doubled: list[Pair]) -> frozenset[int]:
     """The states of l-doubled pairs."""
     return frozenset(v for pair in doubled for v in pair)
 
@@ -204,7 +214,7 @@ def _acting(
 ) -> tuple[list[CodedLine], list[str]]:
     """The lines that symmetry allows and that are real where operators along some axes are odd, and why others are left out."""
     lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
-    lines, imaginary = real_ones(lines, odd, _members(doubled))
+    lines, imaginary = real_ones(lines, odd, members_of_pairs(doubled))
     return lines, forbidden + imaginary
 
 
@@ -315,7 +325,7 @@ def _group(
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
         kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
-    limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
+    limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states)
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
@@ -329,7 +339,7 @@ def _group(
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
-    kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
+    kmax = states[0].kmax if kind in ("prolate", "oblate") else EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
 
 
@@ -384,10 +394,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     return "asymmetric"
 
 
-def _limits(states: list[StateOptions], as_spcat: bool) -> dict[int, tuple[int, int]]:
-    found = {}
-    for place, state in enumerate(states):
-        kmax = state.kmax if as_spcat or state.kmin == state.kmax else _EVERY_K
-        if state.kmin > 0 or kmax < _EVERY_K:
-            found[place] = (state.kmin, kmax)
-    return found
+def _limits(states: list[StateOptions]) -> dict[int, tuple[int, int]]:
+    """KNMIN and KNMAX by the places of the states whose basis they cut."""
+    cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < EVERY_K]
+    return {place: (state.kmin, state.kmax) for place, state in cut}

@@ -17,20 +17,16 @@ from rotor.quantum.spins.operators import ByElements
 from rotor.quantum.spins.terms import Spin
 
 
-def of_their_spins(
-    lines: list[CodedLine], states: tuple[StateOptions, ...], as_spcat: bool
-) -> tuple[list[CodedLine], list[str]]:
-    """The lines whose spins SPIND names, and with `as_spcat`, as SPCAT leaves the others out, why; else ValueError for one of those."""
-    found, reasons = list[CodedLine](), list[str]()
+def with_their_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -> tuple[list[CodedLine], list[str]]:
+    """The lines whose spins SPIND names, and why the others are left out, as SPCAT leaves them out."""
+    usable, reasons = list[CodedLine](), list[str]()
     for line in lines:
         why = _missing_spin(line, states)
-        if why and not as_spcat:
-            raise ValueError(f"parameter {line.name.partition('#')[0]}: {why}")
         if why:
             reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why}")
         else:
-            found.append(line)
-    return found, reasons
+            usable.append(line)
+    return usable, reasons
 
 
 def _missing_spin(line: CodedLine, states: tuple[StateOptions, ...]) -> str:

@@ -21,14 +21,10 @@ from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
 from rotor.formats.spcat.hamiltonian.codes import is_linear
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
-from rotor.formats.spcat.hamiltonian.states import is_plain
+from rotor.formats.spcat.hamiltonian.states import is_plain, states_of
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.predict_states import (
-    UNDIAGONALIZED_NOTE,
-    levels_of_files,
-    predicted,
-    refuse_undiagonalized,
-)
+from rotor.formats.spcat.predict_states import levels_of_files, predicted, refuse_undiagonalized
+from rotor.formats.spcat.prediction_notes import UNDIAGONALIZED_NOTE, note_of_qrot, notes_of_full_basis
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -71,20 +67,24 @@ class Prediction:
         return None if self.listing is None else self.listing()
 
 
-def predict_file(path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False) -> Prediction:
+def predict_file(
+    path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False, full_basis: bool = False
+) -> Prediction:
     """The catalogue that belongs to an .int file, with the .var (else .par) file of the same name beside it.
 
-    own_q, as_spcat: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
+    own_q, as_spcat, full_basis: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
     """
-    return predict(read_par(parameters_beside(path)), read_int(path), own_q=own_q, as_spcat=as_spcat)
+    return predict(
+        read_par(parameters_beside(path)), read_int(path), own_q=own_q, as_spcat=as_spcat, full_basis=full_basis
+    )
 
 
-def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False) -> LevelList:
+def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False, full_basis: bool = False) -> LevelList:
     """The levels that belong to an .int file as SPCAT lists them in its .egy file, from FBGN to FEND; see `predict_file`."""
     parameters, intensities = read_par(parameters_beside(path)), read_int(path)
     if intensities.request.flags >= wavenumbers.FROM:
         parameters, intensities = wavenumbers.files_in_mhz(parameters, intensities)
-    return levels_of_files(parameters, intensities, as_spcat=as_spcat)
+    return levels_of_files(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis)
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
@@ -97,7 +97,12 @@ def parameters_beside(path: str | os.PathLike[str]) -> Path:
 
 
 def predict(
-    parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
+    parameters: ParameterFile,
+    intensities: IntensityFile,
+    *,
+    own_q: bool = False,
+    as_spcat: bool = False,
+    full_basis: bool = False,
 ) -> Prediction:
     """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
@@ -112,14 +117,16 @@ def predict(
     intensities : IntensityFile
         The .int file.
     own_q : bool, optional
-        The partition function is summed from the levels, whatever FEND is, instead of taken from QROT.
+        The partition function is summed from the levels, whatever FEND and KNMAX are, instead of taken from QROT.
     as_spcat : bool, optional
-        K beyond KNMAX is left out of the basis, as the program does in silence; by default all K are in it.
+        Numbers are the program's also where it errs: QROT below 1, some moments. DIAG below 0 is refused then.
+    full_basis : bool, optional
+        KNMIN and KNMAX are lifted: every K to N is in the basis; by default K runs from KNMIN to KNMAX.
 
     Returns
     -------
     Prediction
-        Catalogue, lines, Q, and notes on what the program passes over in silence.
+        Catalogue, lines, Q, and notes on what the program passes over in silence and what KNMAX leaves out.
 
     Raises
     ------
@@ -144,19 +151,23 @@ def predict(
             "highest that two characters of a catalogue can say"
         )
     if request.flags >= wavenumbers.FROM:
-        in_mhz = predict(*wavenumbers.files_in_mhz(parameters, intensities), own_q=own_q, as_spcat=as_spcat)
+        files = wavenumbers.files_in_mhz(parameters, intensities)
+        in_mhz = predict(*files, own_q=own_q, as_spcat=as_spcat, full_basis=full_basis)
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
-    if as_spcat and 0 < request.qrot < 1:  # taken for 1 by the program
+    further = (*note_of_qrot(request, as_spcat), *_not_written(request))
+    if as_spcat and 0 < request.qrot < 1:
         request = replace(request, qrot=1.0)
         intensities = replace(intensities, request=request)
     others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
-    left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
-    top = None if left_out or others_names else _named_top(parameters, intensities)
+    is_cut = not full_basis and options.knmax < request.fend and not is_linear(options)
+    top = None if is_cut or others_names else _named_top(parameters, intensities)
     if top is None:
-        made, of_states, q, listing, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
-        return Prediction(made, of_states, q, request, (*notes, *_not_written(request)), listing)
+        made, of_states, q, listing, notes = predicted(
+            parameters, intensities, own_q=own_q, as_spcat=as_spcat, full_basis=full_basis
+        )
+        return Prediction(made, of_states, q, request, (*notes, *further), listing)
 
     if as_spcat and top.kind == "asymmetric":
         refuse_undiagonalized(options.diag)
@@ -169,7 +180,7 @@ def predict(
         lines=lines,
         q=q,
         request=request,
-        notes=(*_notes(parameters, top, request), *_not_written(request)),
+        notes=(*_notes(parameters, top, request), *further),
     )
 
 
@@ -273,11 +284,8 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
     notes = []
     if parameters.header.npar > found:
         notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
-    if not is_linear(options) and options.knmax < request.fend:
-        notes.append(
-            f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "
-            f"without a word; here every K to J is in it, so levels with K near {options.knmax} and above differ"
-        )
+    if not is_linear(options):  # a KNMAX below FEND is here only where it is lifted
+        notes += notes_of_full_basis(states_of(parameters), request.fend)
     if top.kind == "asymmetric" and options.diag < 0:
         notes.append(UNDIAGONALIZED_NOTE)
     if top.kind == "asymmetric" and options.diag == 0:

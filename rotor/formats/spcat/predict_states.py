@@ -24,9 +24,11 @@ from rotor.formats.spcat.file_lines import (
     transitions_of,
     within,
 )
-from rotor.formats.spcat.file_model import Group, groups_of, left_out, line_names
+from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
+from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.prediction_notes import notes_of_basis, notes_of_files, notes_of_full_basis
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -36,7 +38,6 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
-from rotor.table import counted
 from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
@@ -46,7 +47,12 @@ _LAST = 2000
 
 
 def predicted(
-    parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
+    parameters: ParameterFile,
+    intensities: IntensityFile,
+    *,
+    own_q: bool = False,
+    as_spcat: bool = False,
+    full_basis: bool = False,
 ) -> tuple[Catalogue, Lines, float, Callable[[], LevelList], list[str]]:
     """The prediction of files with spins, several states or other operators; see `predict.predict`.
 
@@ -57,9 +63,11 @@ def predicted(
     intensities : IntensityFile
         The .int file.
     own_q : bool, optional
-        Whether Q is summed from the levels instead of taken from QROT.
+        Whether Q is summed from the levels, with every K, instead of taken from QROT.
     as_spcat : bool, optional
-        Whether K beyond KNMAX is left out of the basis.
+        Whether moments are those that SPCAT computes where it errs.
+    full_basis : bool, optional
+        Whether KNMIN and KNMAX are lifted.
 
     Returns
     -------
@@ -80,11 +88,13 @@ def predicted(
         As `predict` does.
     """
     request = intensities.request
-    groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    groups = _groups_to_solve(parameters, intensities, as_spcat, full_basis)
     if as_spcat and any(group.spins or group.top.kind == "asymmetric" for group in groups):
         refuse_undiagonalized(parameters.options[0].diag)
     form = format_of(parameters, groups)
-    q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
+    q = request.qrot
+    if own_q:
+        q = summed_q(groups_of(parameters, intensities, full_basis=True), request.temperature_k).q
     groups = _with_levels(groups, request)
     solved = _solved(groups, request, form)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
@@ -95,7 +105,11 @@ def predicted(
     ]
     pieces = [(own, form.qnfmt(group.spins)) for own, (group, _) in zip(listed, solved, strict=True)]
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
-    notes = _notes(parameters, groups, request, as_spcat)
+    notes = notes_of_files(parameters, intensities, as_spcat)
+    if any(state.is_cut for group in groups for state in group.states):
+        notes += notes_of_basis(groups, _groups_to_solve(parameters, intensities, as_spcat, True), request)
+    if full_basis:
+        notes += notes_of_full_basis(states_of(parameters), _highest_n(parameters, request))
     if all((levels.components == 1).all() for _, levels in solved):
         transitions = [own.found for own in listed]  # which are within the limits
     lines = _lines(parameters, solved, transitions, form, request, q)
@@ -114,11 +128,6 @@ def _level_list(
 ) -> LevelList:
     """The levels as the program lists them, with its numbers of blocks and places."""
     return as_level_list(solved, form, spreads, blocks_of(parameters, [group for group, _ in solved]))
-
-
-UNDIAGONALIZED_NOTE = (
-    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
-)
 
 
 def refuse_undiagonalized(diag: int) -> None:
@@ -147,13 +156,27 @@ def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
     return replace(levels, weight=np.where(_file_numbers(group, levels) <= maxv, levels.weight, 0))
 
 
-def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> LevelList:
+def _groups_to_solve(
+    parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool, full_basis: bool
+) -> list[Group]:
+    """The groups for the levels of an .int file, which reach N = FEND + the sum of the spins."""
+    highest = _highest_n(parameters, intensities.request)
+    return groups_of(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
+
+
+def _highest_n(parameters: ParameterFile, request: Request) -> int:
+    return request.fend + max(sum(state.spins) for state in states_of(parameters)) // 2
+
+
+def levels_of_files(
+    parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False, full_basis: bool = False
+) -> LevelList:
     """The levels of an .int file from FBGN to FEND as SPCAT lists them, whether they have names of this package or not.
 
     Energies in cm⁻¹ from the zero of the Hamiltonian, their errors by the covariance of the file, degeneracies with the weights of the
     file. Raises ValueError as `predict.predict` does.
     """
-    groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    groups = _groups_to_solve(parameters, intensities, as_spcat, full_basis)
     form = format_of(parameters, groups)
     solved = _solved(_with_levels(groups, intensities.request), intensities.request, form)
     return _level_list(parameters, solved, form, _spreads(solved, parameters))
@@ -317,22 +340,3 @@ def _shown(parameters: ParameterFile, group: Group) -> Top:
     except ValueError:
         return group.top
     return replace(group.top, constants=constants)
-
-
-def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_spcat: bool) -> list[str]:
-    """What SPCAT does in silence with these files, and what is done here."""
-    found, notes = len(parameters.parameters), []
-    if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
-    notes += left_out(parameters, as_spcat=as_spcat)
-    if parameters.options[0].diag < 0 and not as_spcat:
-        notes.append(UNDIAGONALIZED_NOTE)
-    for group in groups:
-        highest = request.fend + sum(group.spins) // 2
-        for state in group.states:
-            if state.kmin < state.kmax < highest and not as_spcat:
-                notes.append(
-                    f"KNMAX = {state.kmax} of state {state.number} is below the highest N, {highest}: SPCAT leaves K > {state.kmax} "
-                    "out of its basis without a word; here every K to N is in it"
-                )
-    return notes

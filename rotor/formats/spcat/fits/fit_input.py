@@ -135,20 +135,18 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         kmax=kmax,
         leave_out_missing=True,
     )
-    notes += _notes(file, options, model is None, assigned) + ([] if model is None else _at_zero(file))
+    notes += _notes(file, options, model is None, assigned) + ([] if model is None else _of_codes(file))
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 
-def _at_zero(file: ParameterFile) -> list[str]:
-    """What is to be known of free parameters that a search from 0 does not move."""
+def _of_codes(file: ParameterFile) -> list[str]:
+    """Notes of parameters that act on no level, and of free ones that a search from 0 does not move."""
+    from rotor.formats.spcat.file_model import left_out
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
 
     stay = stay_at_zero(file)
-    return (
-        [f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"]
-        if stay
-        else []
-    )
+    at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
+    return left_out(file) + ([at_zero] if stay else [])
 
 
 def _largest_error(header: Header) -> float:

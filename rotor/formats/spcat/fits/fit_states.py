@@ -45,7 +45,7 @@ def groups_for_fit(file: ParameterFile) -> list[Group]:
     """The groups of connected states with every parameter line in that may leave 0 in a fit; K limited as SPFIT does."""
     left = left_at_zero(file)
     nonzero = tuple(p if i in left else replace(p, value=p.value or AT_ZERO_MHZ) for i, p in enumerate(file.parameters))
-    return groups_of(replace(file, parameters=nonzero), _NO_REQUEST, as_spcat=True)
+    return groups_of(replace(file, parameters=nonzero), _NO_REQUEST)
 
 
 def names_of_quanta(form: Format) -> tuple[str, ...]:

@@ -141,6 +141,20 @@ def moment_of(
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
+def has_error_of_program(code: DipoleCode, oblate: bool) -> bool:
+    """Whether SPCAT computes another moment than is documented: `moment_of` with `as_spcat` is not that without it."""
+    magnetic, alone = code.axis == 0, code.states[0] == code.states[1]
+    if alone and _is_turned(code):
+        return True
+    if code.typ in FOURIER:
+        return magnetic
+    if code.spin:
+        return magnetic and code.typ in (1, 2)
+    if magnetic:
+        return code.typ not in (1, 2, 6, 12)
+    return code.typ == 12 and code.axis == (3 if oblate else 1) and alone
+
+
 _TURNED = "time reversal would change the sign of this moment in one state, so that it leads between two alone, V2 ≠ V1"
 
 

@@ -35,6 +35,9 @@ _FOLDS = {
 }  # fmt: skip  # by IAX
 
 
+EVERY_K = 10**6  # a KNMAX that cuts nothing
+
+
 @dataclass(frozen=True)
 class StateOptions:
     """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l.
@@ -67,6 +70,24 @@ class StateOptions:
     def linear(self) -> bool:
         """Whether K = 0 alone is in the basis."""
         return self.kmin == self.kmax == 0
+
+    @property
+    def has_one_k(self) -> bool:
+        """Whether K is a quantum number of the state, such as l of a bending state of a linear molecule."""
+        return self.kmin == self.kmax
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether KNMIN or KNMAX leaves K out of a basis of several K."""
+        return not self.has_one_k and (self.kmin > 0 or self.kmax < EVERY_K)
+
+    def with_every_k(self) -> StateOptions:
+        """The state with every K to N in its basis, unless it has one K."""
+        return self if self.has_one_k else replace(self, kmin=0, kmax=EVERY_K)
+
+    def with_k_to(self, highest_n: int) -> StateOptions:
+        """The state without a KNMAX that leaves nothing out up to the highest N."""
+        return self if self.has_one_k or self.kmax < highest_n else replace(self, kmax=EVERY_K)
 
     def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.

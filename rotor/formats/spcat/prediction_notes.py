@@ -1,0 +1,159 @@
+"""Notes of a prediction: what SPCAT does in silence with the same files, what KNMIN and KNMAX leave out, where the program errs.
+
+Each place where `as_spcat` changes a number has one note.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from rotor.formats.spcat.file_model import Group, left_out, members_of_pairs, moments_within_states
+from rotor.formats.spcat.hamiltonian.dipole_codes import (
+    EVEN_ORDER,
+    DipoleCode,
+    Dipoles,
+    dipoles_of,
+    has_error_of_program,
+)
+from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
+from rotor.formats.spcat.hamiltonian.phases import phases_of, with_dipoles
+from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.par import ParameterFile
+from rotor.table import counted
+
+UNDIAGONALIZED_NOTE = (
+    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
+)
+
+
+def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
+    """Notes that follow from the files alone, without their levels."""
+    present, notes = len(parameters.parameters), []
+    if parameters.header.npar > present:
+        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(present, 'parameter')}: all count")
+    notes += left_out(parameters)
+    if parameters.options[0].diag < 0 and not as_spcat:
+        notes.append(UNDIAGONALIZED_NOTE)
+    return notes + _notes_of_moments(parameters, intensities, as_spcat)
+
+
+def note_of_qrot(request: Request, as_spcat: bool) -> list[str]:
+    """A note for QROT below 1, which SPCAT takes for 1."""
+    if not 0 < request.qrot < 1:
+        return []
+    return [f"QROT = {request.qrot:g} is below 1: {_choice('SPCAT takes 1', as_spcat)}"]
+
+
+def _choice(program: str, as_spcat: bool) -> str:
+    """What the program does, and whether that is computed here."""
+    return (
+        f"{program}, and so do these numbers"
+        if as_spcat
+        else f"{program}, these numbers do not; --as-spcat has SPCAT's"
+    )
+
+
+def _notes_of_moments(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
+    """Notes of the dipole lines for which SPCAT computes another moment than is documented, and of their phases."""
+    states = states_of(parameters)
+    dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    oblate = parameters.options[0].nvib < 0
+    wrong = [str(dipole.code) for dipole, code in others if has_error_of_program(code, oblate)]
+    notes = []
+    if wrong:
+        lines = f"dipole{'s' if len(wrong) > 1 else ''} {', '.join(dict.fromkeys(wrong))}"
+        program = "SPCAT computes another moment than its documentation says (docs/spcat_codes.md)"
+        notes.append(f"{lines}: {_choice(program, as_spcat)}")
+
+    members = members_of_pairs(pairs_of(states))
+    own, within = phases_of(parameters, len(states), members), moments_within_states(dipoles, others, states, members)
+    phases = with_dipoles(own, within, oblate, False)
+    if phases.odd and with_dipoles(own, within, oblate, True) != phases:
+        program = "SPCAT settles the phases along axes without odd parameters by the dipoles, SPFIT does not"
+        notes.append(f"phases: {_choice(program, as_spcat)}")
+    if phases.between_i and not phases.odd and _has_unlike_orders(dipoles, [code for _, code in others if code.axis]):
+        program = "SPCAT gives moments of even order in angular momenta the other sign beside those of odd order"
+        notes.append(f"dipoles between two states: {_choice(program, as_spcat)}")
+    return notes
+
+
+def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
+    """Whether electric moments of even and of odd order stand between the same two states."""
+    orders = {states: {False} for states in dipoles}
+    for code in others:
+        orders.setdefault(code.states, set()).add(code.typ in EVEN_ORDER)
+    return any(len(each) > 1 for (low, high), each in orders.items() if low != high)
+
+
+def notes_of_basis(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
+    """What KNMIN and KNMAX leave out, and by how much they change the levels that remain.
+
+    Parameters
+    ----------
+    groups : list of Group
+        With the basis of the file.
+    whole : list of Group
+        With every K.
+    request : Request
+        Highest F.
+
+    Returns
+    -------
+    list of str
+        One sentence for each group whose basis is cut.
+    """
+    cut = [group for group in groups if any(state.is_cut for state in group.states)]
+    return [_note_of_cut(group, [other for other in whole if _share_a_state(group, other)], request) for group in cut]
+
+
+def _share_a_state(group: Group, other: Group) -> bool:
+    return bool({state.number for state in group.states} & {state.number for state in other.states})
+
+
+def _note_of_cut(group: Group, whole: list[Group], request: Request) -> str:
+    half = sum(group.spins) % 2
+    twice_f = 2 * request.fend - half
+    levels, count = _energies([group], twice_f)
+    every, total = _energies(whole, twice_f)
+    shift = max((abs(energy - every[label]) for label, energy in levels.items() if label in every), default=0.0)
+    limits = ", ".join(_limits_of(state) for state in group.states if state.is_cut)
+    angular = f"F = {twice_f}/2" if half else f"{'F' if group.spins else 'J'} = {twice_f // 2}"
+    moved = (
+        f"the others lie up to {shift:.3g} MHz from where the whole basis has them" if count else "no other is there"
+    )
+    return (
+        f"{limits}: as the file says, other K are left out of the basis; at {angular} these are {total - count} of {total} levels, and "
+        f"{moved}; --full-basis has every K"
+    )
+
+
+def _limits_of(state: StateOptions) -> str:
+    low = f"KNMIN = {state.kmin}" if state.kmin else ""
+    high = f"KNMAX = {state.kmax}" if state.with_every_k().kmax != state.kmax else ""
+    return f"{' and '.join(filter(None, (low, high)))} of state {state.number}"
+
+
+def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ...], float], int]:
+    """Energies (MHz) of the levels of one F that exist, by their state in the file and their quantum numbers; their number, ±K as two."""
+    energies, count = dict[tuple[int, ...], float](), 0
+    for group in groups:
+        levels = group.levels((twice_f, twice_f))
+        numbers, quanta = np.array([state.number for state in group.states]), dict(levels.quanta)
+        v = numbers[quanta.pop("v", np.zeros(len(levels), dtype=np.int64))]
+        exist = levels.weight > 0
+        labels = np.column_stack([v, *quanta.values()])[exist]
+        energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[exist].tolist(), strict=True))
+        count += int(levels.components[exist].sum())
+    return energies, count
+
+
+def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[str]:
+    """A note for every KNMIN and KNMAX that is lifted and would leave out levels up to the highest N."""
+    lifted = [state for state in states if state.with_k_to(highest_n).is_cut]
+    return [
+        f"{_limits_of(state)} is lifted by --full-basis: every K to N is in the basis, which is not what the file says"
+        for state in lifted
+    ]
