@@ -96,7 +96,9 @@ def test_own_q_is_that_of_the_file():
 
 def test_what_the_program_does_in_silence_is_said():
     assert water().notes == ()
-    assert water(fend=12).notes[0].startswith("KNMAX = 9 of state 0: as the file says, other K are left out of the basis")
+    assert (
+        water(fend=12).notes[0].startswith("KNMAX = 9 of state 0: as the file says, other K are left out of the basis")
+    )
     quartic = b" 2000 -974.0 0\n 1100 173.0 0\n 200 -37.6 0\n"
     text = (PAR % (0, quartic)).replace(b" 3 0 0 0", b" 6 0 0 0").replace(b"0 9 0", b"0 30 0")
     request = read_int(INT % (0, 25, b"-20 -20"))
