@@ -1,4 +1,4 @@
-"""Folders of unfinished work, locked as long as their process lives.
+"""Folders of unfinished work, and files being written, locked as long as their process lives.
 
 A process that is killed leaves its folder behind; the next one that makes one of the same kind in the same place finds it unlocked
 and removes it.
@@ -6,6 +6,8 @@ and removes it.
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
 import shutil
 import tempfile
@@ -61,10 +63,88 @@ def _lock(folder: Path) -> int | None:
 
 
 def _remove_abandoned(parent: Path, prefix: str) -> None:
-    """Remove the folders of killed processes; one that is in use is locked."""
+    """Remove the folders and the locks of killed processes; one that is in use is locked."""
     with suppress(OSError):  # a folder that cannot be listed has nothing that can be removed
         for folder in parent.glob(f"{prefix}*"):
-            lock = _lock(folder) if folder.is_dir() and not folder.is_symlink() else None
+            lock = _lock(folder) if _is_ours(folder) else None
             if lock is not None:
-                shutil.rmtree(folder, ignore_errors=True)
+                if folder.is_dir():
+                    shutil.rmtree(folder, ignore_errors=True)
+                else:
+                    folder.unlink(missing_ok=True)
                 os.close(lock)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether this is a folder, or the lock of a file, and no link to something else."""
+    return not path.is_symlink() and (path.is_dir() or path.name.startswith(_LOCK))
+
+
+@contextmanager
+def locked_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Hold the right to write a file, until the end of the context.
+
+    The lock is a small file beside it, `.rotor-lock-NAME`, which ends with its process. What is no regular file (a pipe, a device)
+    needs none, and where the file system has no locks there is none.
+
+    Raises ValueError where another run holds it, with the number of its process.
+
+    >>> with tempfile.TemporaryDirectory() as folder, locked_file(Path(folder) / "a.csv"):
+    ...     [path.name for path in Path(folder).iterdir()]
+    ['.rotor-lock-a.csv']
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        yield
+        return
+    lock = target.parent / f"{_LOCK}{target.name}"
+    if len(os.fsencode(lock.name)) > _LONGEST_NAME:
+        lock = lock.with_name(f"{_LOCK}{hashlib.sha256(os.fsencode(target.name)).hexdigest()}")
+    handle = _locked_handle(lock, path)
+    try:
+        yield
+    finally:
+        if handle is not None:
+            with suppress(OSError):
+                lock.unlink()
+            os.close(handle)
+
+
+_LOCK = ".rotor-lock-"
+_LONGEST_NAME = 255  # bytes, on the usual file systems
+
+
+def _locked_handle(lock: Path, path: str | os.PathLike[str]) -> int | None:
+    """An open descriptor with the lock of a file; None where the folder or the system has no locks."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows
+        return None
+    while True:
+        try:
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        except OSError:  # a folder in which nothing can be written: the writer of the file says so
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.read(handle, 20).decode("ascii", "replace").strip()
+            os.close(handle)
+            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+                return None
+            process = f" (process {holder})" if holder else ""
+            raise ValueError(
+                f"{os.fspath(path)}: another run{process} is writing this file; wait for it, or give another name"
+            ) from None
+        if _is_file_of(handle, lock):
+            os.ftruncate(handle, 0)
+            os.write(handle, str(os.getpid()).encode("ascii"))
+            return handle
+        os.close(handle)  # the run before has just ended and removed it
+
+
+def _is_file_of(handle: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    except OSError:
+        return False

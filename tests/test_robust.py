@@ -239,7 +239,7 @@ def test_a_signal_to_end_cleans_up_as_ctrl_c_does(folder):
 @pytest.mark.skipif(os.name == "nt", reason="no locks of folders")
 def test_what_a_killed_process_left_is_removed_by_the_next_one(call):
     assert stopped_while_writing(signal.SIGKILL) == -signal.SIGKILL
-    assert [name.startswith(PREFIX) for name in os.listdir()] == [True]
+    assert [name.startswith(PREFIX) for name in os.listdir()] == [True, True]  # a folder, and the lock of its file
     assert call("spectrum", "CO", "--csv", "x.csv")[0] == 0
     assert sorted(os.listdir()) == ["x.csv", "x.csv.provenance.json"]
 

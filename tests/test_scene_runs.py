@@ -244,7 +244,7 @@ SWEEP = LevelsScene(
 
 
 def test_a_sweep_is_every_combination():
-    made = points(SWEEP)
+    made = list(points(SWEEP))
     assert [(p.scene.molecule, p.scene.observables.jmax) for p in made] == [
         (m, j) for m in ("CO", "HCl", "OCS") for j in (2, 5)
     ]
@@ -267,6 +267,19 @@ def test_a_sweep_is_every_combination():
             LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs=LevelsOutputs(csv="{j}.csv")),
             "there are {jmax}",
         ),
+        (
+            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs=LevelsOutputs(csv="o_{jmax.real}.csv")),
+            "{jmax.real} is no swept name",
+        ),
+        (
+            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs=LevelsOutputs(csv="{jmax:>9}.csv")),
+            "{jmax:>9} is no swept name",
+        ),
+        (
+            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs=LevelsOutputs(csv="{jmax}}.csv")),
+            "a brace without its partner",
+        ),
+        (LevelsScene(molecule="CO", sweep={"observables.jmax": [1, 1]}), "1 stands there twice"),
     ],
 )
 def test_a_sweep_that_cannot_be(scene, said):
@@ -318,9 +331,11 @@ def test_the_command_runs_a_sweep(call, folder):
     write_scene(SWEEP, "s.toml")
     code, out, err = call("run", "s.toml")
     assert code == 0
-    assert "6 computed now" in out
-    assert err.count("done:") == 6
-    assert "0 computed now" in call("run", "s.toml")[1]
+    assert out.count("\n") == 8  # a heading, the columns and six points
+    assert "CO" in out
+    assert err.startswith("6 points: 6 computed now in ")
+    assert err.count("\n") == 1
+    assert call("run", "s.toml")[2].endswith("6 done before (s.sweep.jsonl)\n")
     assert (folder / "s.sweep.jsonl").is_file()
 
 

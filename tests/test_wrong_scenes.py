@@ -59,13 +59,13 @@ def test_a_mistake_is_one_line_with_its_key(call, folder, verb, mistake):
     assert sorted(folder.iterdir()) == before
 
 
-def test_no_point_of_a_sweep_is_run_where_one_cannot_be(call, folder):
+def test_a_point_of_a_sweep_that_cannot_be_costs_itself(call, folder):
     text = SPECTRUM + '[outputs]\ncsv = "{temperature}.csv"\n[sweep]\n"conditions.temperature" = ["10 K", "20 MHz"]'
     (folder / "s.toml").write_text(text, encoding="utf-8")
     code, _, err = call("run", "s.toml")
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert "sweep conditions.temperature = 20 MHz: conditions.temperature" in err
-    assert [one.name for one in folder.glob("*.csv")] == []
+    assert (code, len(err.splitlines())) == (1, 2)
+    assert "conditions.temperature = 20 MHz: conditions.temperature: '20 MHz'" in err
+    assert [one.name for one in folder.glob("*.csv")] == ["10_K.csv"]
 
 
 OPTIONS = [

@@ -20,7 +20,7 @@ import typer
 
 from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainCommand, PlainGroup, folded
-from rotor.cli.shared.output import ComputationError
+from rotor.cli.shared.output import ComputationError, release_files
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
@@ -141,6 +141,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:  # a defect of the program, not of the input
         text = f"{type(error).__name__}: {error}"
         return _fail(NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug", arguments)
+    finally:
+        release_files()
 
 
 def _run(arguments: list[str]) -> int:

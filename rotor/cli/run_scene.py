@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import sys
+import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -33,13 +35,15 @@ if TYPE_CHECKING:
     from rotor.scenes.sweep import SweepResult
     from rotor.table import Table as Columns
 
-SHOWN = 20  # rows of the table in the report
+SHOWN = 20  # rows of the table in the report, and reasons of points that failed
+SHOWN_OF_REASON = 3  # points that failed for one reason
 
 EXAMPLES = """\b
 Examples:
   rotor run s.toml
   rotor run s.toml --out results --json -
   rotor run sweep.toml --workers 4
+  rotor run sweep.toml --retry-failed
   rotor run sweep.toml --dask tcp://head:8786"""
 
 
@@ -56,6 +60,7 @@ class Options:
     record: str | None = option(
         None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
     )
+    retry_failed: bool = option(False, "--retry-failed", help="Of a sweep: run again the points that failed before.")
     json: str | None = json_option()
 
 
@@ -63,18 +68,23 @@ class Options:
 def command(context: typer.Context, options: Options) -> None:
     """Run a scene: write the files that it names, and report; a sweep goes on where it stopped."""
     from rotor.cli.shared.workers import MOST_WORKERS
+    from rotor.scenes.run import refuse_outside
     from rotor.scenes.scene_file import read_scene
+    from rotor.scenes.sweep import is_sweep
 
     require_whole("--workers", options.workers, 1, MOST_WORKERS)
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)
-    if options.record is not None and not scene.sweep:
-        raise ValueError("--record: this scene has no sweep")
+    swept = is_sweep(scene, _folder(options))
+    for name, used in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
+        if used and not swept:
+            raise ValueError(f"{name}: this scene has no sweep")
+    refuse_outside(scene, options.out)
     files = Files()
     files.ask_json(options.json)
     with _workers(options) as pool:
-        if scene.sweep:
+        if swept:
             _sweep(scene, options, files, pool, context.obj)
         else:
             _single(scene, options, files, pool, context.obj)
@@ -93,14 +103,10 @@ def _workers(options: Options) -> Iterator[Executor | None]:
     if number is None or number == 1:
         yield None
         return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from rotor.scenes.worker_processes import worker_processes
 
-    pool = ProcessPoolExecutor(number, mp_context=get_context("spawn"))
-    try:
+    with worker_processes(number) as pool:
         yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
@@ -200,27 +206,58 @@ def _cell(value: Any) -> str:
 
 def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
     import rotor
+    from rotor.cli.shared.workers import progress_bar
     from rotor.scenes.sweep import run_sweep
 
     record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")
-    result = run_sweep(
-        scene, folder=_folder(options), out=options.out, record=record, executor=pool, on_point=_say_point
-    )
+    start = time.monotonic()
+    with progress_bar("points") as advance:
+        result = run_sweep(
+            scene,
+            folder=_folder(options),
+            out=options.out,
+            record=record,
+            executor=pool,
+            retry_failed=options.retry_failed,
+            progress=advance,
+        )
+    seconds = time.monotonic() - start
     head = {"rotor_version": rotor.__version__, "command": command, "scene": options.scene, "kind_of_scene": scene.kind}
-    content = {**head, "record": record, "computed": result.computed, "files": list(result.files)}
+    failed = [{"values": dict(made["values"]), "error": made["error"]} for made in result.failed]
+    content = {**head, "record": record, "computed": result.computed, "failed": failed, "files": list(result.files)}
     text = lambda: json_with_rows(result, "points", content)  # noqa: E731
-    deliver(files, {}, text, lambda: _show_sweep(result, record))
+    deliver(files, {}, text, lambda: _show_sweep(result))
+    print(_summary(result, record, seconds), file=sys.stderr)
+    if failed:
+        raise ComputationError(_failures(result, record))
 
 
-def _say_point(record: Mapping[str, Any]) -> None:
-    import sys
+def _summary(result: SweepResult, record: str, seconds: float) -> str:
+    """One line: how many points there are, were run now, and failed."""
+    before = len(result) - result.computed
+    parts = [f"{result.computed} computed now in {seconds:.3g} s"]
+    parts += [f"{before} done before ({record})"] if before else []
+    parts += [f"{len(result.failed)} failed"] if result.failed else []
+    return f"{counted(len(result), 'point')}: {', '.join(parts)}"
 
-    values = ", ".join(f"{name} = {value}" for name, value in record["values"].items())
-    print(f"done: {values} ({record['seconds']:.3g} s)", file=sys.stderr)
 
+def _failures(result: SweepResult, record: str) -> str:
+    """The points that failed, those of one reason together."""
+    from rotor.scenes.sweep.points import text_of
 
-def _show_sweep(result: SweepResult, record: str) -> None:
-    print(
-        f"a sweep of {counted(len(result), 'point')}, {result.computed} computed now; what was done before is from {record}"
+    reasons: dict[str, list[str]] = {}
+    for made in result.failed:
+        reasons.setdefault(made["error"], []).append(text_of(made["values"]))
+    listed = [
+        f"{'; '.join(points[:SHOWN_OF_REASON])}{' and others' if len(points) > SHOWN_OF_REASON else ''}: {reason}"
+        for reason, points in reasons.items()
+    ]
+    more = f"; and {len(listed) - SHOWN} more reasons, see {record}" if len(listed) > SHOWN else ""
+    hint = "--retry-failed runs them again"
+    return (
+        f"{counted(len(result.failed), 'point')} of {len(result)} failed ({hint}): {' | '.join(listed[:SHOWN])}{more}"
     )
+
+
+def _show_sweep(result: SweepResult) -> None:
     show_table(_some_rows(result))

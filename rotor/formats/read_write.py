@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import reader_of, writer_of
+from rotor.molecules.readers.sdf_entries import entry_of
 from rotor.tops.constants import Constants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
@@ -29,7 +30,8 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
     source : str, Path, Top, Constants, Molecule, ase.Atoms or rdkit.Chem.Mol
         A word is a path that exists, else a molecule of the library (`"water"`, `"H2CO"`), else one of ASE's g2 set;
         a path and a molecule of one name are an error. `"SMILES:C=O"` is built with RDKit; `"-"` reads a geometry
-        (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf, whatever
+        (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf (of several molecules
+        `"many.sdf#3"` is the third), whatever
         `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
         .cat: a catalogue; .lin: measured lines; .egy: levels; .hitran, and .par where its first line is a record of 160
         characters: HITRAN's lines. `rotor.formats.registry` has them all.
@@ -115,6 +117,8 @@ def _looks_like_a_path(word: str) -> bool:
 
 
 def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
+    if entry_of(str(path)) is not None:
+        return _with_isotopes(_top_of_geometry(path), isotopes)
     if not path.exists():
         raise ValueError(f"{path}: no such file")
     if path.is_dir():

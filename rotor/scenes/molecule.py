@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from rotor.molecules.readers.sdf_entries import entry_of
 from rotor.scenes.scene import within
 from rotor.scenes.sections import MoleculeSection
 
@@ -73,7 +74,7 @@ def _from_source(molecule: MoleculeSection, folder: str | os.PathLike[str]) -> T
 
     source = str(molecule.source)
     beside = within(folder, source)
-    if not source.startswith("SMILES:") and Path(beside).is_file():
+    if not source.startswith("SMILES:") and (Path(beside).is_file() or entry_of(beside) is not None):
         source = beside
     if source == "-":
         raise ValueError("molecule.source: '-': a scene reads no standard input; give a file")

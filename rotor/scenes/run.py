@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.scenes.kind import Kind, Writer, fields, kind_of
+from rotor.formats.atomic_write import resolved
+from rotor.scenes.kind import Kind, Where, Writer, fields, kind_of
 from rotor.scenes.scene import Scene, SceneResult, within
+from rotor.temporary import locked_file
 
 if TYPE_CHECKING:
     from rotor.scenes.choice import Choice, Reached
@@ -53,7 +56,7 @@ def run_scene(
     Raises
     ------
     ValueError
-        What the scene asks for cannot be: with the key. Nothing is written then.
+        What the scene asks for cannot be: with the key; another run is writing one of its files. Nothing is written then.
 
     Examples
     --------
@@ -63,8 +66,17 @@ def run_scene(
     """
     if scene.sweep:
         raise ValueError("sweep: this scene has several points; run_sweep runs them")
-    kind = kind_of(scene)
     targets = output_paths(scene, out)
+    with ExitStack() as stack:
+        for path in sorted({resolved(path) for paths in targets.values() for path in paths}):
+            stack.enter_context(locked_file(path))
+        return _run(scene, targets, folder, out, executor)
+
+
+def _run(
+    scene: Scene, targets: Mapping[str, list[Path]], folder: Where, out: Where, executor: Executor | None
+) -> SceneResult:
+    kind = kind_of(scene)
     request = kind.request(scene, folder)
     start, choice = time.perf_counter(), None
     if getattr(scene, "accuracy", None) is not None:
@@ -82,6 +94,33 @@ def run_scene(
     return SceneResult(scene, request, answer, table, files, seconds, found)
 
 
+def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:
+    """Refuse outputs outside the folder from which they are counted, so that a scene from elsewhere replaces no other files.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> from rotor.scenes.sections import LevelsOutputs
+    >>> refuse_outside(LevelsScene(molecule="CO", outputs=LevelsOutputs(csv="../a.csv")), "results")
+    Traceback (most recent call last):
+        ...
+    ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out
+    """
+    inside = Path(os.path.abspath(out))
+    for name, text in output_names(scene):
+        if not Path(os.path.abspath(within(out, text))).is_relative_to(inside):
+            raise ValueError(
+                f"outputs.{name}: {text}: lies outside the folder {os.fspath(out)}; name a file inside it, or give another "
+                "folder as --out"
+            )
+
+
+def output_names(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Every output that is a file, with the name that the scene gives it."""
+    for name in SUFFIXES:
+        given = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
+        names: list[str] = given if isinstance(given, list) else [] if given is None else [given]
+        yield from ((name, one) for one in names)
+
+
 def _reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     from rotor.scenes.accuracy import reached
 
@@ -94,11 +133,8 @@ def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Pa
     Raises ValueError for a suffix that an output has not, a folder that is not there, and one file for two outputs.
     """
     found: dict[str, list[Path]] = {}
-    for name, suffixes in SUFFIXES.items():
-        given = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
-        names: list[str] = given if isinstance(given, list) else [] if given is None else [given]
-        if names:
-            found[name] = [_checked_path(f"outputs.{name}", within(out, one), suffixes) for one in names]
+    for name, text in output_names(scene):
+        found.setdefault(name, []).append(_checked_path(f"outputs.{name}", within(out, text), SUFFIXES[name]))
     paths = [path.resolve() for every in found.values() for path in every]
     for path in paths:
         if paths.count(path) > 1:

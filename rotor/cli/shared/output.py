@@ -15,11 +15,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared.options import files_asked
+from rotor.temporary import locked_file
 
 if TYPE_CHECKING:
     from rotor.table import Table as Columns
 
 Writer = Callable[[Path], None]
+_HELD = ExitStack()  # locks of the files that the command will write
+
+
+def release_files() -> None:
+    """Give up the locks of the files of a command that has ended."""
+    _HELD.close()
 
 
 class ComputationError(Exception):
@@ -203,6 +210,7 @@ class Files:
             raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
         if any(end == _resolved(option, other) for other in self.paths.values()):
             raise ValueError(f"{option} {path}: another option writes the same file")
+        _HELD.enter_context(locked_file(end))
         self.paths[option] = target
 
     def write(self, writers: Mapping[str, Writer]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,7 +16,6 @@ def working(workers: int, what: str) -> Iterator[Executor | None]:
 
     Raises ValueError for fewer than one worker, and for more than 256.
     """
-    import multiprocessing
     import sys
 
     if not 1 <= workers <= MOST_WORKERS:
@@ -26,11 +25,9 @@ def working(workers: int, what: str) -> Iterator[Executor | None]:
         with progress_bar(what) if terminal else _nothing() as advance:
             yield Counted(None, advance) if advance else None
         return
-    context = multiprocessing.get_context("spawn")
-    with (
-        ProcessPoolExecutor(workers, mp_context=context) as pool,
-        progress_bar(what) if terminal else _nothing() as advance,
-    ):
+    from rotor.scenes.worker_processes import worker_processes
+
+    with worker_processes(workers) as pool, progress_bar(what) if terminal else _nothing() as advance:
         yield Counted(pool, advance)
 
 
@@ -41,12 +38,24 @@ def _nothing() -> Iterator[None]:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], object]]:
-    """What shows on standard error that so many pieces of so many are done."""
+    """On a terminal, a bar on standard error: so many pieces of so many are done, the time until now and the time left."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda done, total: None
+        return
+    left = (TextColumn("left"), TimeRemainingColumn())
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn(), *left)
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 

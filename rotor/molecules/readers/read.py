@@ -11,6 +11,7 @@ import numpy as np
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import element_symbol, isotope, isotope_of_mass
 from rotor.molecules.readers.quantum_chemistry import WITHOUT_CCLIB, has_cclib, is_output, needs_no_cclib, read_output
+from rotor.molecules.readers.sdf_entries import entry_bytes, entry_of
 from rotor.molecules.readers.smiles import from_rdkit, from_smiles, parse_sdf
 from rotor.molecules.readers.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
@@ -72,6 +73,8 @@ def _read_word(word: str) -> Molecule:
     if word.startswith(_PREFIX):
         return from_smiles(word.removeprefix(_PREFIX).strip())
     path = Path(word)
+    if entry_of(word) is not None:
+        return _read_file(path)
     if not path.is_file():
         return g2_molecule(word)
     if word in g2_names():
@@ -80,6 +83,10 @@ def _read_word(word: str) -> Molecule:
 
 
 def _read_file(path: Path) -> Molecule:
+    entry = entry_of(str(path))
+    if entry is not None:
+        molecule = parse_sdf(decode(entry_bytes(*entry), str(path)), str(path))
+        return molecule if molecule.name else replace(molecule, name=f"{entry[0].stem}_{entry[1]}")
     if not path.is_file():
         raise ValueError(f"{path}: no such file; give one in xyz, mol or sdf, or in another format that ASE reads")
     suffix = path.suffix.lower()

@@ -177,7 +177,8 @@ def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     blocks = [block for block in re.split(r"^\$\$\$\$.*$", lines, flags=re.M) if block.strip()]
     if len(blocks) != 1:
-        raise ValueError(f"{where}: {len(blocks)} molecules; expected a file with one")
+        entry = f"; {where}#1 is the first of them, and a scene whose molecule is this file runs all" if blocks else ""
+        raise ValueError(f"{where}: {len(blocks)} molecules; expected a file with one{entry}")
     if "M  END" not in blocks[0]:
         raise ValueError(f"{where}: the line 'M  END' is missing; the file was cut or is no mol or sdf file")
     _refuse_bad_coordinates(blocks[0], where)

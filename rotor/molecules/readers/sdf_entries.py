@@ -1,0 +1,69 @@
+"""Single molecules of an SDF file of many: `many.sdf#3` is the third."""
+
+from __future__ import annotations
+
+import os
+import re
+from functools import lru_cache
+from pathlib import Path
+
+SDF_SUFFIXES = (".sdf", ".sd")
+_ENTRY = re.compile(r"(.+\.sdf?)#(\d+)", flags=re.IGNORECASE | re.DOTALL)
+
+
+def entry_of(word: str) -> tuple[Path, int] | None:
+    """The file and the number that a word such as many.sdf#3 means; None for any other word, and for a file of that very name.
+
+    >>> entry_of("many.sdf#3"), entry_of("water")
+    ((PosixPath('many.sdf'), 3), None)
+    """
+    found = _ENTRY.fullmatch(word)
+    return None if found is None or os.path.exists(word) else (Path(found[1]), int(found[2]))
+
+
+def entry_names(path: Path) -> tuple[str, ...]:
+    """The titles of the molecules of a file, in its order; an empty text for one without."""
+    return tuple(name for name, _, _ in _entries(*_stamp(path)))
+
+
+def entry_bytes(path: Path, number: int) -> bytes:
+    """The text of one molecule, numbered from 1, as the file has it.
+
+    Raises ValueError for a number that the file has not.
+    """
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file")
+    entries = _entries(*_stamp(path))
+    if not 1 <= number <= len(entries):
+        raise ValueError(f"{path}#{number}: the file has {len(entries)} molecules, numbered from 1")
+    _, start, length = entries[number - 1]
+    with open(path, "rb") as handle:
+        handle.seek(start)
+        return handle.read(length)
+
+
+def _stamp(path: Path) -> tuple[str, int, int]:
+    status = path.stat()
+    return str(path), status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=8)
+def _entries(path: str, modified: int, size: int) -> list[tuple[str, int, int]]:
+    """Title, place and length of every molecule of a file; read anew when the file changes."""
+    out: list[tuple[str, int, int]] = []
+    start, place, title, blank = 0, 0, b"", True
+    with open(path, "rb") as handle:
+        for line in handle:
+            if place == start:
+                title = line
+            place += len(line)
+            if line.startswith(b"$$$$"):
+                out += [] if blank else [_entry(title, start, place - len(line))]
+                start, blank = place, True
+            elif line.strip():
+                blank = False
+    return out if blank else [*out, _entry(title, start, place)]
+
+
+def _entry(title: bytes, start: int, end: int) -> tuple[str, int, int]:
+    return title.decode("utf-8", "replace").removeprefix("\ufeff").strip(), start, end - start

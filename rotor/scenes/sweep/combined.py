@@ -1,0 +1,117 @@
+"""A Parquet file with the rows of all points, each row with the values of its point.
+
+Rows of a finished point wait in a file of their own in the folder NAME.points; at the end they are joined with what the file
+has already, in the order of the points. The column `point` says to which point of the record a row belongs, so that points which
+are done are not computed again, and rows of points that the sweep has no more are left out.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
+
+    from rotor.table import Table
+
+KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
+MEMORY_MB = 300  # for the sort; more goes to files
+
+
+def point_columns(values: Mapping[str, Any], table: Table) -> dict[str, Any]:
+    """Columns of the swept values, by the last part of their names where that is free, before those of a table."""
+    from rotor.scenes.sweep.points import cell
+
+    own = dict(table.columns)
+    short = [name.rpartition(".")[2] for name in values]
+    out = {}
+    for name, key in zip(values, short, strict=True):
+        free = short.count(key) == 1 and key not in own and key != "point"
+        out[key if free else name] = np.full(len(table), cell(values[name]))
+    return out | own
+
+
+class CombinedFile:
+    """The file of all points: what it has, where rows of finished points wait, and how they are joined."""
+
+    def __init__(self, target: Path) -> None:
+        self.target, self.folder = target, Path(f"{target}.points")
+
+    def part(self, key: str) -> Path:
+        """Where the rows of a finished point wait."""
+        return self.folder / f"{key[:KEY_LENGTH]}.parquet"
+
+    def keys(self) -> set[str]:
+        """The points whose rows are there, in the file or waiting; none of a file that is no table of points."""
+        waiting = {path.stem for path in self.folder.glob("*.parquet")} if self.folder.is_dir() else set()
+        return waiting | self._joined()
+
+    def _joined(self) -> set[str]:
+        if not self.target.is_file():
+            return set()
+        import duckdb
+
+        with duckdb.connect() as engine, suppress(duckdb.Error):  # no Parquet, or without the column: written anew
+            rows = engine.execute("SELECT DISTINCT point FROM read_parquet($1)", [str(self.target)]).fetchall()
+            return {str(key) for (key,) in rows}
+        return set()
+
+    def write_part(self, key: str, values: Mapping[str, Any], table: Table) -> None:
+        """Write the rows of a finished point to where they wait."""
+        from rotor.formats.atomic_write import atomic_path
+        from rotor.formats.tables import copy_columns
+
+        columns = {"point": np.full(len(table), key[:KEY_LENGTH])} | point_columns(values, table)
+        with atomic_path(self.part(key)) as unfinished:
+            copy_columns(columns, unfinished, "(FORMAT parquet)")
+
+    def join(self, keys: Sequence[str], provenance: str) -> None:
+        """Write the file: the rows of the points with these keys, in their order; the folder is removed."""
+        import duckdb
+
+        from rotor.formats.atomic_write import atomic_path
+        from rotor.formats.tables import quoted, run
+
+        sources = sorted(map(str, self.folder.glob("*.parquet")))
+        waiting = {Path(source).stem for source in sources}
+        before = self._joined() - waiting
+        with duckdb.connect() as engine, atomic_path(self.target) as unfinished:
+            engine.execute("SET memory_limit = $1", [f"{MEMORY_MB}MB"])
+            engine.execute("SET temp_directory = $1", [str(self.folder / "sort")])
+            _register_order(engine, keys)
+            parts = [_rows(sources, "true")] if sources else []
+            if before:
+                parts.append(_rows([str(self.target)], f"point NOT IN ({', '.join(map(quoted, ('', *waiting)))})"))
+            chosen = " UNION ALL BY NAME ".join(parts)
+            run(
+                engine,
+                f"COPY (SELECT t.* EXCLUDE (file_row_number) FROM ({chosen}) t JOIN places ON t.point = places.key "
+                f"ORDER BY places.number, t.file_row_number) TO {quoted(str(unfinished))} "
+                f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(provenance)}}})",
+                self.target,
+            )
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def open_folder(self) -> None:
+        """Make the folder in which rows wait."""
+        os.makedirs(self.folder, exist_ok=True)
+
+
+def _rows(files: Sequence[str], condition: str) -> str:
+    from rotor.formats.tables import quoted
+
+    listed = ", ".join(map(quoted, files))
+    return f"SELECT * FROM read_parquet([{listed}], union_by_name = true, file_row_number = true) WHERE {condition}"
+
+
+def _register_order(engine: DuckDBPyConnection, keys: Sequence[str]) -> None:
+    places = {"key": np.array([key[:KEY_LENGTH] for key in keys]), "number": np.arange(len(keys))}
+    engine.register("given", places)
+    engine.execute("CREATE TABLE places AS SELECT key::VARCHAR AS key, number FROM given")

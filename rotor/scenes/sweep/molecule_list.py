@@ -1,0 +1,72 @@
+"""Lists of molecules: an SDF file of several, or a CSV file with a column of SMILES or of names."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from rotor.molecules.readers.sdf_entries import SDF_SUFFIXES, entry_names
+from rotor.scenes.scene import within
+
+SMILES_COLUMNS, MOLECULE_COLUMNS, NAME_COLUMNS = ("smiles",), ("molecule", "source", "name"), ("name", "id", "title")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One molecule of a list. source: what reads it, as the molecule of a scene. name: what tables and files call it."""
+
+    source: str
+    name: str
+
+
+def is_list(source: str, folder: str | os.PathLike[str]) -> bool:
+    """Whether a source is a list of molecules: a CSV file, or an SDF file of two or more."""
+    suffix, path = Path(source).suffix.lower(), within(folder, source)
+    if suffix not in (*SDF_SUFFIXES, ".csv") or not os.path.isfile(path):
+        return False
+    return suffix == ".csv" or len(entry_names(Path(path))) > 1
+
+
+def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
+    """The molecules of a list that is a file in a folder.
+
+    Raises ValueError for a CSV file without a column of molecules, or without a row.
+    """
+    path = Path(within(folder, source))
+    if path.suffix.lower() == ".csv":
+        return _of_csv(path)
+    names = entry_names(path)
+    return [Entry(f"{source}#{n}", name or f"{path.stem}_{n}") for n, name in enumerate(names, 1)]
+
+
+def _of_csv(path: Path) -> list[Entry]:
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as handle:
+            rows = [row for row in csv.reader(handle) if any(cell.strip() for cell in row)]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: a list of molecules is comma-separated UTF-8 text: {error}") from None
+    heads = [head.strip().lower() for head in rows[0]] if rows else []
+    smiles, word = _column(heads, SMILES_COLUMNS), _column(heads, MOLECULE_COLUMNS)
+    if smiles is None and word is None:
+        raise ValueError(
+            f"{path}: expected a column smiles, molecule or name, found {', '.join(heads) or 'no columns'}"
+        )
+    if len(rows) < 2:
+        raise ValueError(f"{path}: no molecules below the names of the columns")
+    column = smiles if smiles is not None else word
+    assert column is not None
+    label = _column(heads, NAME_COLUMNS)
+    out = []
+    for row in rows[1:]:
+        source = row[column].strip() if column < len(row) else ""
+        name = row[label].strip() if label is not None and label < len(row) else ""
+        if smiles is not None and not source.startswith("SMILES:"):
+            source = f"SMILES:{source}"
+        out.append(Entry(source, name or source.removeprefix("SMILES:")))
+    return out
+
+
+def _column(heads: list[str], names: tuple[str, ...]) -> int | None:
+    return next((heads.index(name) for name in names if name in heads), None)

@@ -1,0 +1,277 @@
+"""The points of a sweep: every combination of the swept values, each a scene of its own.
+
+Points are made when they are needed: a sweep over ten thousand molecules holds their names, not their scenes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rotor.scenes.run import SUFFIXES, output_paths
+from rotor.scenes.scene import Scene, molecule_of
+from rotor.scenes.scene_file import scene_of
+from rotor.scenes.sweep.molecule_list import is_list, list_entries
+
+_NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
+_PLACE = re.compile(r"\{([^{}]*)\}")
+_MOLECULE = ("molecule", "molecule.source")  # swept names whose values may be lists of molecules
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The values of one swept name. shown: what tables show for each. words: what file names show, no two of them equal."""
+
+    name: str
+    values: tuple[Any, ...]
+    shown: tuple[Any, ...]
+    words: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        texts = (_NOT_IN_NAMES.sub("_", str(cell(value))) for value in self.shown)
+        object.__setattr__(self, "words", tuple(numbered(texts)))
+
+    @property
+    def key(self) -> str:
+        """The last part of the name, which stands in braces in the names of files."""
+        return self.name.rpartition(".")[2]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point of a sweep: its place in the order, the values by dotted name, and the tables of its scene."""
+
+    number: int
+    values: Mapping[str, Any]
+    content: Mapping[str, Any]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of this point; ValueError where it cannot be."""
+        return scene_of(self.content, f"sweep {text_of(self.values)}")
+
+
+@dataclass(frozen=True)
+class Points:
+    """All points of a sweep, made in order. combined: the Parquet file for the rows of all points, where there is one."""
+
+    axes: tuple[Axis, ...]
+    base: Mapping[str, Any]
+    combined: str | None
+
+    def __len__(self) -> int:
+        return math.prod(len(axis.values) for axis in self.axes)
+
+    def __iter__(self) -> Iterator[Point]:
+        for number, indices in enumerate(self._indices()):
+            content = deepcopy(dict(self.base))
+            for axis, i in zip(self.axes, indices, strict=True):
+                put(content, axis.name, axis.values[i])
+            outputs = content.get("outputs", {})
+            words = self._words(indices)
+            for name in SUFFIXES.keys() & outputs.keys():
+                texts = outputs[name]
+                outputs[name] = (
+                    [named(text, words) for text in texts] if isinstance(texts, list) else named(texts, words)
+                )
+            shown = {axis.name: axis.shown[i] for axis, i in zip(self.axes, indices, strict=True)}
+            yield Point(number, shown, content)
+
+    def _indices(self) -> Iterator[tuple[int, ...]]:
+        return itertools.product(*(range(len(axis.values)) for axis in self.axes))
+
+    def _words(self, indices: tuple[int, ...]) -> dict[str, str]:
+        """What stands in the names of files for each key in braces; a key of two swept names is left out."""
+        keys = [axis.key for axis in self.axes]
+        pairs = zip(self.axes, indices, strict=True)
+        return {axis.key: axis.words[i] for axis, i in pairs if keys.count(axis.key) == 1}
+
+    def refuse_equal_names(self) -> None:
+        """ValueError where two points would write one file."""
+        seen: set[str] = set()
+        patterns = list(_output_names(self.base.get("outputs", {})))
+        for indices in self._indices():
+            words = self._words(indices)
+            names = {os.path.normpath(named(pattern, words)) for pattern in patterns}
+            if twice := names & seen:
+                keys = " and ".join(f"{{{axis.key}}}" for axis in self.axes)
+                raise ValueError(
+                    f"outputs: {twice.pop()}: several points write this file; put {keys} into its name (the rows of all "
+                    "points go into one file that is named as parquet)"
+                )
+            seen |= names
+
+
+def is_sweep(scene: Scene, folder: str | os.PathLike[str] = ".") -> bool:
+    """Whether a scene has several points: swept values, or a list of molecules in place of one."""
+    return bool(scene.sweep) or _listed(scene, folder) is not None
+
+
+def _listed(scene: Scene, folder: str | os.PathLike[str]) -> str | None:
+    """The list of molecules that stands in place of the molecule of a scene."""
+    molecule = molecule_of(scene)
+    source = None if molecule is None else molecule.source
+    return source if source is not None and is_list(source, folder) else None
+
+
+def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
+    """Every combination of the values of a sweep, the last name running fastest.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a sweep, or with a list of molecules (an SDF file of several, a CSV file) as its molecule.
+    folder : path
+        From which the files that the scene reads are counted.
+
+    Returns
+    -------
+    Points
+        An iterable with a length.
+
+    Raises
+    ------
+    ValueError
+        For a name without values, for braces in the name of a file that no swept name fills, and where two points would write
+        one file.
+
+    Examples
+    --------
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> [p.scene.molecule for p in points(LevelsScene(molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
+    ['CO', 'HCl']
+    """
+    content: dict[str, Any] = msgspec.to_builtins(scene)
+    content |= {"schema": scene.schema}
+    content.pop("sweep", None)
+    swept = dict(scene.sweep)
+    whole = _listed(scene, folder)
+    if whole is not None and not any(name in swept for name in _MOLECULE):
+        swept = {"molecule.source" if isinstance(content["molecule"], dict) else "molecule": [whole]} | swept
+    axes = tuple(_axis(name, values, folder) for name, values in swept.items())
+    combined = _combined(content.get("outputs", {}), axes)
+    made = Points(axes, content, combined)
+    made.refuse_equal_names()
+    return made
+
+
+def _axis(name: str, values: list[Any], folder: str | os.PathLike[str]) -> Axis:
+    if not values:
+        raise ValueError(f"sweep.{name}: expected at least one value")
+    if name not in _MOLECULE:
+        counts = Counter(json.dumps(value, default=str) for value in values)
+        if twice := next((text for text, count in counts.items() if count > 1), None):
+            raise ValueError(f"sweep.{name}: {twice} stands there twice; each point is one combination of values")
+        return Axis(name, tuple(values), tuple(values))
+    sources: list[Any] = []
+    shown: list[Any] = []
+    for value in values:
+        if isinstance(value, str) and is_list(value, folder):
+            entries = list_entries(value, folder)
+            sources += [entry.source for entry in entries]
+            shown += [entry.name for entry in entries]
+        else:
+            sources.append(value)
+            shown.append(value)
+    texts = all(isinstance(value, str) for value in shown)
+    return Axis(name, tuple(sources), tuple(numbered(shown)) if texts else tuple(shown))
+
+
+def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> str | None:
+    """The name of the Parquet file of all points, taken out of the outputs of each; None where each point has its own."""
+    name = outputs.get("parquet")
+    if not isinstance(name, str) or _PLACE.search(name) or math.prod(len(axis.values) for axis in axes) == 1:
+        return None
+    del outputs["parquet"]
+    return name
+
+
+def _output_names(outputs: Mapping[str, Any]) -> Iterator[str]:
+    for name in SUFFIXES.keys() & outputs.keys():
+        texts = outputs[name]
+        yield from texts if isinstance(texts, list) else [texts]
+
+
+def numbered(texts: Iterable[str]) -> Iterator[str]:
+    """The texts, those that were there before with a number: a, b, a is a, b, a_2.
+
+    >>> list(numbered(["a", "b", "a", "a_2"]))
+    ['a', 'b', 'a_2', 'a_2_2']
+    """
+    seen: dict[str, int] = {}
+    for text in texts:
+        unique = text
+        while unique in seen:
+            seen[text] += 1
+            unique = f"{text}_{seen[text]}"
+        seen[unique] = 1
+        yield unique
+
+
+def named(text: str, words: Mapping[str, str]) -> str:
+    """A name of a file with its keys in braces filled: plain keys alone, {temperature} for conditions.temperature.
+
+    >>> named("{molecule}_{jmax}.csv", {"molecule": "CO", "jmax": "3"})
+    'CO_3.csv'
+    >>> named("{jmax.real}.csv", {"jmax": "3"})
+    Traceback (most recent call last):
+        ...
+    ValueError: outputs: '{jmax.real}.csv': {jmax.real} is no swept name; of the sweep there are {jmax}
+    """
+    for key in _PLACE.findall(text):
+        if key not in words:
+            known = ", ".join(f"{{{word}}}" for word in words)
+            raise ValueError(f"outputs: {text!r}: {{{key}}} is no swept name; of the sweep there are {known}")
+    if any(brace in _PLACE.sub("", text) for brace in "{}"):
+        raise ValueError(f"outputs: {text!r}: a brace without its partner; a swept name stands as {{key}}")
+    return _PLACE.sub(lambda found: words[found[1]], text)
+
+
+def put(content: dict[str, Any], name: str, value: Any) -> None:
+    """Put a value at a dotted name; the molecule's word becomes a table where one of its keys is meant."""
+    *path, last = name.split(".")
+    table = content
+    for part in path:
+        inner = table.get(part, {})
+        table[part] = inner = {"source": inner} if isinstance(inner, str) else inner
+        if not isinstance(inner, dict):
+            raise ValueError(f"sweep.{name}: {part} is no table of the scene")
+        table = inner
+    table[last] = value
+
+
+def check_first(every: Points, out: str | os.PathLike[str]) -> None:
+    """Check what all points share: the swept names, the folders and suffixes of the files that are written."""
+    first = next(iter(every))
+    output_paths(first.scene, out)
+    if every.combined is not None:
+        target = Path(out) / every.combined
+        if not target.name.lower().endswith(SUFFIXES["parquet"]):
+            raise ValueError(f"outputs.parquet: {every.combined}: the name must end in .parquet")
+        if not target.parent.is_dir():
+            raise ValueError(f"outputs.parquet: {target}: there is no folder {target.parent}; make it first")
+
+
+def cell(value: Any) -> Any:
+    """A swept value as a cell of a table: lists and tables as JSON text."""
+    return value if isinstance(value, int | float | str) else json.dumps(value, ensure_ascii=False, default=str)
+
+
+def text_of(values: Mapping[str, Any]) -> str:
+    """The values of a point in a sentence.
+
+    >>> text_of({"molecule": "CO", "observables.jmax": 3})
+    'molecule = CO, observables.jmax = 3'
+    """
+    return ", ".join(f"{name} = {value}" for name, value in values.items())

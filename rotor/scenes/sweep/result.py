@@ -1,0 +1,47 @@
+"""What came of a sweep: a row for each point, with its values and its results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.scenes.sweep.points import cell
+from rotor.table import Table
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult(Table):
+    """A sweep that was run: a row for each point. computed: how many points were run now; the others were done before. combined: the
+    file with the rows of all points."""
+
+    records: tuple[Mapping[str, Any], ...]
+    computed: int
+    combined: Path | None = None
+
+    @property
+    def failed(self) -> tuple[Mapping[str, Any], ...]:
+        """The records of the points that failed, each with its reason under "error"."""
+        return tuple(record for record in self.records if "error" in record)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The swept values, rows, seconds, every result, and the reasons of points that failed; NaN where a point has no such number."""
+        first = self.records[0]["values"] if self.records else {}
+        out = {name: np.array([cell(record["values"][name]) for record in self.records]) for name in first}
+        out["rows"] = np.array([record.get("rows", 0) for record in self.records])
+        out["seconds"] = np.array([record["seconds"] for record in self.records])
+        names = dict.fromkeys(name for record in self.records for name in record.get("results", {}))
+        for name in names:
+            out[name] = np.array([record.get("results", {}).get(name, np.nan) for record in self.records])
+        return out | ({"error": np.array([record.get("error", "") for record in self.records])} if self.failed else {})
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files of all points, and the file of all points."""
+        single = [file for record in self.records for file in record.get("files", ())]
+        return (*single, *([] if self.combined is None else [str(self.combined)]))

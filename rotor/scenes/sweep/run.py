@@ -1,0 +1,199 @@
+"""A sweep run: every point that is not done, spread over an executor, each recorded as soon as it is done or has failed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rotor.formats.atomic_write import FULL
+from rotor.scenes.kind import NoResultError
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene import Scene
+from rotor.scenes.scene_file import scene_of, scene_text
+from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
+from rotor.scenes.sweep.inputs import InputHashes
+from rotor.scenes.sweep.point_results import point_results
+from rotor.scenes.sweep.points import check_first, points, text_of
+from rotor.scenes.sweep.record import Record, appended, read_records
+from rotor.scenes.sweep.result import SweepResult
+from rotor.temporary import locked_file
+
+AHEAD = 200  # points that are submitted before they are begun, so that workers never wait and memory stays bounded
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point on its way to a worker."""
+
+    key: str
+    values: Mapping[str, Any]
+    content: Mapping[str, Any]
+    folder: str
+    out: str
+    combined: str | None
+
+
+def run_sweep(
+    scene: Scene,
+    *,
+    folder: str | os.PathLike[str] = ".",
+    out: str | os.PathLike[str] = ".",
+    record: str | os.PathLike[str] | None = None,
+    executor: Executor | None = None,
+    retry_failed: bool = False,
+    on_point: Callable[[Record], None] = lambda _: None,
+    progress: Callable[[int, int], object] = lambda done, total: None,
+) -> SweepResult:
+    """Run every point of a sweep that the record has not yet; a point that fails is recorded with its reason, the others run.
+
+    A point is done where the record has its key, a hash of its scene, of the content of every file that it reads, and of the
+    version of the package, and where its files are there.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a sweep, or with a list of molecules as its molecule. Rows of all points go into one file where outputs.parquet is
+        a name without a swept key in braces.
+    folder, out : path
+        From which the files that are read, and those that are written, are counted.
+    record : path, optional
+        A file with one line for each point that was run; no other run may use it meanwhile.
+    executor : Executor, optional
+        Points are spread over it: `rotor.scenes.worker_processes.WorkerProcesses`, or any other.
+    retry_failed : bool, optional
+        Run points again that the record has as failed.
+    on_point : callable
+        Called with the record of each point when it is done.
+    progress : callable
+        Called with the number of points that are done, and of all.
+
+    Returns
+    -------
+    SweepResult
+        In the order of the points; `failed` has those that failed.
+
+    Raises
+    ------
+    ValueError
+        What no point could be: swept names that the scene has not, files that cannot be written; before any is run.
+    """
+    every = points(scene, folder)
+    check_first(every, out)
+    joined = None if every.combined is None else CombinedFile(Path(out) / every.combined)
+    finished = 0
+    with ExitStack() as stack:
+        for path in (record, None if joined is None else joined.target):
+            if path is not None:
+                stack.enter_context(locked_file(path))
+        done = dict(read_records(record))
+        there = None if joined is None else joined.keys()
+        keys: list[str] = []
+
+        def missing() -> Iterator[Job]:
+            nonlocal finished
+            hashes = InputHashes(folder)
+            for point in every:
+                key = hashes.key(point.content, point.values)
+                keys.append(key)
+                if _stands(done.get(key), retry_failed, there):
+                    finished += 1
+                    progress(finished, len(every))
+                else:
+                    yield Job(key, point.values, point.content, os.fspath(folder), os.fspath(out), every.combined)
+
+        if joined is not None:
+            joined.open_folder()
+        append, computed = stack.enter_context(appended(record)), 0
+        for made in _computed(missing(), executor):
+            done[made["key"]] = made
+            append(made)
+            computed, finished = computed + 1, finished + 1
+            on_point(made)
+            progress(finished, len(every))
+        if joined is not None:
+            joined.join([key for key in keys if "error" not in done[key]], scene_text(scene))
+    combined = None if joined is None else joined.target.resolve()
+    return SweepResult(tuple(done[key] for key in keys), computed, combined)
+
+
+def _stands(made: Record | None, retry_failed: bool, there: set[str] | None) -> bool:
+    """Whether a point need not be run: it failed before, or its files, and its rows in the file of all points, are there."""
+    if made is None:
+        return False
+    if "error" in made:
+        return not retry_failed
+    rows = there is None or made["key"][:KEY_LENGTH] in there
+    return rows and all(Path(file).is_file() for file in made["files"])
+
+
+def _computed(jobs: Iterable[Job], executor: Executor | None) -> Iterator[Record]:
+    """The records of all jobs, as they are done."""
+    if executor is None:
+        yield from map(run_point, jobs)
+        return
+    waiting: dict[Future[Record], Job] = {}
+    try:
+        for job in jobs:
+            waiting[executor.submit(run_point, job)] = job
+            if len(waiting) >= AHEAD or any(future.done() for future in waiting):
+                yield from _ready(waiting)
+        while waiting:
+            yield from _ready(waiting)
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _ready(waiting: dict[Future[Record], Job]) -> Iterator[Record]:
+    """Records of jobs that are done, taken out of those that are waited for; of at least one."""
+    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+        job = waiting.pop(future)
+        try:
+            yield future.result()
+        except (BrokenExecutor, CancelledError):  # nothing more can be submitted
+            raise
+        except OSError as error:  # a disk that is full, see run_point
+            raise OSError(error.errno, error.strerror, error.filename) from error
+        except Exception as error:  # the worker was killed, or the cluster has lost it
+            yield _failed(job, f"{error}" or type(error).__name__, 0.0)
+
+
+def run_point(job: Job) -> Record:
+    """Run one point; what the record says of it, its error where it fails.
+
+    Raises OSError where a disk is full: then no other point can be written either.
+    """
+    start = time.perf_counter()
+    try:
+        scene = scene_of(job.content, f"sweep {text_of(job.values)}")
+        result = run_scene(scene, folder=job.folder, out=job.out)
+        files = [str(path.resolve()) for path in result.files]
+        if job.combined is not None:
+            CombinedFile(Path(job.out) / job.combined).write_part(job.key, job.values, result.table)
+        results = point_results(scene.kind, result.answer, len(result.table))
+    except (ValueError, NoResultError) as error:
+        return _failed(job, str(error), time.perf_counter() - start)
+    except MemoryError:
+        return _failed(job, "not enough memory", time.perf_counter() - start)
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno in FULL:
+            raise
+        return _failed(job, f"{type(error).__name__}: {error}; this is a defect", time.perf_counter() - start)
+    return {
+        "key": job.key,
+        "values": dict(job.values),
+        "rows": len(result.table),
+        "seconds": round(result.seconds, 6),
+        "files": files,
+        "results": results,
+    }
+
+
+def _failed(job: Job, reason: str, seconds: float) -> Record:
+    return {"key": job.key, "values": dict(job.values), "seconds": round(seconds, 6), "error": reason}

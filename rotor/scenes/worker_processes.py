@@ -1,0 +1,105 @@
+"""Processes that share work, each on its own: one that is killed costs the piece that it was at, not the others.
+
+A `ProcessPoolExecutor` is broken for good when one of its processes ends, as the system ends one that takes too much memory. Here every
+process is a pool of one, which is started again. Each takes one thread of BLAS: several processes of several threads wait for each other.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_STARTING = threading.Lock()  # the environment is that of the whole process
+
+
+class WorkerKilledError(RuntimeError):
+    """The process that computed a piece has ended before it was done."""
+
+
+class WorkerProcesses(Executor):
+    """An executor of processes that do not depend on each other."""
+
+    def __init__(self, number: int) -> None:
+        self._threads = ThreadPoolExecutor(number)
+        self._local = threading.local()
+        self._pools: set[ProcessPoolExecutor] = set()
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """One call, in the next process that is free; its future has WorkerKilledError where that process ends."""
+        return self._threads.submit(self._call, fn, args, kwargs)
+
+    def _call(self, fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+        pool = getattr(self._local, "pool", None)
+        if pool is None:
+            pool = self._local.pool = _started_process()
+            self._pools.add(pool)
+        try:
+            return pool.submit(fn, *args, **kwargs).result()
+        except BrokenProcessPool:
+            self._local.pool = None
+            self._pools.discard(pool)
+            pool.shutdown(wait=False)
+            raise WorkerKilledError("its process was ended from outside, as by lack of memory") from None
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes when they have done what was submitted, or, of that, only what has begun."""
+        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        for pool in tuple(self._pools):
+            pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def terminate(self) -> None:
+        """End the processes now; what they were at is lost."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for pool in tuple(self._pools):
+            for process in (getattr(pool, "_processes", None) or {}).values():  # public from Python 3.14 on
+                process.terminate()
+        self.shutdown()
+
+
+@contextmanager
+def worker_processes(number: int) -> Iterator[WorkerProcesses]:
+    """So many processes until the end of the context; where it ends with an error or Ctrl-C, they are ended at once."""
+    pool = WorkerProcesses(number)
+    try:
+        yield pool
+    except BaseException:
+        pool.terminate()
+        raise
+    pool.shutdown()
+
+
+def _started_process() -> ProcessPoolExecutor:
+    """A pool of one process that has started with one thread of BLAS, whatever this process has."""
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    with _STARTING:
+        before = {name: os.environ.get(name) for name in _ONE_THREAD}
+        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+        try:
+            pool.submit(_nothing)
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+    return pool
+
+
+def _nothing() -> None:
+    """The first piece: a process is started when it has one."""
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches all processes of a terminal; the one that began ends the others."""
+    with suppress(ValueError):  # not in the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,445 @@
+"""Sweeps: what makes a point out of date, points that fail, lists of molecules, one file of all points, locks."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene import LevelsScene, SpectrumScene
+from rotor.scenes.scene_file import parse_scene, write_scene
+from rotor.scenes.sections import BasisNumerics, LevelsObservables, LevelsOutputs, MoleculeSection
+from rotor.scenes.sweep import points, run_sweep
+from rotor.scenes.sweep.inputs import InputHashes
+from rotor.scenes.worker_processes import WorkerKilledError, worker_processes
+from rotor.temporary import locked_file
+
+LINEAR = "[constants]\nB = {b}\n"
+
+
+def levels(**changes) -> LevelsScene:
+    return LevelsScene(**{"molecule": "CO", "observables": LevelsObservables(jmax=2), **changes})
+
+
+# Keys of finished points
+
+
+def test_constants_changed_in_a_file_are_computed_anew(call, folder):
+    """The review's case: 10000 MHz becomes 20000 MHz, and the numbers follow."""
+    Path("m.toml").write_text(LINEAR.format(b=10000.0))
+    write_scene(levels(molecule="m.toml", sweep={"observables.jmax": [1, 2]}), "s.toml")
+    for b in (10000.0, 20000.0):
+        Path("m.toml").write_text(LINEAR.format(b=b))
+        assert call("run", "s.toml", "--json", "r.json")[0] == 0
+        answer = json.loads(Path("r.json").read_text())
+        assert answer["computed"] == 2
+        highest = [point["highest_cm"] * rotor.units.MHZ_PER_CM for point in answer["points"]]
+        np.testing.assert_allclose(highest, [2 * b, 6 * b], rtol=1e-12)  # B J(J+1), exact but for the units
+    assert call("run", "s.toml")[2].startswith("2 points: 0 computed now")
+
+
+def _key(scene, folder="."):
+    (point,) = points(scene, folder)
+    return InputHashes(folder).key(point.content, point.values)
+
+
+@pytest.mark.parametrize(
+    ("file", "scene"),
+    [
+        ("m.toml", levels(molecule="m.toml", sweep={"observables.jmax": [1]})),
+        ("m.toml", levels(molecule=MoleculeSection(source="m.toml"), sweep={"observables.jmax": [1]})),
+        ("h.txt", levels(molecule=MoleculeSection(source="water", hessian="h.txt"), sweep={"observables.jmax": [1]})),
+        ("case.var", levels(molecule="case.int", sweep={"observables.jmax": [1]})),
+        ("levels.csv", levels(molecule="with_levels.toml", sweep={"observables.jmax": [1]})),
+        ("mine/named.toml", levels(molecule="my molecule", sweep={"observables.jmax": [1]})),
+        (
+            "lines.csv",
+            parse_scene(
+                'schema = 1\nkind = "fit"\nmolecule = "CO"\n[lines]\nsource = "lines.csv"\n[sweep]\n"numerics.max_iterations" = [3]'
+            ),
+        ),
+        ("many.sdf", levels(sweep={"molecule": ["many.sdf#2"]})),
+    ],
+)
+def test_every_file_that_enters_is_part_of_the_key(folder, monkeypatch, file, scene):
+    monkeypatch.setenv("ROTOR_MOLECULES", "mine")
+    Path("mine").mkdir()
+    Path("case.int").write_text("int")
+    Path("with_levels.toml").write_text('[levels]\nfile = "levels.csv"\n')
+    Path("many.sdf").write_text("one\n$$$$\ntwo\n$$$$\n")
+    Path("mine/named.toml").write_text('name = "my molecule"\n')
+    if not Path(file).exists():
+        Path(file).write_text("before")
+    before = _key(scene)
+    assert _key(scene) == before
+    Path(file).write_text(Path(file).read_text().replace("two", "three") + "\n# changed\n")
+    assert _key(scene) != before
+
+
+def test_other_files_are_not_part_of_the_key(folder):
+    Path("out.csv").write_text("a result of the last run")
+    Path("many.sdf").write_text("one\n$$$$\ntwo\n$$$$\n")
+    own = levels(outputs=LevelsOutputs(csv="out.csv"), sweep={"observables.jmax": [1]})
+    second = levels(sweep={"molecule": ["many.sdf#2"]})
+    before = _key(own), _key(second)
+    Path("out.csv").write_text("another result")
+    Path("many.sdf").write_text("uno\n$$$$\ntwo\n$$$$\n")
+    assert (_key(own), _key(second)) == before
+
+
+def test_values_of_a_point_and_the_version_are_part_of_the_key(folder, monkeypatch):
+    scene = levels(sweep={"observables.jmax": [1]})
+    before = _key(scene)
+    assert _key(levels(sweep={"observables.jmax": [2]})) != before
+    monkeypatch.setattr("rotor.scenes.sweep.inputs.version", lambda: "9")
+    assert _key(scene) != before
+
+
+# Points that fail
+
+
+def test_a_bad_molecule_costs_its_own_point(call, folder):
+    write_scene(levels(sweep={"molecule": ["CO", "no such molecule", "HCl"]}), "s.toml")
+    code, out, err = call("run", "s.toml", "--json", "r.json")
+    assert code == 1
+    assert "HCl" in out
+    summary, error = err.splitlines()
+    assert summary.startswith("3 points: 3 computed now")
+    assert summary.endswith("1 failed")
+    assert error.startswith(
+        "error: 1 point of 3 failed (--retry-failed runs them again): molecule = no such molecule: "
+    )
+    answer = json.loads(Path("r.json").read_text())
+    assert [point["rows"] for point in answer["points"]] == [3, 0, 3]
+    assert [point["highest_cm"] is None for point in answer["points"]] == [False, True, False]
+    assert "no such molecule" in answer["failed"][0]["error"]
+
+    code, _, err = call("run", "s.toml")  # not run again, and still said
+    assert code == 1
+    assert err.startswith("3 points: 0 computed now")
+    code, _, err = call("run", "s.toml", "--retry-failed")
+    assert code == 1
+    assert err.startswith("3 points: 1 computed now")
+
+
+def test_a_failed_point_is_run_again_when_its_file_is_repaired(folder):
+    scene = levels(sweep={"molecule": ["CO", "m.toml"]})
+    Path("m.toml").write_text("[constants]\nB = 'x'\n")
+    assert len(run_sweep(scene, record="r").failed) == 1
+    Path("m.toml").write_text(LINEAR.format(b=1e4))
+    result = run_sweep(scene, record="r")
+    assert (result.failed, result.computed) == ((), 1)
+
+
+def test_a_scene_that_no_point_can_be_is_refused_at_once(call, folder):
+    write_scene(levels(sweep={"observables.j": [1, 2]}), "s.toml")
+    code, _, err = call("run", "s.toml")
+    assert code == 2
+    assert "[observables] has no key 'j'" in err
+    assert not Path("s.sweep.jsonl").exists()
+
+
+@pytest.mark.parametrize("line", ["1", "[]", "null", '"a"', '{"key": 1}', '{"key": "a", "values": {}}', "schema = 1"])
+def test_odd_lines_of_a_record_are_errors_in_one_line(call, folder, line):
+    write_scene(levels(sweep={"observables.jmax": [1]}), "s.toml")
+    call("run", "s.toml")
+    before = Path("s.sweep.jsonl").read_text() + line + "\n"
+    Path("s.sweep.jsonl").write_text(before)
+    code, _, err = call("run", "s.toml")
+    assert code == 2
+    assert err.startswith("error: s.sweep.jsonl, line 2: ")
+    assert Path("s.sweep.jsonl").read_text() == before
+
+
+def test_a_record_whose_last_line_was_cut_off_goes_on(folder):
+    scene = levels(sweep={"observables.jmax": [1, 2]})
+    run_sweep(scene, record="r")
+    whole = Path("r").read_text()
+    Path("r").write_text(whole[:-20])
+    assert run_sweep(scene, record="r").computed == 1
+    assert run_sweep(scene, record="r").computed == 0
+
+
+# Workers
+
+
+def _double(number):
+    return 2 * number
+
+
+def _end_this_process(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _threads_of_blas(_):
+    return [os.environ.get(name) for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_killed_worker_costs_its_piece(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    with worker_processes(2) as pool:
+        killed = [pool.submit(_end_this_process, 0) for _ in range(3)]
+        others = [pool.submit(_double, n) for n in range(20)]
+        assert [future.result() for future in others] == [2 * n for n in range(20)]
+        for future in killed:
+            with pytest.raises(WorkerKilledError, match="ended from outside"):
+                future.result()
+        assert pool.submit(_threads_of_blas, 0).result() == ["1", "1", "1"]
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_sweep_goes_on_where_a_worker_is_killed(folder, monkeypatch):
+    """One point is given to a process that ends; the others are done, and its record says why."""
+    scene = levels(sweep={"observables.jmax": list(range(1, 9))})
+
+    class Deadly:
+        """An executor that ends the process of the third point."""
+
+        def __init__(self, pool):
+            self.pool = pool
+
+        def submit(self, function, job):
+            return self.pool.submit(_end_this_process if job.values["observables.jmax"] == 3 else function, job)
+
+    with worker_processes(2) as pool:
+        result = run_sweep(scene, record="r", executor=Deadly(pool))
+        assert [made["values"] for made in result.failed] == [{"observables.jmax": 3}]
+        assert "ended from outside" in result.failed[0]["error"]
+        assert result.columns["rows"].tolist() == [2, 3, 0, 5, 6, 7, 8, 9]
+        again = run_sweep(scene, record="r", executor=pool, retry_failed=True)
+    assert (again.failed, again.computed) == ((), 1)
+
+
+def _interrupted():
+    with worker_processes(1) as pool:
+        pool.submit(_double, 1).result()
+        pool.submit(time.sleep, 60)
+        raise KeyboardInterrupt
+
+
+def test_an_error_ends_the_workers_at_once():
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted()
+    assert time.monotonic() - start < 30  # s; the piece alone takes 60
+
+
+# Lists of molecules, and one file of all points
+
+WATER = """{name}
+  written by hand
+
+  3  2  0  0  0  0            999 V2000
+    0.0000    0.0000    0.1173 O   0  0
+    0.0000    {y}   -0.4692 H   0  0
+    0.0000   -{y}   -0.4692 H   0  0
+  1  2  1  0
+  1  3  1  0
+M  END
+$$$$
+"""
+
+
+def sdf(*entries) -> str:
+    return "".join(WATER.format(name=name, y=f"{y:.4f}") for name, y in entries)
+
+
+def test_an_sdf_of_many_molecules_is_a_sweep_over_them(call, folder):
+    Path("many.sdf").write_text(sdf(("water", 0.7572), ("wide", 0.8), ("water", 0.9)))
+    write_scene(levels(molecule="many.sdf", outputs=LevelsOutputs(csv="{molecule}.csv")), "s.toml")
+    code, _, err = call("run", "s.toml")
+    assert code == 0, err
+    assert sorted(path.name for path in folder.glob("*.csv")) == ["water.csv", "water_2.csv", "wide.csv"]
+    for number, name in enumerate(("water", "wide", "water_2"), 1):
+        alone = run_scene(levels(molecule=f"many.sdf#{number}"))
+        assert str(alone.table.energy_mhz[-1]) in Path(f"{name}.csv").read_text()
+    with pytest.raises(ValueError, match=r"many.sdf#4: the file has 3 molecules"):
+        rotor.read("many.sdf#4")
+    with pytest.raises(ValueError, match=r"3 molecules.*many.sdf#1"):
+        rotor.read("many.sdf")
+
+
+def test_a_csv_of_smiles_or_names_is_a_sweep_over_them(folder):
+    Path("a.csv").write_text("id,SMILES\nformaldehyde,C=O\n,[C-]#[O+]\nformaldehyde,C#N\n")
+    made = [(p.values["molecule"], p.content["molecule"]) for p in points(levels(molecule="a.csv"))]
+    assert made == [
+        ("formaldehyde", "SMILES:C=O"), ("[C-]#[O+]", "SMILES:[C-]#[O+]"), ("formaldehyde_2", "SMILES:C#N"),
+    ]  # fmt: skip
+    Path("b.csv").write_text("name;x\n")
+    with pytest.raises(ValueError, match=r"b.csv: expected a column smiles, molecule or name, found name;x"):
+        points(levels(molecule="b.csv"))
+    Path("c.csv").write_text("name\nCO\nHCl\n")
+    result = run_sweep(levels(sweep={"molecule": ["OCS", "c.csv"], "observables.jmax": [0, 1]}))
+    assert result.columns["molecule"].tolist() == ["OCS", "OCS", "CO", "CO", "HCl", "HCl"]
+
+
+def test_names_that_become_equal_in_files_get_a_number(folder):
+    scene = levels(
+        sweep={"molecule": ["SMILES:C=O", "SMILES:C#O", "SMILES:C-O"]}, outputs=LevelsOutputs(csv="{molecule}.csv")
+    )
+    assert [p.content["outputs"]["csv"] for p in points(scene)] == [
+        "SMILES_C_O.csv",
+        "SMILES_C_O_2.csv",
+        "SMILES_C-O.csv",
+    ]
+
+
+def _rows(path):
+    import duckdb
+
+    return duckdb.sql(f"SELECT molecule, jmax, j, energy_mhz FROM '{path}'").fetchall()
+
+
+def test_rows_of_all_points_go_into_one_parquet_file(folder):
+    scene = levels(
+        sweep={"molecule": ["HCl", "CO", "bad word"], "observables.jmax": [1, 2]},
+        outputs=LevelsOutputs(parquet="all.parquet"),
+    )
+    result = run_sweep(scene, record="r")
+    rows = _rows("all.parquet")
+    assert [row[:3] for row in rows] == [(m, n, j) for m in ("HCl", "CO") for n in (1, 2) for j in range(n + 1)]
+    alone = run_scene(levels(molecule="CO")).table.energy_mhz.tolist()
+    assert [row[3] for row in rows[-3:]] == alone
+    assert len(result.failed) == 2
+    assert sorted(path.name for path in folder.iterdir()) == ["all.parquet", "r"]
+    import duckdb
+
+    (metadata,) = duckdb.sql("SELECT value FROM parquet_kv_metadata('all.parquet') WHERE key = 'provenance'").fetchall()
+    assert parse_scene(metadata[0].decode()) == scene
+
+    assert run_sweep(scene, record="r").computed == 0  # nothing is lost when nothing is new
+    assert _rows("all.parquet") == rows
+    fewer = levels(sweep={"molecule": ["CO", "OCS"], "observables.jmax": [1, 2]}, outputs=scene.outputs)
+    assert run_sweep(fewer, record="r").computed == 2  # of OCS; those of HCl leave the file
+    assert [row[0] for row in _rows("all.parquet")] == ["CO"] * 5 + ["OCS"] * 5
+    Path("all.parquet").unlink()
+    assert run_sweep(scene, record="r").computed == 4  # rows that are lost are made again
+    assert _rows("all.parquet") == rows
+
+
+def test_a_stopped_sweep_keeps_the_rows_of_its_points(folder):
+    scene = levels(
+        sweep={"molecule": ["CO", "HCl"], "observables.jmax": [1, 2]}, outputs=LevelsOutputs(parquet="all.parquet")
+    )
+    count = []
+
+    def stop(made):
+        count.append(made)
+        if len(count) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(scene, record="r", on_point=stop)
+    assert not Path("all.parquet").exists()
+    assert run_sweep(scene, record="r").computed == 1
+    assert len(_rows("all.parquet")) == 10
+
+
+def test_the_summary_shows_results(folder):
+    result = run_sweep(SpectrumScene(molecule="CO", numerics=BasisNumerics(jmax=3), sweep={"molecule": ["CO", "HCl"]}))
+    columns = result.columns
+    for row, name in enumerate(("CO", "HCl")):
+        lines = rotor.line_list(rotor.read(name), jmax=3)
+        best = lines.intensity_nm2_mhz.argmax()
+        assert columns["lines"][row] == len(lines)
+        assert columns["strongest_mhz"][row] == lines.frequency_mhz[best]
+        assert columns["q"][row] == lines.partition.q
+
+
+def test_ten_thousand_points_begin_at_once(folder):
+    """Points are made when they are needed: the first result comes before the last scene is checked."""
+    scene = levels(sweep={"observables.jmax": list(range(10_000))}, observables=LevelsObservables(max_energy="1 MHz"))
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    start = time.process_time()
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(scene, on_point=stop)
+    assert time.process_time() - start < 1.0  # s, as the issue asks
+
+
+# Locks and paths
+
+
+def test_a_file_has_one_writer(folder):
+    with (
+        locked_file("a.csv"),
+        pytest.raises(ValueError, match=rf"a.csv: another run \(process {os.getpid()}\) is writing"),
+        locked_file(folder / "a.csv"),
+    ):
+        pass
+    assert list(folder.iterdir()) == []
+    with locked_file("a.csv"), locked_file("b.csv"), locked_file(os.devnull), locked_file(os.devnull):
+        pass
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "sweep.toml"),
+        ("run", "one.toml"),
+        ("run", "all.toml"),
+        ("levels", "CO", "--csv", "a.csv"),
+        ("spectrum", "CO", "--cat", "a.cat"),
+        ("levels", "CO", "--json", "a.json"),
+    ],
+)
+def test_the_second_of_two_runs_that_write_one_file_is_refused(call, folder, arguments):
+    write_scene(levels(sweep={"observables.jmax": [1, 2]}), "sweep.toml")
+    write_scene(levels(outputs=LevelsOutputs(csv="a.csv")), "one.toml")
+    write_scene(levels(sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(parquet="a.parquet")), "all.toml")
+    busy = {"sweep.toml": "sweep.sweep.jsonl", "one.toml": "a.csv", "all.toml": "a.parquet"}.get(
+        arguments[1], arguments[-1]
+    )
+    code = f"from rotor.temporary import locked_file\nwith locked_file({busy!r}):\n    print('locked', flush=True)\n    input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout.readline() == "locked\n"
+        answer = call(*arguments)
+        holder.kill()  # a run that is killed holds nothing
+    assert answer[0] == 2
+    assert f"another run (process {holder.pid}) is writing this file" in answer[2]
+    assert call(*arguments)[0] == 0
+    assert not list(folder.glob(".rotor*"))
+
+
+@pytest.mark.parametrize("name", ["../a.csv", "{place}/a.csv", "sub/../../a.csv"])
+def test_outputs_of_a_scene_stay_in_its_folder(call, folder, name):
+    Path("work/sub").mkdir(parents=True)
+    os.chdir("work")
+    name = name.replace("{place}", str(folder))
+    write_scene(levels(outputs=LevelsOutputs(csv=name)), "s.toml")
+    write_scene(levels(outputs=LevelsOutputs(csv=name), sweep={"molecule": ["CO"]}), "t.toml")
+    for scene in ("s.toml", "t.toml"):
+        code, _, err = call("run", scene)
+        assert code == 2
+        assert "lies outside the folder ." in err
+    assert not (folder / "a.csv").exists()
+
+
+def test_a_folder_that_was_typed_is_written_to(call, folder):
+    Path("work").mkdir()
+    write_scene(levels(outputs=LevelsOutputs(csv=str(folder / "a.csv"))), "work/s.toml")
+    assert call("run", "work/s.toml", "--out", str(folder))[0] == 0
+    assert (folder / "a.csv").exists()
+
+
+def test_parquet_of_all_points_stays_in_the_folder(call, folder):
+    Path("work").mkdir()
+    os.chdir("work")
+    write_scene(levels(sweep={"molecule": ["CO", "HCl"]}, outputs=LevelsOutputs(parquet="../a.parquet")), "s.toml")
+    code, _, err = call("run", "s.toml")
+    assert (code, "lies outside" in err) == (2, True)
