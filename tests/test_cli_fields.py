@@ -207,7 +207,6 @@ def test_every_kind_of_pulse(call, options):
         (("stark", "OCS", "--tilt", "20", "--m", "0"), "mixes M"),
         (("stark", "OCS", "--light", "1,2", "--lines", "a.csv"), "a direction such as 1,0,1"),
         (("stark", "OCS", "--workers", "0"), "--workers: 0"),
-        (("stark", "OCS", "--field", "0,1", "--coefficients", "a.csv"), "more than 4"),
         (("stark", "OCS", "--field", "0,1,5", "--deflection", "a.csv"), "evenly"),
         (("stark", "OCS", "--temperature", "0"), "--temperature"),
         (("stark", "CCl4"), "spherical top"),

@@ -145,6 +145,11 @@ class FieldBlock(ABC):
         """Energies of the free top (n,)."""
         return self.levels.energy_mhz[self.rows]
 
+    @property
+    def even_in_field(self) -> bool:
+        """Whether a reversed electric field leaves all energies: half a turn about an axis across it and time reversal keep K and M."""
+        return True
+
     @cached_property
     def free_order(self) -> Ints:
         """Places of the states in order of their free energies, J deciding between equal ones (n,)."""
@@ -187,6 +192,11 @@ class AxialBlock(FieldBlock):
     def levels(self) -> FreeLevels:
         """The levels of the space."""
         return self.space.levels
+
+    @property
+    def even_in_field(self) -> bool:
+        """Where K M is not 0 a reversed field exchanges K and -K."""
+        return not self.k * self.m
 
     @property
     def label(self) -> str:

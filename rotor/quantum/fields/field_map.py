@@ -54,7 +54,8 @@ class FieldMap(Table):
     edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
     weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. moved_mhz: by how much the energy of
     each state still moved when J max was raised, at the highest field. round_off_mhz: of each energy, a few units in the last
-    place of the largest one of its matrix.
+    place of the largest one of its matrix. block_number: place of the block in `blocks_of_map`. request: what the map was
+    made from.
     """
 
     field_name: str
@@ -75,6 +76,8 @@ class FieldMap(Table):
     jmax: int
     moved_mhz: Floats
     round_off_mhz: Floats
+    block_number: Ints
+    request: MapRequest
     diabatic_label: NDArray[np.str_] | None = None
 
     def __len__(self) -> int:
@@ -222,7 +225,7 @@ def converged_jmax(
                 f"J max {jmax} is too small: with {more} energies at the highest field move by {worst:.3g} MHz, more than "
                 f"{request.tolerance_mhz:g}; give a higher J max, or none and it is chosen"
             )
-        least = max(_round_off(request.problem(block), ends) for block in _blocks(request, more))
+        least = max(_round_off(request.problem(block), ends) for block in blocks_of_map(request, more))
         if worst <= least:
             raise ValueError(
                 f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
@@ -232,7 +235,8 @@ def converged_jmax(
             raise ValueError(f"the field needs J beyond {HIGHEST_J}: it is too strong for this top")
 
 
-def _blocks(request: MapRequest, jmax: int) -> list[FieldBlock]:
+def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
+    """The blocks that hold states of a map, in its order."""
     space = request.space(jmax)
     return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
 
@@ -258,7 +262,7 @@ def each_block(
     list
         What `run` returned, in the order of the blocks.
     """
-    blocks = _blocks(request, jmax)
+    blocks = blocks_of_map(request, jmax)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
 
@@ -325,17 +329,19 @@ def _round_off(problem: BlockProblem, fields: Floats) -> float:
 
 
 def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
-    blocks = _blocks(request, jmax)
+    blocks = blocks_of_map(request, jmax)
     if executor is None or _is_small(request, blocks):
         solved = _solve_blocks(request, blocks)
     else:
         solved = each_block(request, jmax, partial(_solve_block, request), executor)
-    fields, rows = request.fields, []
+    fields, rows, numbers = request.fields, [], []
     named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
-    for one, names in zip(solved, named, strict=True):
+    for number, (one, names) in enumerate(zip(solved, named, strict=True)):
         ours = one.block.levels.j[one.rows] <= request.j_highest
         listed = ours if names is None else ours | ours[names].any(axis=0)
-        rows += [(one, rank) for rank in np.flatnonzero(listed).tolist()]
+        ranks = np.flatnonzero(listed).tolist()
+        rows += [(one, rank) for rank in ranks]
+        numbers += [number] * len(ranks)
 
     def column(pick: Callable[[_Solved, int], Floats]) -> Floats:
         return np.concatenate([pick(one, rank) for one, rank in rows])
@@ -363,6 +369,8 @@ def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor
         jmax=jmax,
         moved_mhz=np.repeat(_accuracy(request, rows, moved), len(fields)),
         round_off_mhz=repeated(lambda one, rank: one.round_off),
+        block_number=np.repeat(np.array(numbers, dtype=np.int64), len(fields)),
+        request=request,
         diabatic_label=_diabatic_labels(solved, named, rows),
     )
 

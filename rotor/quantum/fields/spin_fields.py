@@ -79,6 +79,11 @@ class SpinFieldBlock(FieldBlock):
     space: SpinSpace = field(repr=False)
 
     @property
+    def even_in_field(self) -> bool:
+        """Where K is good and neither it nor M is 0, a reversed field exchanges K and -K."""
+        return not (axial_k_of(self) and self.twice_m)
+
+    @property
     def label(self) -> str:
         """Which block it is."""
         return self.species

@@ -28,6 +28,7 @@ from rotor.checks import require_one_of, require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import Z, checked_direction, map_request
 from rotor.quantum.fields.block_states import BlockStates, block_states
+from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import converged_jmax, each_block
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.tilted_blocks import TiltedBlock
@@ -51,7 +52,8 @@ class FieldLines(Table):
 
     frequency_mhz: E′ - E″, the upper state being the higher one at the last field: below 0 where they have crossed. shift_mhz: from the
     line of the free top. strength_debye2, intensity_nm2_mhz: for the light given, all coinciding pairs together. upper, lower: labels of
-    the free levels; upper_m, lower_m: |M|, |M_F| with spins, -1 where M is mixed. lower_mhz: E″.
+    the free levels; upper_m, lower_m: |M|, |M_F| with spins, -1 where M is mixed. lower_mhz: E″. upper_state, lower_state: numbers of
+    the states, counted through `blocks` of `request`.
     """
 
     top: Top
@@ -71,6 +73,10 @@ class FieldLines(Table):
     jmax: int
     accuracy_mhz: float
     q: Floats = field(repr=False)
+    upper_state: Ints = field(repr=False)
+    lower_state: Ints = field(repr=False)
+    request: MapRequest = field(repr=False)
+    blocks: tuple[FieldBlock, ...] = field(repr=False)
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -122,7 +128,8 @@ class FieldLines(Table):
         """Some of the rows; whole pairs of states where `pairs` is to be used."""
         from dataclasses import replace
 
-        cut: dict[str, Any] = {name: column[chosen] for name, column in self.columns.items()}
+        names = (*self.columns, "upper_state", "lower_state")
+        cut: dict[str, Any] = {name: getattr(self, name)[chosen] for name in names}
         return replace(self, **cut)
 
 
@@ -216,6 +223,8 @@ def field_lines(
         jmax=jmax,
         accuracy_mhz=2 * float(moved.max(initial=0.0)),
         q=found.q,
+        request=request,
+        blocks=tuple(states.block for states in solved),
         **columns,
     )
 
@@ -268,7 +277,7 @@ class _Part(NamedTuple):
     strength: Floats
     intensity: Floats
     lower_energy: Floats
-    names: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
+    names: tuple[NDArray[Any], ...]
 
 
 def _lines_of(
@@ -291,7 +300,7 @@ def _lines_of(
         strength[:, first, second],
         intensity,
         np.where(turned, up.energies[:, first], low.energies[:, second]),
-        _names(up, low, (first, second), turned),
+        (*_names(up, low, (first, second), turned), *_numbers(solved, pair, (first, second), turned)),
     )
 
 
@@ -312,6 +321,15 @@ def _names(
     return out[0], out[1], out[2], out[3]
 
 
+def _numbers(
+    solved: list[BlockStates], pair: BlockPair, states: tuple[Ints, Ints], turned: NDArray[np.bool_]
+) -> tuple[Ints, Ints]:
+    """Numbers of the upper and of the lower state of every line, counted through the blocks."""
+    first = np.cumsum([0, *(len(block.rows) for block in solved)])
+    up, low = first[pair.up] + states[0], first[pair.low] + states[1]
+    return np.where(turned, low, up), np.where(turned, up, low)
+
+
 def _above(count: int) -> NDArray[np.bool_]:
     return np.tril(np.ones((count, count), dtype=bool), -1)
 
@@ -327,7 +345,8 @@ def _joined(parts: list[_Part]) -> dict[str, NDArray[Any]]:
 
     values = ("frequency_mhz", "shift_mhz", "strength_debye2", "intensity_nm2_mhz", "lower_mhz")
     out = {one: column(place) for place, one in enumerate(values)}
-    return {**out, **{one: name(place) for place, one in enumerate(("upper", "upper_m", "lower", "lower_m"))}}
+    names = ("upper", "upper_m", "lower", "lower_m", "upper_state", "lower_state")
+    return {**out, **{one: name(place) for place, one in enumerate(names)}}
 
 
 def _strong(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[Any]]:

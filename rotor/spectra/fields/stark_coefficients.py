@@ -1,93 +1,136 @@
-"""Stark coefficients of levels and of lines: the shift in a field as a polynomial, fitted to energies in the field.
+"""Stark coefficients of levels and of lines: derivatives of energies at zero field.
 
-    ΔE(E) = c1 E + c2 E² + c3 E³ + c4 E⁴
+    ΔE(E) = c1 E + c2 E² + c3 E³ + c4 E⁴ + ...
 
-c1 is not 0 where ±K coincide, c2 is what tables print (MHz/(kV/cm)²). The fit is a plain least-squares one; its largest departure is given
-with it: where two levels that repel each other are as close as their shifts are large, a polynomial is no description, and it shows.
+c1 is not 0 where ±K coincide, c2 is what tables print (MHz/(kV/cm)²). They are perturbation sums over the blocks of the map
+(`rotor.quantum.fields.field_series`), so that no choice of fields enters. Of a linear top c2 of J = 0 is -μ²/6hB; of a symmetric one
+c1 = -μ KM/[J(J+1)] (Encyclopedia of Physical Science and Technology, 3rd edition, Microwave Molecular Spectroscopy, eq. 106).
+
+A series has a range. It ends where E⁵ and E⁶ each add 1 % of the largest of the four terms: there the four coefficients give the shift to
+about that, and beyond it only the solved energies of the map do. Levels that a field mixes strongly because they are close, such as
+asymmetry doublets, have large coefficients and a short range.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.field_map import FieldMap
+from rotor.arrays import Floats
+from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM
+from rotor.quantum.fields.block_states import count_of
+from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.field_map import FieldMap, blocks_of_map
+from rotor.quantum.fields.field_series import FieldSeries, field_series
+from rotor.quantum.fields.map_request import MapRequest
 from rotor.table import Table
 
 if TYPE_CHECKING:
     from rotor.spectra.fields.lines import FieldLines
 
 POWERS = 4
+_SUMMED = POWERS + 2  # E⁵ and E⁶ tell the range
+SHARE = 0.01  # of the shift: what the terms beyond E⁴ add at the end of the range
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StarkCoefficients(Table):
     """Coefficients of shifts against the field, one row for each state or line.
 
-    names: labels and M by column. coefficients: (n, powers) in MHz/(kV/cm)^p, p = 1 ... departure_mhz: the largest of the fit. highest:
-    field in kV/cm up to which was fitted.
+    names: labels and M by column. coefficients, errors: (n, powers) in MHz/(kV/cm)^p, p = 1 ... 4, errors those of rounding.
+    valid_to_kv_per_cm: (n,) field up to which the four terms give the shift to about 1 %.
     """
 
     names: dict[str, NDArray[Any]]
     coefficients: Floats
-    departure_mhz: Floats
-    highest_kv_per_cm: float
+    errors: Floats
+    valid_to_kv_per_cm: Floats
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Names, c1_mhz_per_kv_per_cm, c2_mhz_per_kv2_per_cm2, ..., departure_mhz."""
-        units = ["c1_mhz_per_kv_per_cm"] + [f"c{p}_mhz_per_kv{p}_per_cm{p}" for p in range(2, POWERS + 1)]
-        fitted = {name: self.coefficients[:, place] for place, name in enumerate(units)}
-        return {**self.names, **fitted, "departure_mhz": self.departure_mhz}
+        """Names, c1_mhz_per_kv_per_cm, c2_mhz_per_kv2_per_cm2, ..., valid_to_kv_per_cm, then c1_error, c2_error, ..."""
+        powers = range(1, POWERS + 1)
+        units = ["c1_mhz_per_kv_per_cm"] + [f"c{p}_mhz_per_kv{p}_per_cm{p}" for p in powers[1:]]
+        values = {name: self.coefficients[:, place] for place, name in enumerate(units)}
+        errors = {f"c{p}_error": self.errors[:, p - 1] for p in powers}
+        return {**self.names, **values, "valid_to_kv_per_cm": self.valid_to_kv_per_cm, **errors}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The field up to which was fitted."""
-        return {"highest_kv_per_cm": self.highest_kv_per_cm, "powers": POWERS}
+        """The highest power, and the share of the shift that defines the range."""
+        return {"powers": POWERS, "share_beyond_range": SHARE}
 
 
 def level_coefficients(states: FieldMap) -> StarkCoefficients:
-    """Stark coefficients of every state of a map against a static field.
+    """Stark coefficients of the states of a map.
 
-    Raises ValueError for fewer than five fields other than 0.
+    Parameters
+    ----------
+    states : FieldMap
+        States, basis and direction of the field; its fields do not enter, except that a map of fields below 0 alone names states there.
+
+    Returns
+    -------
+    StarkCoefficients
+        One row for each curve of the map.
 
     >>> from rotor.quantum.effects.stark import stark_map
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
-    >>> found = level_coefficients(stark_map(rod, np.linspace(0, 0.5, 11), j_highest=0))
-    >>> found.coefficients[0, 1].round(5).item()  # -μ²/6B
-    -3.44937
+    >>> coefficients = level_coefficients(stark_map(rod, [0, 100], j_highest=0))
+    >>> coefficients.coefficients[0, 1].round(8).item()  # -μ²/6B
+    -3.44937264
     """
+    series = [_block_series(states.request, block) for block in blocks_of_map(states.request, states.jmax)]
     first = [rows.start for rows in states.curves()]
-    shifts = np.array([states.energy_mhz[rows] - states.free_mhz[rows] for rows in states.curves()])
-    names = {"label": states.label[first], "m": states.m[first]}
-    return _fitted(states.fields, shifts, names)
+    of_curve = list(zip(states.block_number[first].tolist(), states.rank[first].tolist(), strict=True))
+    values, errors = (
+        np.array([getattr(series[number], name)[rank] for number, rank in of_curve]) for name in FieldSeries._fields
+    )
+    return _coefficients({"label": states.label[first], "m": states.m[first]}, values, errors)
 
 
 def line_coefficients(lines: FieldLines) -> StarkCoefficients:
-    """Stark coefficients of every line between two states, the shift counted from the line of the free top.
-
-    Raises ValueError for fewer than five fields other than 0.
-    """
+    """Stark coefficients of the lines between two states: those of the upper state less those of the lower one."""
     first = [rows.start for rows in lines.pairs()]
-    shifts = np.array([lines.shift_mhz[rows] for rows in lines.pairs()])
+    values, errors = _series_of_blocks(lines.request, lines.blocks)
+    upper, lower = lines.upper_state[first], lines.lower_state[first]
     names = {name: getattr(lines, name)[first] for name in ("upper", "upper_m", "lower", "lower_m")}
-    return _fitted(lines.fields, shifts, names)
+    return _coefficients(names, values[upper] - values[lower], errors[upper] + errors[lower])
 
 
-def _fitted(fields: Floats, shifts: Floats, names: dict[str, NDArray[Any] | Ints]) -> StarkCoefficients:
-    used = fields != 0
-    if used.sum() <= POWERS:
-        raise ValueError(
-            f"{int(used.sum())} fields other than 0: more than {POWERS} are needed for the coefficients of E to E^{POWERS}"
-        )
-    highest = float(np.abs(fields).max())
-    powers = np.arange(1, POWERS + 1)
-    matrix = (fields[used, None] / highest) ** powers
-    scaled = np.linalg.lstsq(matrix, shifts[:, used].T, rcond=None)[0]
-    departure = np.abs(matrix @ scaled - shifts[:, used].T).max(axis=0)
-    return StarkCoefficients(names, scaled.T / highest**powers, departure, highest)
+def _series_of_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> FieldSeries:
+    series = [_block_series(request, block) for block in blocks]
+    coefficients, errors = (np.concatenate(parts) for parts in zip(*series, strict=True))
+    return FieldSeries(coefficients, errors)
+
+
+def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
+    """c_1 ... c_6 of the states of a block, ranked as at the fields of the map."""
+    terms = request.problem(block).terms(np.arange(len(block)))
+    sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
+    turned = tuple(sign**n * term for n, term in enumerate(terms))
+    series = field_series(turned, count_of(request, block), _SUMMED, block.even_in_field)
+    return FieldSeries(series.coefficients * np.power(sign, np.arange(1, _SUMMED + 1)), series.errors)
+
+
+def _coefficients(names: dict[str, NDArray[Any]], values: Floats, errors: Floats) -> StarkCoefficients:
+    return StarkCoefficients(names, values[:, :POWERS], errors[:, :POWERS], _range(np.abs(values)))
+
+
+def _range(sizes: Floats) -> Floats:
+    """Field at which E⁵ or E⁶ adds `SHARE` of the largest of the terms before, at most the highest field that is accepted."""
+    beyond = np.full(len(sizes), HIGHEST_KV_PER_CM)
+    for q in range(POWERS + 1, _SUMMED + 1):
+        term = sizes[:, q - 1]
+        reach = np.zeros(len(sizes))
+        for p in range(1, POWERS + 1):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                field = (SHARE * sizes[:, p - 1] / term) ** (1 / (q - p))
+            reach = np.maximum(reach, np.where(term > 0, field, np.inf))
+        beyond = np.minimum(beyond, reach)
+    return np.asarray(beyond)
