@@ -1,0 +1,137 @@
+"""Spectra as columns of text: two or three numbers a line, with blanks or commas between, under any heading.
+
+Read are frequency (or velocity) and intensity, and the noise from a third column where the heading calls it so. Units stand in the heading:
+`#xLabel: frequency [MHz]` and `#yLabel: (Jy/beam) Mean` as CASA and CASSIS write them, or a line of names such as
+`frequency_mhz,intensity_k` or `freq (GHz), T (K)`. Without a heading the choices of the user count, MHz and K by default, with a note.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.packed import load
+from rotor.formats.spectra.axis import ReadChoices, axis_mhz, intensity_unit
+from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
+
+COMMENTS = ("#", "!", "//", ";", "%")
+_SEPARATOR = re.compile(r"[,;\s]+")
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
+_LABEL = re.compile(r"\s*([xy])\s*label\s*:\s*(.*)", re.IGNORECASE)
+_SUFFIX = re.compile(r"_(hz|khz|mhz|ghz|k|mk|km_s|jy_beam)$", re.IGNORECASE)
+_UNIT_OF_SUFFIX = {"km_s": "km/s", "jy_beam": "Jy/beam"}
+_NOISE = re.compile(r"noise|error|sigma|uncertainty|rms", re.IGNORECASE)
+
+
+def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> ObservedSpectrum:
+    """The spectrum in a text file.
+
+    Parameters
+    ----------
+    path : path
+        Packed with gzip or not.
+    choices : ReadChoices, optional
+        What the file does not state.
+
+    Returns
+    -------
+    ObservedSpectrum
+
+    Raises
+    ------
+    ValueError
+        With file, line and rule: a line that is not two or three numbers, a unit that is not known.
+    """
+    choices = choices or ReadChoices()
+    text, name = load(path)
+    heading, numbers = _parsed(text.decode("utf-8", "replace"), name)
+    names, labels = _names_and_labels(heading)
+    axis_unit, unit = choices.axis_unit or labels.get("x"), choices.unit or labels.get("y")
+    assumed = [text for known, text in ((axis_unit, "frequencies in MHz"), (unit, "intensities in K")) if known is None]
+    chosen, factor = intensity_unit(unit or "K", name)
+    notes = (f"no units in the file: {' and '.join(assumed)} assumed",) if assumed else ()
+    third = numbers.shape[1] > 2 and len(names) > 2 and _NOISE.search(names[2])
+    noise = numbers[:, 2] * factor if third else None
+    if choices.noise is not None:
+        noise = np.full(len(numbers), choices.noise * factor)
+    return observed_spectrum(
+        axis_mhz(numbers[:, 0], axis_unit or "MHz", name, choices),
+        numbers[:, 1] * factor,
+        noise=noise,
+        source=name,
+        unit=chosen,
+        rest_mhz=choices.rest_mhz,
+        frame=choices.frame or "SOURCE",
+        beam_arcsec=choices.beam_arcsec,
+        notes=notes,
+    )
+
+
+def _parsed(text: str, name: str) -> tuple[list[str], NDArray[np.float64]]:
+    """Lines of the heading, and the numbers (n, 2 or more)."""
+    heading: list[str] = []
+    rows: list[list[float]] = []
+    for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
+        body = line.strip()
+        if not body:
+            continue
+        mark = next((mark for mark in COMMENTS if body.startswith(mark)), None)
+        if mark:
+            heading.append(body[len(mark) :].strip())
+            continue
+        values = _numbers(body)
+        if values is None and not rows:
+            heading.append(body)
+            continue
+        if values is None or len(values) < 2 or (rows and len(values) != len(rows[0])):
+            raise ValueError(
+                f"{name}, line {number}: {body[:60]!r}: expected {len(rows[0]) if rows else 'two or three'} numbers"
+            )
+        rows.append(values)
+    if len(rows) < 2:
+        raise ValueError(
+            f"{name}: {len(rows)} lines with numbers; expected a spectrum: frequency and intensity in each line"
+        )
+    return heading, np.array(rows)
+
+
+def _numbers(body: str) -> list[float] | None:
+    try:
+        return [float(item.replace("D", "E").replace("d", "e")) if item else float("nan") for item in _items(body)]
+    except ValueError:
+        return None
+
+
+def _items(body: str) -> list[str]:
+    """Fields between commas, which may be empty, or between blanks."""
+    return [item.strip() for item in body.split(",")] if "," in body else _SEPARATOR.split(body)
+
+
+def _names_and_labels(heading: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Names of the columns from the last line of the heading that names two or more, and units of x and y."""
+    labels: dict[str, str] = {}
+    names: list[str] = []
+    for line in heading:
+        if match := _LABEL.match(line):
+            if bracket := _IN_BRACKETS.findall(match.group(2)):
+                labels[match.group(1).lower()] = bracket[-1] if match.group(1).lower() == "x" else bracket[0]
+        elif "," in line and ":" not in line:
+            names = [item.strip() for item in line.split(",")]
+        elif _SUFFIX.search(line.split()[0] if line.split() else ""):
+            names = line.split()
+    for axis, name in zip("xy", names[:2], strict=False):
+        if unit := _unit_in(name):
+            labels.setdefault(axis, unit)
+    return names, labels
+
+
+def _unit_in(name: str) -> str | None:
+    """`freq (GHz)` and `frequency_mhz` state a unit."""
+    if bracket := _IN_BRACKETS.search(name):
+        return bracket.group(1)
+    if suffix := _SUFFIX.search(name):
+        return _UNIT_OF_SUFFIX.get(suffix.group(1).lower(), suffix.group(1))
+    return None
