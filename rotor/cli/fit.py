@@ -147,7 +147,7 @@ def command(context: typer.Context, given: Options) -> None:
     if (given.save_lines or "").lower().endswith(".lin"):
         from rotor.formats.assigned_lin import note_of_lin
 
-        for text in note_of_lin(fit.lines):
+        for text in note_of_lin(fit.marked_lines):
             note(text)
     writers = _writers(answer, content, scaled=given.table_errors == "scatter") | spfit | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
@@ -373,7 +373,7 @@ def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dic
         "--out .fit": lambda path: write_text(path, report_of(answer)),
         "--out .toml": lambda path: write_fitted_toml(answer, path),
         "--table": lambda path: write_text(path, table_of(answer, form[path.suffix.lower()], scaled=scaled)),
-        "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
+        "--save-lines": lambda path: write_assigned_lines(fit.marked_lines, path),
         "--plot": picture,
     }
 

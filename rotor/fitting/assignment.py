@@ -27,6 +27,7 @@ class Assignments(Table):
     widths_mhz : by the number of a blend, how far its components may lie apart (rms): a standard error about 0
     places (n,) : of each line in its source from 0 on, where some were left out
     halves : names of the quantum numbers that are half-integers, of which the labels have twice the value
+    excluded (n,) : lines that do not count in a fit, such as those that an earlier fit rejected; None where all count
     """
 
     names: tuple[str, ...]
@@ -42,6 +43,7 @@ class Assignments(Table):
     widths_mhz: dict[int, float] = field(default_factory=dict)
     places: Ints | None = None
     halves: frozenset[str] = frozenset()
+    excluded: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         n, k = len(self.frequency_mhz), len(self.names)
@@ -83,7 +85,20 @@ class Assignments(Table):
         changes: dict[str, Any] = {name: getattr(self, name)[picked] for name in fields}
         if self.comments:
             changes["comments"] = tuple(self.comments[i] for i in picked.tolist())
+        if self.excluded is not None:
+            changes["excluded"] = self.excluded[picked]
         return replace(self, **changes, places=picked if self.places is None else self.places[picked])
+
+    @property
+    def is_excluded(self) -> NDArray[np.bool_]:
+        """Which lines do not count, (n,)."""
+        return np.zeros(len(self), dtype=bool) if self.excluded is None else self.excluded
+
+    @property
+    def blended(self) -> NDArray[np.bool_]:
+        """Which lines share their frequency with others, (n,)."""
+        counts = np.bincount(self.blend, minlength=1)
+        return np.asarray(counts[self.blend] > 1)
 
     def number(self, line: int) -> int:
         """Of one line in its source, from 1 on."""
@@ -226,17 +241,24 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
             0,
             f"{counted(len(same), 'line is', 'lines are')} in both, once in the result, the first: {second.text(same[0])}",
         )
-    more = second.take(np.array(chosen, dtype=np.int64))
+    return appended(first, second.take(np.array(chosen, dtype=np.int64))), notes
+
+
+def appended(first: Assignments, second: Assignments) -> Assignments:
+    """The lines of both, by the same quantum numbers; blends stay blends."""
     shift = int(first.blend.max(initial=-1)) + 1
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")
-    joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(more, name)]) for name in fields}
-    comments = [text for one in (first, more) for text in (one.comments or ("",) * len(one))]
-    source = " and ".join(dict.fromkeys(filter(None, (first.source, second.source))))
-    blend = np.concatenate([first.blend, more.blend + shift])
-    widths = first.widths_mhz | {number + shift: width for number, width in more.widths_mhz.items()}
+    joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in fields}
     return Assignments(
-        first.names, **joined, blend=blend, source=source, comments=tuple(comments), widths_mhz=widths
-    ), notes
+        first.names,
+        **joined,
+        blend=np.concatenate([first.blend, second.blend + shift]),
+        source=" and ".join(dict.fromkeys(filter(None, (first.source, second.source)))),
+        comments=tuple(text for lines in (first, second) for text in (lines.comments or ("",) * len(lines))),
+        widths_mhz=first.widths_mhz | {number + shift: width for number, width in second.widths_mhz.items()},
+        halves=first.halves,
+        excluded=np.concatenate([first.is_excluded, second.is_excluded]),
+    )
 
 
 def _key(lines: Assignments, i: int) -> tuple[int, ...]:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, levels_in
-from rotor.fitting.fit import Fit
+from rotor.fitting.fit import Fit, missing_level
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.search import FitOptions, Search, errors_of
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.fitting.top_levels import model_of
+from rotor.quantum.labelled import MissingLevelsError
 
 _STEPS = 4  # to the value that moves the lines by one error
 _EVEN = 1e-3  # errors: by so much do the lines of a value and of its negative differ, rms, where they know its square
@@ -52,18 +53,27 @@ def search_of(
         Of the same constants.
     options : FitOptions
     used : (lines,) array of bool, optional
-        Which lines count; those with an error where it is left out.
+        Which lines count; those with an error that are not excluded where it is left out.
 
     Returns
     -------
     Search
+
+    Raises
+    ------
+    ValueError
+        With the first line that has a level which does not exist.
     """
     labels, upper, lower = levels_in(lines)
     left_out, sigma = errors_of(lines, options)
     if used is None:
         used = np.ones(len(lines), dtype=bool)
         used[list(left_out)] = False
-    return Search(lines, model_of(constants, labels, options.kmax), free, options, upper, lower, sigma, used)
+    try:
+        model = model_of(constants, labels, options.kmax)
+    except MissingLevelsError as error:
+        raise missing_level(lines, error) from None
+    return Search(lines, model, free, options, upper, lower, sigma, used)
 
 
 def beside_zero(

@@ -68,6 +68,12 @@ class Fit:
     notes: tuple[str, ...]
 
     @property
+    def marked_lines(self) -> Assignments:
+        """The lines, with those that were rejected marked as excluded, for the next fit; one without an error says so itself."""
+        excluded = np.isin(np.arange(len(self.lines)), list(self.left_out)) & (self.line_errors_mhz > 0)
+        return replace(self.lines, excluded=excluded)
+
+    @property
     def named(self) -> ConstantSet:
         """The fitted constants. ValueError where the parameters are not named constants."""
         if self.constants is None:
@@ -239,13 +245,20 @@ def _with_levels(
     except MissingLevelsError as error:
         lost = np.isin(upper, error.places) | np.isin(lower, error.places)
         if not options.leave_out_missing or lost.all():
-            raise ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}") from None
+            raise missing_level(lines, error) from None
         notes = [
             f"{_named(lines, i)}, is left out: it has a level that does not exist"
             for i in np.flatnonzero(lost).tolist()
         ]
     rest, made, more = _with_levels(lines.take(~lost), model, options)
     return rest, made, notes + more
+
+
+def missing_level(lines: Assignments, error: MissingLevelsError) -> ValueError:
+    """The error of the first line that has a level which does not exist."""
+    _, upper, lower = levels_in(lines)
+    lost = np.isin(upper, error.places) | np.isin(lower, error.places)
+    return ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}")
 
 
 def _named(lines: Assignments, i: int) -> str:

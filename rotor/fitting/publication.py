@@ -18,6 +18,7 @@ _UNITS = (("MHz", 1.0), ("kHz", 1e-3), ("Hz", 1e-6), ("mHz", 1e-9), ("μHz", 1e-
 _SHOWN = {"Delta": "Δ", "delta": "δ", "Phi": "Φ", "phi": "φ", "chi": "χ", "eps": "ε", "gamma": "γ", "lambda": "λ"}
 _GREEK = {name: "\\epsilon" if name == "eps" else f"\\{name}" for name in _SHOWN}
 _NAME = re.compile(r"(Delta|delta|Phi|phi|[A-Za-z])([JK]*|\d?)")
+_ISOTOPE = re.compile(r"(?<=[(,])(\d+)(?=[A-Z])")  # the mass number in (35Cl) or (14N,1H_2)
 _WITH_AXES = re.compile(r"(chi|eps|gamma|lambda|[CTDGFWb])_?([\w-]*)")  # of states and spins: chi_bb-cc, G_c_J
 
 
@@ -67,7 +68,7 @@ def name_text(name: str, form: str) -> str:
     >>> name_text("DeltaJK", "latex"), name_text("d1", "latex"), name_text("PhiJ", "text")
     ('$\\\\Delta_{JK}$', '$d_{1}$', 'ΦJ')
     >>> name_text("DeltaJ[1]", "text"), name_text("chi_bb-cc(14N)", "latex"), name_text("G_c[0,1]", "latex")
-    ('ΔJ[1]', '$\\\\chi_{bb-cc}$(14N)', '$G_{c}$[0,1]')
+    ('ΔJ[1]', '$\\\\chi_{bb-cc}$($^{14}$N)', '$G_{c}$[0,1]')
     """
     head = re.match(r"[^(\[]*", name)
     assert head is not None  # an empty one matches too
@@ -80,7 +81,7 @@ def name_text(name: str, form: str) -> str:
         between = "_" if "_" in head[0] else ""
         return _SHOWN.get(letter, letter) + between + below + own
     symbol = _GREEK.get(letter, letter) + (f"_{{{below}}}" if below else "")
-    return f"${symbol}$" + own.replace("_", "\\_")
+    return f"${symbol}$" + _ISOTOPE.sub(r"$^{\1}$", own.replace("_", "\\_"))
 
 
 @dataclass(frozen=True)

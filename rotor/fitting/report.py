@@ -12,6 +12,7 @@ from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.fit import Fit
 from rotor.fitting.publication import value_text
+from rotor.table import counted
 
 FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
 _CORRELATED = 0.95  # correlation from which a pair is listed
@@ -73,6 +74,7 @@ def fit_facts(fit: Fit) -> dict[str, Any]:
         "line_count": len(fit.lines),
         "lines_used": int(fit.used.sum()),
         "frequencies": len(fit.groups),
+        "blends": blend_counts(fit)[0],
         "weighted_rms": fit.weighted_rms,
         "reduced_chi": fit.reduced_chi,
         "rms_mhz": fit.rms_mhz(),
@@ -96,7 +98,7 @@ def statistics_text(fit: Fit) -> list[str]:
     rms, infrared = fit.rms_mhz(), fit.rms_mhz(wavenumber=True)
     condition = fit.statistics.condition
     out = [
-        f"lines {len(fit.lines)}, of which {int(fit.used.sum())} count in {len(fit.groups)} measured frequencies",
+        f"lines {len(fit.lines)}, of which {int(fit.used.sum())} count in {len(fit.groups)} measured frequencies{_blends(fit)}",
         f"free parameters {len(fit.parameters.names)}, degrees of freedom {fit.degrees_of_freedom}",
         f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {scatter_text(fit.reduced_chi, '.5f')}",
         *_with_priors(fit),
@@ -108,6 +110,19 @@ def statistics_text(fit: Fit) -> list[str]:
     out += [f"far off, {text}" for text in far_off(fit)]
     out += [f"influential, {text}" for text in influential(fit)]
     return out + [f"decisive, {text}" for text in decisive(fit)]
+
+
+def _blends(fit: Fit) -> str:
+    """How many of the measured frequencies are blends, and of how many lines."""
+    counts = blend_counts(fit)
+    return f", {counts[0]} of these are blends of {counts[1]} lines" if counts[0] else ""
+
+
+def blend_counts(fit: Fit) -> tuple[int, int]:
+    """The number of measured frequencies of several lines that count, and of these lines."""
+    lines_of_each = np.bincount(fit.lines.blend[fit.used], minlength=1)
+    several = lines_of_each[lines_of_each > 1]
+    return len(several), int(several.sum())
 
 
 def scatter_text(value: float, form: str) -> str:
@@ -149,14 +164,21 @@ def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
     ]
 
 
-def dfbetas(fit: Fit) -> Floats:
-    """By how many standard errors each parameter moves when a measured frequency is left out (frequencies, n); see `Regression`."""
+def dfbetas(fit: Fit) -> Floats | None:
+    """By how many standard errors each parameter moves when a measured frequency is left out (frequencies, n); see `Regression`.
+
+    None with less than two degrees of freedom: without the frequency there is no scatter to compare with.
+    """
+    if fit.degrees_of_freedom < 2:
+        return None
     return fit.statistics.dfbetas(fit.minimum.residuals)[: len(fit.groups)]
 
 
 def influential(fit: Fit, errors: float = 1.0) -> list[str]:
     """Lines without which a constant would move by more than so many of its standard errors, the most influential first."""
     moved, out = dfbetas(fit), list[str]()
+    if moved is None:
+        return out
     size = np.where(np.isfinite(moved), np.abs(moved), 0.0)
     largest = size.max(axis=1, initial=0.0)
     for i in np.argsort(-largest, kind="stable")[:5].tolist():
@@ -172,6 +194,8 @@ def influential(fit: Fit, errors: float = 1.0) -> list[str]:
 def influence(fit: Fit) -> list[str]:
     """The lines that move a constant most, with their leverages and DFBETAS, in standard errors of the scatter without them."""
     moved = dfbetas(fit)
+    if moved is None:
+        return [f"undefined with {counted(fit.degrees_of_freedom, 'degree')} of freedom"]
     size = np.abs(moved).max(axis=1, initial=0.0)
     leverages, lines = fit.statistics.leverages, fit.lines
     out = []
@@ -233,6 +257,8 @@ def _lines(fit: Fit) -> list[str]:
 
 def _texts(lines: Assignments) -> list[str]:
     """The labels of every line, as `Assignments.text` has them."""
+    if lines.halves:
+        return [lines.text(i) for i in range(len(lines))]
     sides = ([" ".join(map(str, row)) for row in side.tolist()] for side in (lines.upper, lines.lower))
     return [" - ".join(pair) for pair in zip(*sides, strict=True)]
 

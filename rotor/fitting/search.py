@@ -244,7 +244,8 @@ def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters)
 
 
 def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
-    """Lines without an error, by position, and errors with the default put in."""
+    """Why lines do not count, by position: excluded ones and those without an error; and errors with the default put in."""
+    excluded = {int(i): "it is marked as excluded" for i in np.flatnonzero(lines.is_excluded)}
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:
         raise ValueError(
@@ -252,5 +253,6 @@ def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], 
             "(default_error_mhz, --default-error)"
         )
     if options.default_error_mhz is not None:
-        return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)
-    return {int(i): "its error is 0" for i in np.flatnonzero(zero)}, np.where(zero, 1.0, lines.error_mhz)
+        return excluded, np.where(zero, options.default_error_mhz, lines.error_mhz)
+    left_out = {int(i): "its error is 0" for i in np.flatnonzero(zero)} | excluded
+    return left_out, np.where(zero, 1.0, lines.error_mhz)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotor.fitting.assignment import Assignments
-from rotor.formats.spcat.text.lin import LineList, line_list
+from rotor.fitting.assignment import Assignments, appended, assignments
+from rotor.formats.spcat.text.lin import LineList, excluded_lines, line_list, with_defaults, with_excluded
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
@@ -37,7 +37,15 @@ class _Blend:
 
 
 def as_lin(lines: Assignments) -> LineList:
-    """The lines as a .lin file has them; half-integers are rounded up, wavenumbers have a negative error."""
+    """The lines as a .lin file has them, excluded ones behind a blank line; half-integers are rounded up, wavenumbers have a negative
+    error."""
+    excluded = lines.is_excluded
+    counted_ones = _listed(lines.take(~excluded))
+    return with_excluded(counted_ones, _listed(lines.take(excluded))) if excluded.any() else counted_ones
+
+
+def _listed(lines: Assignments) -> LineList:
+    """Lines in the order of a .lin file."""
     numbers, places = np.unique(lines.blend, return_inverse=True)
     order = np.array([one.number for one in _in_order(lines)], dtype=np.int64)
     rank = np.empty(len(numbers), dtype=np.int64)
@@ -53,7 +61,7 @@ def as_lin(lines: Assignments) -> LineList:
 
 def note_of_lin(lines: Assignments) -> list[str]:
     """What is to be known of these lines in a .lin file: those of one frequency that no other line parts are one blend there."""
-    pairs = _meetings(_in_order(lines))
+    pairs = _meetings(_in_order(lines.take(~lines.is_excluded)))
     if not pairs:
         return []
     them = "it is" if pairs == 1 else "them are"
@@ -61,6 +69,21 @@ def note_of_lin(lines: Assignments) -> list[str]:
         f"{counted(pairs, 'line')} of the same frequency as the line before {them} a blend with it in a .lin file, for want of "
         "others to put between them; a .csv file has them apart"
     ]
+
+
+def with_excluded_lines(lines: Assignments, read: LineList) -> Assignments:
+    """Assigned lines with those behind a .lin file's list that are marked as excluded."""
+    names, marked = lines.names, excluded_lines(read, len(lines.names))
+    if marked is None:
+        return lines
+    marked = with_defaults(marked, names)
+    blends = marked.blends()
+    upper, lower = (side[:, : len(names)] for side in marked.states())
+    more = assignments(
+        names, upper, lower, marked.frequency_mhz, marked.error_mhz,
+        weight=marked.weight, blend=blends, wavenumber=marked.error < 0,
+    )  # fmt: skip
+    return appended(lines, replace(more.take(blends >= 0), excluded=np.ones(int((blends >= 0).sum()), dtype=bool)))
 
 
 def _blends(lines: Assignments) -> list[_Blend]:

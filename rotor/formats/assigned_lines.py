@@ -4,10 +4,11 @@ A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper
 `v_upper` too; with spins N in place of J, `n_upper`, and the sums `f1_upper`, ..., `f_upper`, half-integers as 5/2, 2.5, or as twice
 the value, 5), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
-needed, `weight`, `blend` (one text or number for the lines of one measured frequency), `width_mhz` (how far the components of a
-blend may lie apart, rms, at one of its lines or at all) and `comment`. Of a catalogue the lines
-measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of
-spins, where the file has them, are put together at their mean by intensity.
+needed, `weight`, `blend` (one text or number for the lines of one measured frequency; without this column lines of one frequency and
+error behind each other are a blend, as in a .lin), `excluded` (yes for a line that does not count), `width_mhz` (how far the
+components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Of a catalogue the lines measured in a
+laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of spins, where the
+file has them, are put together at their mean by intensity.
 """
 
 from __future__ import annotations
@@ -24,17 +25,20 @@ from typing import Any
 
 import numpy as np
 
+from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.formats.assigned_lin import as_lin
+from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import (
+    like_line_before,
     note_of_defaults,
     note_of_remarks,
     read_lin,
     with_defaults,
     write_lin,
 )
+from rotor.quantum.quanta import value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
@@ -46,6 +50,7 @@ QUANTA = {
     "oblate": ("j", "k"),
     "asymmetric": ("j", "ka", "kc"),
 }
+_YES, _NO = ("yes", "true", "1"), ("no", "false", "0", "")
 _WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
@@ -79,7 +84,7 @@ def read_assigned_lines(
     if not text.endswith(SUFFIXES):
         raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
     if text.endswith(".csv"):
-        found, notes = _of_csv(path, names, halves), list[str]()
+        found, notes = _of_csv(path, names, halves)
     else:
         plain = "v" not in names and names[0] != "n"
         read = _of_lin if text.endswith(".lin") else _of_catalogue if plain else _of_full_catalogue
@@ -128,16 +133,19 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
                 f"({', '.join(names)})"
             )
     upper, lower = (side[used][:, : len(names)] for side in lines.states())
-    return assignments(
+    listed = assignments(
         names, upper, lower, lines.frequency_mhz[used], lines.error_mhz[used], weight=lines.weight[used],
         blend=blends[used], wavenumber=(lines.error < 0)[used], source=Path(path).name,
-    ), notes  # fmt: skip
+    )  # fmt: skip
+    return with_excluded_lines(listed, lines), notes
 
 
-def _of_csv(path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]) -> Assignments:
+def _of_csv(
+    path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
+) -> tuple[Assignments, list[str]]:
     columns, rows = _table_of(path)
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
-    known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment"}
+    known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment", "excluded"}
     _refuse_columns(path, columns, labels, known)
     unit = next(name for name in _FREQUENCY if name in columns)
     error = next((name for name in _ERROR if name in columns), None)
@@ -150,12 +158,13 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str], halves: Collecti
             if side[0] < 0:
                 label = " ".join(map(str, side))
                 raise ValueError(f"{path}, line {i} of the table: there is no level {label}; {names[0]} is 0 or more")
-    blends = _blends([(row.get("blend") or "").strip() for row in rows])
-    frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)]) * _FREQUENCY[unit]
-    errors = [_size(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
-    return assignments(
-        names, quanta[:, : len(names)], quanta[:, len(names) :], frequency,
-        np.array(errors) * (_ERROR[error] if error else 1.0),
+    frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)])
+    errors = np.array([_size(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)])
+    named = "blend" in columns
+    blends = _blends([(row.get("blend") or "").strip() for row in rows]) if named else _equal_lines(frequency, errors)
+    made = assignments(
+        names, quanta[:, : len(names)], quanta[:, len(names) :], frequency * _FREQUENCY[unit],
+        errors * (_ERROR[error] if error else 1.0),
         weight=np.array([_size(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
         blend=blends,
         widths_mhz=_widths(path, rows, columns, blends),
@@ -164,6 +173,34 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str], halves: Collecti
         comments=[(row.get("comment") or "").strip() for row in rows] if "comment" in columns else (),
         halves=halves,
     )  # fmt: skip
+    if "excluded" in columns:
+        made = replace(made, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
+    return made, [] if named else _note_of_blends(made)
+
+
+def _equal_lines(frequency: Floats, error: Floats) -> list[int]:
+    """Numbers of blends: as in a .lin file, lines of one frequency and error behind each other are one."""
+    near, alike = like_line_before(frequency, error)
+    places = np.cumsum(np.append(np.zeros(min(len(frequency), 1), dtype=bool), ~(near & alike)))
+    return [int(place) for place in places]
+
+
+def _note_of_blends(lines: Assignments) -> list[str]:
+    count = int(lines.blended.sum())
+    if not count:
+        return []
+    return [
+        f"{count} lines have the frequency and the error of their neighbours: they are "
+        f"{counted(len(set(lines.blend[lines.blended].tolist())), 'blend')}, as in a .lin file; a column blend says otherwise"
+    ]
+
+
+def _is_marked(path: object, line: int, row: Mapping[str, str]) -> bool:
+    """Whether a line is marked as excluded."""
+    text = (row.get("excluded") or "").strip().lower()
+    if text not in (*_YES, *_NO):
+        raise ValueError(f"{path}, line {line} of the table: excluded reads {text!r}; yes or no is needed")
+    return text in _YES
 
 
 def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
@@ -218,7 +255,7 @@ def _refuse_columns(
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
         raise ValueError(
             f"{path}: {what}; columns are {', '.join(labels)}, a frequency ({' or '.join(_FREQUENCY)}), an error "
-            f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, comment"
+            f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, excluded, comment"
         )
     twice = next((name for name in columns if columns.count(name) > 1), None)
     if twice is not None:
@@ -364,7 +401,8 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     """Write assigned lines as .lin or .csv; an existing file is replaced at the end or not at all.
 
     In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together, and others of one
-    frequency apart; see `rotor.formats.assigned_lin`. Wavenumbers stand with a negative error.
+    frequency apart; see `rotor.formats.assigned_lin`. Excluded lines stand behind a blank line, where SPFIT reads nothing. Wavenumbers
+    stand with a negative error.
     """
     text = os.fspath(path).lower()
     if text.endswith(".lin"):
@@ -381,14 +419,20 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         "weight",
         "blend",
         *(["width_mhz"] if lines.widths_mhz else []),
+        *(["excluded"] if lines.is_excluded.any() else []),
     ]
+    halves = [name in lines.halves for name in lines.names]
     with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
         writer = csv.writer(handle, lineterminator="\n")
         writer.writerow([*heads, *(["comment"] if lines.comments else [])])
         for i in range(len(lines)):
             numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
-            row = [*lines.upper[i].tolist(), *lines.lower[i].tolist(), *map(float, numbers), int(lines.blend[i])]
+            sides = zip((*lines.upper[i].tolist(), *lines.lower[i].tolist()), halves * 2, strict=True)
+            quanta = [value_text(value, half) for value, half in sides]
+            row = [*quanta, *map(float, numbers), int(lines.blend[i])]
             if lines.widths_mhz:
                 row.append(lines.widths_mhz.get(int(lines.blend[i]), ""))
+            if "excluded" in heads:
+                row.append("yes" if lines.is_excluded[i] else "")
             writer.writerow([*row, *([lines.comments[i]] if lines.comments else [])])
     return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,16 @@ _HEADINGS = {
     "ka": "Ka of the upper state",
     "k": "K of the upper state",
     "n": "N of the upper state",
-    "f": "F of the upper state (rounded up)",
+    "f": "F of the upper state",
 }
 
 
 def fit_figure(fit: Fit, title: str = "") -> Any:
     """A matplotlib figure of (obs - calc)/error of every line; lines that do not count are crosses."""
+    halves = fit.lines.halves
     panels = [("frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
     panels += [
-        (_HEADINGS[name], fit.lines.upper[:, i].astype(float))
+        (_heading(name, halves), fit.lines.upper[:, i] / (2.0 if name in halves else 1.0))
         for i, name in enumerate(fit.lines.names)
         if name in _HEADINGS
     ]
@@ -39,6 +40,11 @@ def fit_figure(fit: Fit, title: str = "") -> Any:
                 axes.xaxis.get_major_locator().set_params(integer=True)
         figure.axes[0].set_title(_title(fit, title).replace("$", r"\$"), loc="left")
     return figure
+
+
+def _heading(name: str, halves: Collection[str]) -> str:
+    """The name of an axis; files of SPFIT have half-integers of F rounded up."""
+    return _HEADINGS[name] + (" (rounded up)" if name == "f" and name not in halves else "")
 
 
 def _title(fit: Fit, title: str) -> str:

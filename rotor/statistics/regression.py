@@ -97,7 +97,7 @@ class Regression:
         """By how many standard errors each parameter moves when a datum is left out, (m, n).
 
         b_j - b_j(i) over s(i) √(XᵀX)⁻¹_jj, with s(i) the weighted standard deviation without the datum (Belsley, Kuh and
-        Welsch, eq. 2.7). A datum of leverage 1 cannot be left out; its row is infinite.
+        Welsch, eq. 2.7), which needs two degrees of freedom. A datum of leverage 1 cannot be left out; its row is infinite.
         """
         h = self.leverages
         free = len(residuals) - self.rank

@@ -84,7 +84,8 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
     from rotor.fitting.report import dfbetas
 
-    moved = dict(zip(fit.groups.tolist(), dfbetas(fit), strict=True))
+    of_frequencies = dfbetas(fit)
+    moved = {} if of_frequencies is None else dict(zip(fit.groups.tolist(), of_frequencies, strict=True))
     difference = fit.difference_mhz
     return [
         {

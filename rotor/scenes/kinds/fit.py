@@ -134,7 +134,7 @@ def writers(found: FitAnswer, scene: FitScene) -> Mapping[str, Writer]:
         "par": lambda path: named("outputs.par", lambda: write_fitted_par(found, path, variances=False)),
         "var": lambda path: named("outputs.var", lambda: write_fitted_par(found, path, variances=True)),
         "table": lambda path: _write_text(path, table_of(found, form[path.suffix.lower()])),
-        "save_lines": lambda path: write_assigned_lines(fit.lines, path),
+        "save_lines": lambda path: write_assigned_lines(fit.marked_lines, path),
         "plot": plot,
     }
 

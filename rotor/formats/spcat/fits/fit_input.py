@@ -19,6 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.fit import Fit, FitOptions
 from rotor.fitting.parameters import Parameters
+from rotor.formats.assigned_lin import with_excluded_lines
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
@@ -243,11 +244,12 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     scale = np.where(wavenumber, header.cal, 1.0)  # SPFIT multiplies what it calculates in cm⁻¹ by CAL
     frequency, error = lines.frequency_mhz / scale, lines.error_mhz / scale
     k = len(names)
-    return assignments(
+    listed = assignments(
         names, upper[used][:, :k], lower[used][:, :k], frequency[used], error[used],
         weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
         widths_mhz=widths,
-    ), notes  # fmt: skip
+    )  # fmt: skip
+    return with_excluded_lines(listed, lines), notes
 
 
 def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> dict[int, float]:

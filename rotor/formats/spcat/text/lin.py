@@ -114,10 +114,9 @@ class LineList:
         array([ 0,  0, -1,  1])
         """
         groups = np.empty(len(self), dtype=np.int64)
-        near = (np.abs(np.diff(self.frequency)) < 1e-14 * np.abs(self.frequency[1:]) + 1e-8).tolist()
+        near, alike = (each.tolist() for each in like_line_before(self.frequency, self.error))
         if not any(near):
             return np.arange(len(self), dtype=np.int64)
-        alike = (np.abs(np.diff(self.error)) < 1e-7).tolist()
         count, blend = 0, -1  # lines of the present blend, 0 behind its width
         for i in range(len(self)):
             follows = count > 0 and near[i - 1]
@@ -136,6 +135,30 @@ class LineList:
         """The numbers of one line."""
         quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
         return Measured(quanta, float(self.frequency[index]), float(self.error[index]), float(self.weight[index]))
+
+
+def like_line_before(
+    frequency: NDArray[np.float64], error: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the second of n lines and those behind it have the frequency, and the error, of the line before, two arrays (n - 1,)."""
+    near = np.abs(np.diff(frequency)) < 1e-14 * np.abs(frequency[1:]) + 1e-8
+    return near, np.abs(np.diff(error)) < 1e-7
+
+
+EXCLUDED = (
+    "lines that do not count, as rotor fit --reject left them out:"  # behind a blank line, where SPFIT reads nothing
+)
+
+
+def excluded_lines(lines: LineList, per_state: int = 0) -> LineList | None:
+    """The lines behind the list that are marked as excluded, None where there are none."""
+    _, mark, behind = lines.rest.partition(EXCLUDED)
+    return read_lin(behind.lstrip("\r\n").encode(), per_state) if mark else None
+
+
+def with_excluded(lines: LineList, excluded: LineList) -> LineList:
+    """The lines with others behind a blank line, which end the list for SPFIT and are marked as excluded here."""
+    return replace(lines, rest=f"\n{EXCLUDED}\n{format_lin(excluded).decode()}")
 
 
 def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: int | None = None) -> LineList:
