@@ -205,7 +205,7 @@ def test_lines_that_nothing_parts_are_named():
 
 
 def test_the_command_line_says_so(call, folder):
-    (folder / "x.csv").write_text("j_upper,j_lower,frequency_mhz,error_mhz\n1,0,100,0.1\n1,0,100,0.1\n")
+    (folder / "x.csv").write_text("j_upper,j_lower,frequency_mhz,error_mhz,blend\n1,0,100,0.1,\n1,0,100,0.1,\n")
     code, _, err = call("fit", "x.csv", "--constants", "B=50 MHz", "--free", "B", "--save-lines", "x.lin")
     assert code == 0, err
     assert "1 line of the same frequency as the line before it is a blend with it in a .lin file" in err
