@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import rotor
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
@@ -21,6 +23,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.thermodynamics import partition_function
 from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 PROTONS = """constants = { A = 282000.0, B = 38800.0, C = 34000.0 }
@@ -166,3 +169,61 @@ def test_weights_beside_a_total_are_those_of_half_a_turn():
     top = Top.from_constants("A=9 B=3 C=2.5 GHz", spin_weights=weights, spin_constants=TOPS["two"].spin_constants)
     with pytest.raises(ValueError, match="expected those of half a turn about one axis"):
         effects_of(top, True)
+
+
+@pytest.mark.parametrize(
+    ("spins", "text", "weights"),
+    [
+        ("1H_1+1H_2", "C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "ee=1,eo=1,oe=3,oo=3"),
+        ("1H_1+1H_2", "C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "ee=6,eo=2,oe=2,oo=6"),  # the other way round, not reduced
+        ("14N_1+14N_2", "chi_aa(14N_1)=-4 chi_aa(14N_2)=-4", "ee=6,eo=6,oe=3,oo=3"),
+        ("35Cl_1+35Cl_2", "chi_aa(35Cl_1)=-40 chi_aa(35Cl_2)=-40", "ee=3,eo=3,oe=5,oo=5"),
+    ],
+)
+def test_typed_weights_that_count_a_pair_twice_are_refused(call, spins, text, weights):
+    """Levels that do not exist, and Q two to four times too large; the same rule as for weights from a geometry."""
+    command = ("levels", "--constants", "A=9 B=3 C=2.5 GHz", "--spins", spins, "--spin-constants", text, "--jmax", "1")
+    code, out, err = call(*command, "--spin-weights", weights)
+    assert (code, out) == (2, "")
+    assert "in a total spin: the spin weights of this top count their" in err
+    assert len(err.splitlines()) == 1
+    code, _, err = call(*command, "--spin-weights", "ee=1,eo=1,oe=0,oo=0")
+    assert code == 0, err
+
+
+def test_weights_of_other_nuclei_beside_a_pair():
+    """Of CH2Cl2 with the total spin of 35Cl the weights are those of the protons, with that of the protons those of 35Cl."""
+    geometry = rotor.read("H2CCl2")
+    chlorines = SpinConstants.parse("chi_aa(35Cl_1)=-40 chi_aa(35Cl_2)=-40", "35Cl_1+35Cl_2")
+    protons = SpinConstants.parse("C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "1H_1+1H_2")
+    all_nuclei = geometry.spin_weights
+    of_protons = SpinWeights.from_mapping({"ee": 3, "eo": 1, "oe": 1, "oo": 3})
+    of_chlorines = SpinWeights.from_mapping({"ee": 5, "eo": 3, "oe": 3, "oo": 5})
+    assert of_protons.with_pair(3) == all_nuclei == of_chlorines.with_pair(1)
+    for weights, spins in ((of_protons, chlorines), (of_chlorines, protons)):
+        top = replace(geometry.with_weights(weights.to_mapping(), "given"), spin_constants=spins)
+        assert len(effects_of(top, True)) > 2
+        twice = replace(geometry, spin_constants=spins)
+        with pytest.raises(ValueError, match="count their"):
+            effects_of(twice, True)
+
+
+def test_a_geometry_tells_the_weights_of_another_such_pair():
+    """Four protons in two pairs: beside the total spin of one pair the other has 3:1, which without a geometry is taken for the pair's."""
+    furan = rotor.read("C4H4O")
+    spins = SpinConstants.parse("C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "1H_1+1H_2")
+    names = furan.spin_weights.to_mapping()
+    other = {name: 1 if weight == max(names.values()) else 3 for name, weight in names.items()}
+    known = replace(furan.with_weights(other, "of the other pair"), spin_constants=spins)
+    assert SpinWeights.from_mapping(other).with_pair(1) == furan.spin_weights
+    assert len(effects_of(known, True)) > 2
+    with pytest.raises(ValueError, match="count their 4 functions"):
+        effects_of(Top.from_constants("A=9 B=8 C=4 GHz", spin_weights=other, spin_constants=spins), True)
+
+
+def test_weights_of_states_that_count_a_pair_are_refused(call, folder):
+    states = '[states]\n"E[1]" = 1000.0\n"A[1]" = 282000.0\n"B[1]" = 38800.0\n"C[1]" = 34000.0\n[states.weights]\n1 = { ee = 1, eo = 1, oe = 3, oo = 3 }\n'
+    (folder / "two.toml").write_text(PROTONS + states)
+    code, _, err = call("levels", "two.toml", "--hyperfine", "--jmax", "1")
+    assert code == 2
+    assert "count their 4 functions already" in err

@@ -13,6 +13,7 @@ from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
     from rotor.tops.spins.spin_constants import SpinConstants
+    from rotor.tops.spins.spin_weights import SpinWeights
     from rotor.tops.states.state_constants import StateConstants
     from rotor.tops.top import Top
 
@@ -97,32 +98,43 @@ def _refuse_across_a_line(top: Top) -> None:
                 )
 
 
-def _refuse_weights_of_the_geometry(top: Top) -> None:
-    """ValueError where the spin weights beside a total spin of two nuclei are those of all nuclei of the geometry, these two among them."""
+def _weights_of_states(top: Top) -> list[SpinWeights]:
+    """The spin weights of a top and of its states, without those that are alike for all levels."""
+    every = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
+    return [weights for weights in every if weights.rule != "none"]
+
+
+def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
+    """ValueError where the spin weights beside a total spin of two nuclei count these two.
+
+    With a geometry that is known. Without one, weights that are those of the two nuclei alone are taken to be theirs.
+    """
     from rotor.tops.spins.spin_statistics import weights_of
 
     assert top.spin_constants is not None
-    weights = top.spin_weights
-    if weights.rule == "none" or top.molecule is None or weights != weights_of(top.molecule):
+    twice = top.spin_constants.twice[next(iter(top.spin_constants.totals))]
+    all_nuclei = None if top.molecule is None else weights_of(top.molecule)
+    if weights.with_pair(twice) == all_nuclei:
         return
-    first = next(iter(top.spin_constants.totals))
-    spin = top.spin_constants.twice[first]
-    raise ValueError(
-        f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
-        f"{(spin + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, 0 to others"
-    )
+    if weights == all_nuclei or weights.is_of_pair(twice):
+        raise ValueError(
+            f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
+            f"{(twice + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, "
+            "0 to others"
+        )
 
 
 def _refuse_like_nuclei(top: Top) -> None:
     """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
+    every = _weights_of_states(top)
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
     if len(top.spin_constants.totals) == 2:
-        _refuse_weights_of_the_geometry(top)
-        top.spin_weights.exchanged()  # raises where an exchange of two nuclei does not tell the classes apart
+        for weights in every:
+            _refuse_weights_of_the_pair(top, weights)
         labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
-    if like and top.spin_weights.rule != "none":
+    if like and every:
         raise ValueError(
             f"spins of several {like[0]}: the spin weights of {top.name or 'this top'} count their exchange already; give the "
             "weights without them, or an .int and .var file with equivalent nuclei"

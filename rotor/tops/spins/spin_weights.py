@@ -80,6 +80,28 @@ class SpinWeights:
             "and oe = oo = 0, of levels of even total spin; those of odd total spin have them exchanged"
         )
 
+    def with_pair(self, twice: int) -> SpinWeights:
+        """The weights of all nuclei, where these are those of the nuclei beside two of spin `twice`/2 that half a turn exchanges.
+
+        Of the (2i+1)² functions of the two, (i+1)(2i+1) and i(2i+1) have the parity of their total spin 2i and the other one. Raises
+        ValueError as `exchanged`.
+
+        >>> SpinWeights.from_mapping({"even": 1, "odd": 0}).with_pair(1).to_mapping()  # two protons
+        {'even': 1, 'odd': 3}
+        """
+        even, odd = (twice + 2, twice) if twice % 2 == 0 else (twice, twice + 2)
+        both = zip(self.classes, self.values, self.exchanged().values, strict=True)
+        return SpinWeights.from_mapping({name: even * own + odd * other for name, own, other in both})
+
+    def is_of_pair(self, twice: int) -> bool:
+        """Whether the classes weigh as the functions of two nuclei of spin `twice`/2 alone, i + 1 to i.
+
+        >>> SpinWeights.from_mapping({"ee": 6, "eo": 6, "oe": 3, "oo": 3}).is_of_pair(2)
+        True
+        """
+        divisor = gcd(twice, 2)
+        return set(self.values) == {(twice + 2) // divisor, twice // divisor}
+
     @property
     def mean(self) -> float:
         """The weight of one component averaged over many levels: what the classical limit of Q carries."""
