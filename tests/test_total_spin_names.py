@@ -197,8 +197,8 @@ def test_weights_of_other_nuclei_beside_a_pair():
     chlorines = SpinConstants.parse("chi_aa(35Cl_1)=-40 chi_aa(35Cl_2)=-40", "35Cl_1+35Cl_2")
     protons = SpinConstants.parse("C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "1H_1+1H_2")
     all_nuclei = geometry.spin_weights
-    of_protons = SpinWeights.from_mapping({"ee": 3, "eo": 1, "oe": 1, "oo": 3})
-    of_chlorines = SpinWeights.from_mapping({"ee": 5, "eo": 3, "oe": 3, "oo": 5})
+    of_protons = SpinWeights.from_mapping({"ee": 1, "eo": 3, "oe": 3, "oo": 1})
+    of_chlorines = SpinWeights.from_mapping({"ee": 3, "eo": 5, "oe": 5, "oo": 3})
     assert of_protons.with_pair(3) == all_nuclei == of_chlorines.with_pair(1)
     for weights, spins in ((of_protons, chlorines), (of_chlorines, protons)):
         top = replace(geometry.with_weights(weights.to_mapping(), "given"), spin_constants=spins)
@@ -222,7 +222,10 @@ def test_a_geometry_tells_the_weights_of_another_such_pair():
 
 
 def test_weights_of_states_that_count_a_pair_are_refused(call, folder):
-    states = '[states]\n"E[1]" = 1000.0\n"A[1]" = 282000.0\n"B[1]" = 38800.0\n"C[1]" = 34000.0\n[states.weights]\n1 = { ee = 1, eo = 1, oe = 3, oo = 3 }\n'
+    constants = "".join(
+        f'"{name}[1]" = {value}\n' for name, value in {"E": 1e3, "A": 282e3, "B": 388e2, "C": 34e3}.items()
+    )
+    states = f"[states]\n{constants}[states.weights]\n1 = {{ ee = 1, eo = 1, oe = 3, oo = 3 }}\n"
     (folder / "two.toml").write_text(PROTONS + states)
     code, _, err = call("levels", "two.toml", "--hyperfine", "--jmax", "1")
     assert code == 2
