@@ -122,7 +122,7 @@ def test_a_stark_map_converges_with_j_max():
     by_j = list(errors(table, "numerics.jmax").values())
     assert by_j[:4] == sorted(by_j[:4], reverse=True)
     assert by_j[0] > 10.0  # MHz, with the least J max
-    assert by_j[-1] < 1e-8  # round-off of 1e5 MHz is 1e-11
+    assert by_j[-1] < 1e-4 < by_j[-2]  # the tolerance of a scene: the lowest J max that meets it
     for tolerance, error in errors(table, "numerics.tolerance").items():
         assert error <= float(tolerance)
 

@@ -224,6 +224,7 @@ def map_request(
         slope_name="mu_eff_debye",
         slope_unit_mhz=units.MHZ_PER_DEBYE_KV_PER_CM,
         diabatic_gap_mhz=diabatic_gap_mhz,
+        reach=1 if light is None else 2,
     )
 
 

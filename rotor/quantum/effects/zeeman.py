@@ -139,6 +139,7 @@ def zeeman_map(
         field_name="field_tesla",
         slope_name="moment_nuclear_magnetons",
         slope_unit_mhz=NUCLEAR_MAGNETON_MHZ_PER_T,
+        reach=1 if square is None else 2,
     )
     return field_map(request, jmax, executor)
 

@@ -10,14 +10,17 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest
 from rotor.quantum.fields.solver import DENSE, Matrix, solve_fields
+from rotor.quantum.fields.truncation import left_out_mhz
 
 FIRST_BASIS = 64
+PART_OF_TOLERANCE = 0.1  # for states below J max that a basis leaves out
 
 
 class BlockStates(NamedTuple):
-    """The lowest states of one block: free rows (states,) that name them, energies (fields, states), vectors (fields, n, states).
+    """The lowest states of one block.
 
-    places: (n,) of the functions of the block over which the vectors are.
+    rows: free levels (states,) that name them. energies: (fields, states), MHz. places: (n,) functions of the block over which the
+    vectors (fields, n, states) are. error: bound of what the basis leaves out of each energy (fields, states), MHz.
     """
 
     block: FieldBlock
@@ -25,21 +28,27 @@ class BlockStates(NamedTuple):
     energies: Floats
     places: Ints
     vectors: Matrix
+    error: Floats
 
 
-def followed(block: FieldBlock, j_highest: int) -> int:
-    """How many of the lowest states of a block hold all free levels up to J = `j_highest`."""
+def basis_order(block: FieldBlock, jmax: int) -> Ints:
+    """Places of the states up to J max in order of their free energies."""
     order = block.free_order
+    return order[block.j[order] <= jmax]
+
+
+def followed(block: FieldBlock, order: Ints, j_highest: int) -> int:
+    """How many of the lowest states of a basis hold all free levels up to J = `j_highest`."""
     return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
 
 
-def count_of(request: MapRequest, block: FieldBlock) -> int:
+def count_of(request: MapRequest, block: FieldBlock, order: Ints) -> int:
     """States to be solved: those followed, and where labels are diabatic as many above as they may cross."""
-    count = followed(block, request.j_highest)
-    return count if request.diabatic_gap_mhz is None else min(len(block), count + count // 2 + 4)
+    count = followed(block, order, request.j_highest)
+    return count if request.diabatic_gap_mhz is None else min(len(order), count + count // 2 + 4)
 
 
-def block_states(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool = True) -> BlockStates:
+def block_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> BlockStates:
     """The states of a block that a map follows, at several fields.
 
     Parameters
@@ -47,64 +56,55 @@ def block_states(request: MapRequest, block: FieldBlock, fields: Floats, with_ve
     request : MapRequest
         What is solved.
     block : FieldBlock
-        One of its blocks.
+        A block of the space of `jmax + request.margin`.
     fields : (f,) array
         In the unit of the request.
-    with_vectors : bool, optional
-        False leaves the eigenvectors out where energies can be found without them.
+    jmax : int
+        Highest J of the basis.
 
     Returns
     -------
     BlockStates
         Energies (f, states) in MHz, and the states that they belong to.
     """
-    return states_of(request, block, request.problem(block), fields, with_vectors)
+    return solve_block(request, block, request.problem(block), fields, jmax)
 
 
-def states_of(
-    request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, with_vectors: bool
+def solve_block(
+    request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, jmax: int
 ) -> BlockStates:
-    """The same, the matrices of the block being known.
-
-    Parameters
-    ----------
-    request : MapRequest
-        What is solved.
-    block : FieldBlock
-        One of its blocks.
-    problem : BlockProblem
-        Its matrices.
-    fields : (f,) array
-        In the unit of the request.
-    with_vectors : bool
-        False leaves the eigenvectors out where energies can be found without them.
-
-    Returns
-    -------
-    BlockStates
-        Energies (f, states) in MHz, and the states that they belong to.
-    """
-    count, order = count_of(request, block), block.free_order
+    """`block_states` with the matrices of the block at hand."""
+    order = basis_order(block, jmax)
+    count = count_of(request, block, order)
     places = enough_states(problem, order, count, fields, request.tolerance_mhz)
-    energies, vectors = solve_fields(problem.terms(places), fields, count, with_vectors, request.tolerance_mhz)
-    return BlockStates(block, block.rows[order[:count]], energies, places, vectors)
+    energies, vectors, error = solve_fields(problem.terms(places), fields, count, request.tolerance_mhz)
+    return bounded_states(block, problem, order, places, energies, vectors, error, fields)
+
+
+def bounded_states(
+    block: FieldBlock, problem: BlockProblem, order: Ints, places: Ints, energies: Floats, vectors: Matrix, error: Floats,
+    fields: Floats,
+) -> BlockStates:  # fmt: skip
+    """Solved states with their names, and the bound of what their basis leaves out added to the error of the solver."""
+    error = error + left_out_mhz(problem, places, energies, vectors, fields)
+    return BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, error)
 
 
 def enough_states(problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float) -> Ints:
-    """Of the free states the lowest that are enough at the strongest field, found by doubling.
+    """The lowest free states that suffice at the strongest field.
 
     Parameters
     ----------
     problem : BlockProblem
         Matrices of the block.
     order : (n,) array
-        Its states by energy.
+        States of the basis by energy.
     count : int
-        How many of the lowest are asked for.
+        How many of the lowest energies are computed.
     fields : (f,) array
         In the unit of the request.
     tolerance_mhz : float
-        A tenth of it is how far energies may still move.
+        A tenth of it is the bound of what further states of the basis may change.
 
     Returns
     -------
@@ -112,14 +112,15 @@ def enough_states(problem: BlockProblem, order: Ints, count: int, fields: Floats
         Places in the block, rising.
     """
     size = max(FIRST_BASIS, 2 * count)
+    every = np.sort(order)
     if len(order) <= max(size, 2 * DENSE):
-        return np.arange(len(order))
+        return every
     strongest = fields[np.argmax(np.abs(fields))][None]
-    before = None
+    whole = problem.over(every)
     while size < len(order):
-        basis = np.sort(order[:size])
-        energies = solve_fields(problem.terms(basis), strongest, count, False)[0]
-        if before is not None and np.abs(energies - before).max() <= 0.1 * tolerance_mhz:
-            return basis
-        before, size = energies, int(1.4 * size) + 1
-    return np.arange(len(order))
+        basis = np.searchsorted(every, np.sort(order[:size]))
+        energies, vectors, _ = solve_fields(whole.terms(basis), strongest, count)
+        if left_out_mhz(whole, basis, energies, vectors, strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
+            return every[basis]
+        size = int(1.4 * size) + 1
+    return every

@@ -1,8 +1,9 @@
 """Energies of a top against a field: maps of levels with M, their labels, dipoles and cosines.
 
 H(x) = H0 + F + x V over every exact block of states, x the field that is varied, F what else acts (the light of a laser beside a
-static field). Each block is solved for all fields, its lowest states only, in a basis of the lowest free states that is doubled
-until the energies stand still; J max is raised until they do. The population of the highest J is reported with each state.
+static field). Each block is solved for all fields, its lowest states only, in the smallest basis of free states whose bound of what
+it leaves out (`rotor.quantum.fields.truncation`) is within the tolerance: J max is chosen first, then the states up to it.
+The bound and the population of the highest J stand beside each state at each field.
 
 Labels. Inside an exact symmetry block levels do not cross, so the state of rank r at any field is named after the free level of
 rank r in that block: adiabatic labels, which no grid of fields can change. Labels by overlap do depend on the grid. Diabatic ones
@@ -21,7 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, states_of
+from rotor.quantum.fields.block_states import (
+    BlockStates,
+    basis_order,
+    bounded_states,
+    count_of,
+    enough_states,
+    solve_block,
+)
 from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
@@ -52,10 +60,10 @@ class FieldMap(Table):
     field: (n,) in the unit that `field_name` names. m, rank: M, and the order in energy inside its exact block. block: which block.
     energy_mhz: E/h. label: the free level of that rank. slope: -dE/dfield, in `slope_name`. cosines: expectation values by name.
     edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
-    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. moved_mhz: by how much the energy of
-    each state still moved when J max was raised, at the highest field. round_off_mhz: of each energy, a few units in the last
-    place of the largest one of its matrix. block_number: place of the block in `blocks_of_map`. request: what the map was
-    made from.
+    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. truncation_mhz: bound of what the basis
+    leaves out of each energy; NaN for states listed for their diabatic label alone. round_off_mhz: of each energy, a few units in
+    the last place of the largest one of its matrix. block_number: place of the block in `blocks_of_map`. request:
+    what the map was made from.
     """
 
     field_name: str
@@ -74,7 +82,7 @@ class FieldMap(Table):
     free_mhz: Floats
     weight: Floats
     jmax: int
-    moved_mhz: Floats
+    truncation_mhz: Floats
     round_off_mhz: Floats
     block_number: Ints
     request: MapRequest
@@ -97,15 +105,15 @@ class FieldMap(Table):
             "block": self.block,
             "edge_population": self.edge_population,
             "copies": self.copies,
-            "accuracy_mhz": self.moved_mhz + self.round_off_mhz,
+            "accuracy_mhz": self.truncation_mhz + self.round_off_mhz,
         }
         return out if self.diabatic_label is None else {**out, "diabatic_label": self.diabatic_label}
 
     @property
     def accuracy_mhz(self) -> float:
-        """The largest error of an energy that is known: what J max leaves, and round-off."""
-        here = np.isfinite(self.moved_mhz)
-        return float((self.moved_mhz + self.round_off_mhz)[here].max(initial=0.0))
+        """Bound of the numerical error of every energy: what the basis leaves out, and round-off."""
+        here = np.isfinite(self.truncation_mhz)
+        return float((self.truncation_mhz + self.round_off_mhz)[here].max(initial=0.0))
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -139,9 +147,9 @@ class FieldMap(Table):
 
 
 class _Solved(NamedTuple):
-    """Of one block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,).
+    """A block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,).
 
-    round_off: of an energy, MHz.
+    error: bound of what the basis leaves out (fields, states), round_off: of an energy, MHz.
     """
 
     energies: Floats
@@ -150,94 +158,110 @@ class _Solved(NamedTuple):
     cosines: dict[str, Floats]
     rows: Ints
     block: FieldBlock
+    error: Floats
     round_off: float
 
 
 def field_map(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> FieldMap:
     """The map that a request asks for.
 
-    jmax: of the basis; by default it is raised until no energy at the highest field moves by more than the tolerance, and until no
-    state has more of its population in the two highest J than the request allows.
+    jmax: of the basis; by default the lowest whose bound of each energy is within the tolerance, and with which no state has more of
+    its population in the two highest J than the request allows.
     executor: blocks are spread over it.
 
     Raises ValueError where a given J max is too small for either, and where J of 300 would not be enough.
     """
-    tried = jmax
+    chosen = smallest_jmax(request, executor) if jmax is None else _checked_jmax(request, jmax)
     while True:
-        enough, moved = converged_jmax(request, tried, executor, given=jmax is not None)
-        found = _tabulated(request, enough, moved, executor)
-        leaked = float(found.edge_population.max(initial=0.0))
-        if leaked <= request.most_at_edge:
-            return found
+        states = _tabulated(request, chosen, executor)
+        error = float(np.nanmax(states.truncation_mhz, initial=0.0))
+        leaked = float(states.edge_population.max(initial=0.0))
+        if error <= request.tolerance_mhz and leaked <= request.most_at_edge:
+            return states
         if jmax is not None:
-            raise ValueError(
-                f"J max {jmax} is too small: a state has {leaked:.2g} of its population in the two highest J, more than "
-                f"{request.most_at_edge:g}; give a higher J max, or none and it is chosen"
-            )
-        tried = enough + max(STEP_J, enough // 4)
+            raise ValueError(_too_small(request, jmax, error, leaked))
+        chosen += 1 if error > request.tolerance_mhz else 2
+        _check_highest(chosen)
 
 
-def converged_jmax(
-    request: MapRequest, jmax: int | None = None, executor: Executor | None = None, given: bool | None = None
-) -> tuple[int, Floats]:
-    """J max of the basis of a map, and by how many MHz each energy at the highest field moves with a higher one.
+def _checked_jmax(request: MapRequest, jmax: int) -> int:
+    if jmax < request.j_highest + EDGE:
+        raise ValueError(
+            f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
+        )
+    return jmax
+
+
+def _too_small(request: MapRequest, jmax: int, error: float, leaked: float) -> str:
+    """Why a J max that was given does not serve."""
+    reason = (
+        f"the error of an energy may be {error:.3g} MHz, more than {request.tolerance_mhz:g}"
+        if error > request.tolerance_mhz
+        else f"a state has {leaked:.2g} of its population in the two highest J, more than {request.most_at_edge:g}"
+    )
+    return f"J max {jmax} is too small: {reason}; give a higher J max, or none and it is chosen"
+
+
+def _check_highest(jmax: int) -> None:
+    if jmax > HIGHEST_J:
+        raise ValueError(f"the field needs J beyond {HIGHEST_J}: it is too strong for this top")
+
+
+def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
+    """The lowest J max whose bound of each energy at the strongest field is within the tolerance.
 
     Parameters
     ----------
     request : MapRequest
         What is solved.
-    jmax : int, optional
-        Where to begin; by default the lowest that can serve.
     executor : Executor, optional
         Blocks are spread over it.
-    given : bool, optional
-        Whether no other J max may be taken; by default where one is given.
 
     Returns
     -------
-    jmax : int
-        That is enough.
-    moved : (states,) array
-        Of the states that come from levels up to the J asked for, in the order of the map.
+    int
+        At most 300.
 
     Raises
     ------
     ValueError
-        As `field_map`.
+        Where that is not enough.
     """
-    given = jmax is not None if given is None else given
-    jmax = jmax if jmax is not None else _first_jmax(request)
-    if jmax < request.j_highest + EDGE:
-        raise ValueError(
-            f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
-        )
-    ends = np.unique(np.abs(request.fields))[-1:]
-    before = _energies_at(request, jmax, ends, executor)
+    lowest = _lowest_jmax(request)
+    highest = lowest + STEP_J
     while True:
-        more = jmax + max(STEP_J, jmax // 4)
-        after = _energies_at(request, more, ends, executor)
-        moved = np.abs(after - before)
-        worst = float(moved.max(initial=0.0))
-        if worst <= request.tolerance_mhz:
-            return jmax, moved
-        if given:
-            raise ValueError(
-                f"J max {jmax} is too small: with {more} energies at the highest field move by {worst:.3g} MHz, more than "
-                f"{request.tolerance_mhz:g}; give a higher J max, or none and it is chosen"
-            )
-        least = max(_round_off(request.problem(block), ends) for block in blocks_of_map(request, more))
-        if worst <= least:
-            raise ValueError(
-                f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
-            )
-        jmax, before = more, after
-        if jmax > HIGHEST_J:
-            raise ValueError(f"the field needs J beyond {HIGHEST_J}: it is too strong for this top")
+        _check_highest(highest)
+        enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
+        if max(enough, default=lowest) <= highest:
+            return max(enough, default=lowest)
+        lowest, highest = highest, highest + max(STEP_J, highest // 4)
+
+
+def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: FieldBlock) -> int:
+    """The lowest J max between two that is enough for a block, by bisection; `highest` + 1 where none is."""
+    problem = request.problem(block)
+    strongest = request.fields[np.argmax(np.abs(request.fields))][None]
+
+    def serves(jmax: int) -> bool:
+        states = solve_block(request, block, problem, strongest, jmax)
+        return float(states.error[:, block.levels.j[states.rows] <= request.j_highest].max()) <= request.tolerance_mhz
+
+    least = _round_off(problem, strongest)
+    if least > request.tolerance_mhz:
+        raise ValueError(
+            f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
+        )
+    if not serves(highest):
+        return highest + 1
+    while lowest < highest:
+        middle = (lowest + highest) // 2
+        lowest, highest = (lowest, middle) if serves(middle) else (middle + 1, highest)
+    return highest
 
 
 def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
-    """The blocks that hold states of a map, in its order."""
-    space = request.space(jmax)
+    """Blocks with states of a map, in its order, over J up to J max and the margin that bounds need."""
+    space = request.space(jmax + request.margin)
     return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
 
 
@@ -251,7 +275,7 @@ def each_block(
     request : MapRequest
         What is solved.
     jmax : int
-        Highest J of the basis.
+        Highest J of the basis; blocks reach beyond it by `request.margin`.
     run : callable
         Takes a block; must be picklable for a pool of processes.
     executor : Executor, optional
@@ -266,76 +290,69 @@ def each_block(
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
 
-def _first_jmax(request: MapRequest) -> int:
-    """The J from which on all free levels lie above those that are followed; they would shift the ranks."""
+def _lowest_jmax(request: MapRequest) -> int:
+    """The J beyond which all free levels lie above those that are followed; they would shift the ranks."""
     jmax = request.j_highest + STEP_J
     while jmax <= HIGHEST_J:
         levels = request.space(jmax).levels
         top = levels.energy_mhz[levels.j <= request.j_highest].max()
         if levels.energy_mhz[levels.j == jmax].min() > top:
-            return jmax
+            return max(int(levels.j[levels.energy_mhz <= top].max()), request.j_highest + EDGE)
         jmax += max(STEP_J, jmax // 4)
     raise ValueError(f"levels beyond J = {HIGHEST_J} lie among those up to J = {request.j_highest}; follow fewer")
 
 
-def _energies_at(request: MapRequest, jmax: int, fields: Floats, executor: Executor | None) -> Floats:
-    solved = each_block(request, jmax, partial(block_states, request, fields=fields, with_vectors=False), executor)
-    return np.concatenate(
-        [one.energies[:, one.block.levels.j[one.rows] <= request.j_highest].ravel() for one in solved]
-    )
-
-
-def _solve_block(request: MapRequest, block: FieldBlock) -> _Solved:
+def _solve_block(request: MapRequest, jmax: int, block: FieldBlock) -> _Solved:
     problem = request.problem(block)
-    return _measured(request, block, problem, states_of(request, block, problem, request.fields, True))
+    return _measured(request, jmax, problem, solve_block(request, block, problem, request.fields, jmax))
 
 
-def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_Solved]:
+def _solve_blocks(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[_Solved]:
     """All blocks in this process, in one go where they are chains."""
     parts = []
     for block in blocks:
-        problem, count, order = request.problem(block), count_of(request, block), block.free_order
+        problem, order = request.problem(block), basis_order(block, jmax)
+        count = count_of(request, block, order)
         places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)
-        parts.append((block, problem, block.rows[order[:count]], places, (problem.terms(places), count)))
-    found = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
+        parts.append((block, problem, order, places, (problem.terms(places), count)))
+    solved = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
     return [
-        _measured(request, block, problem, BlockStates(block, rows, energies, places, vectors))
-        for (block, problem, rows, places, _), (energies, vectors) in zip(parts, found, strict=True)
+        _measured(request, jmax, problem, bounded_states(block, problem, order, places, *states, request.fields))
+        for (block, problem, order, places, _), states in zip(parts, solved, strict=True)
     ]
 
 
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     """Whether all blocks are chains that one sweep holds together: milliseconds, which other processes would not shorten."""
-    states = sum(count_of(request, block) for block in blocks)
+    states = sum(count_of(request, block, block.free_order) for block in blocks)
     chains = all(isinstance(block, AxialBlock) for block in blocks)
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
-def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, found: BlockStates) -> _Solved:
+def _measured(request: MapRequest, jmax: int, problem: BlockProblem, found: BlockStates) -> _Solved:
     """Slopes, cosines and leakage of the states of a block."""
-    fields, vectors = request.fields, found.vectors
+    block, fields, vectors = found.block, request.fields, found.vectors
     slopes = -derivatives(problem.terms(found.places), fields, vectors)
     cosines = {name: expectation(over(made(), found.places), vectors) for name, made in problem.observables.items()}
-    edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
-    return _Solved(found.energies, slopes, edge, cosines, found.rows, block, _round_off(problem, fields))
+    edge = (np.abs(vectors[:, block.j[found.places] > jmax - EDGE]) ** 2).sum(axis=1)
+    return _Solved(found.energies, slopes, edge, cosines, found.rows, block, found.error, _round_off(problem, fields))
 
 
 def _round_off(problem: BlockProblem, fields: Floats) -> float:
     """Of eigenvalues at any field: LAPACK's are those of a matrix that is off by a few last places of |H|, and move by no more."""
     strongest = float(np.abs(fields).max())
-    given = (problem.fixed, problem.slope, problem.curvature)
-    norms = [strongest**n * np.abs(one).sum(axis=1).max() for n, one in enumerate(given) if one is not None]
+    norms = [strongest**n * np.abs(one).sum(axis=1).max() for n, one in enumerate(problem.coefficients)]
     return ROUND_OFF * float(sum(norms))
 
 
-def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
+def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> FieldMap:
     blocks = blocks_of_map(request, jmax)
     if executor is None or _is_small(request, blocks):
-        solved = _solve_blocks(request, blocks)
+        solved = _solve_blocks(request, jmax, blocks)
     else:
-        solved = each_block(request, jmax, partial(_solve_block, request), executor)
+        solved = each_block(request, jmax, partial(_solve_block, request, jmax), executor)
     fields, rows, numbers = request.fields, [], []
-    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
+    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, jmax, one) for one in solved]
     for number, (one, names) in enumerate(zip(solved, named, strict=True)):
         ours = one.block.levels.j[one.rows] <= request.j_highest
         listed = ours if names is None else ours | ours[names].any(axis=0)
@@ -367,7 +384,7 @@ def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor
         free_mhz=repeated(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
         weight=repeated(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
         jmax=jmax,
-        moved_mhz=np.repeat(_accuracy(request, rows, moved), len(fields)),
+        truncation_mhz=column(partial(_truncation, request)),
         round_off_mhz=repeated(lambda one, rank: one.round_off),
         block_number=np.repeat(np.array(numbers, dtype=np.int64), len(fields)),
         request=request,
@@ -375,25 +392,23 @@ def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor
     )
 
 
-def _accuracy(request: MapRequest, rows: list[tuple[_Solved, int]], moved: Floats) -> Floats:
-    """By how much the energy of each state moves with a higher J max; NaN for states listed for their diabatic label alone."""
-    asked = np.array([one.block.levels.j[one.rows[rank]] <= request.j_highest for one, rank in rows], dtype=bool)
-    out = np.full(len(rows), np.nan)
-    out[asked] = moved
-    return out
+def _truncation(request: MapRequest, solved: _Solved, rank: int) -> Floats:
+    """Bound of what the basis leaves out (fields,); NaN for states listed for their diabatic label alone."""
+    is_followed = solved.block.levels.j[solved.rows[rank]] <= request.j_highest
+    return solved.error[:, rank] if is_followed else np.full(len(solved.error), np.nan)
 
 
 def _cosine(name: str, one: _Solved, rank: int) -> Floats:
     return one.cosines[name][:, rank]
 
 
-def _diabatic_ranks(request: MapRequest, one: _Solved) -> Ints:
+def _diabatic_ranks(request: MapRequest, jmax: int, one: _Solved) -> Ints:
     """Whose name each state of a block has at each field, (fields, states)."""
     from rotor.quantum.fields.diabatic import diabatic_ranks
 
     count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
     return diabatic_ranks(
-        partial(_energies_and_slopes, _small(request, one.block, count), count), request.fields, count, gap
+        partial(_energies_and_slopes, _small(request, jmax, one.block, count), count), request.fields, count, gap
     )
 
 
@@ -409,10 +424,12 @@ def _diabatic_labels(
     return np.concatenate([of_block[id(one)][:, rank] for one, rank in rows])
 
 
-def _small(request: MapRequest, block: FieldBlock, count: int) -> Terms:
+def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Terms:
     """The Hamiltonian of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
-    terms = problem.terms(enough_states(problem, block.free_order, count, request.fields, request.tolerance_mhz))
+    terms = problem.terms(
+        enough_states(problem, basis_order(block, jmax), count, request.fields, request.tolerance_mhz)
+    )
     if len(terms[0]) <= DENSE:
         return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)

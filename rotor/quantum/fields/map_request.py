@@ -27,10 +27,19 @@ class BlockProblem(NamedTuple):
     observables: Mapping[str, Callable[[], Matrix]]
     curvature: Matrix | None = None
 
+    @property
+    def coefficients(self) -> Terms:
+        """The coefficients of H(x) as a polynomial in x, (n, n) each."""
+        return (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
+
     def terms(self, states: Ints) -> Terms:
-        """The coefficients of H(x) as a polynomial in x, over some of the states, which rise."""
-        given = (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
-        return tuple(over(one, states) for one in given)
+        """The coefficients of H(x) over some of the states, which rise."""
+        return tuple(over(one, states) for one in self.coefficients)
+
+    def over(self, states: Ints) -> BlockProblem:
+        """The problem over some of the states, which rise; without observables."""
+        curvature = None if self.curvature is None else over(self.curvature, states)
+        return BlockProblem(over(self.fixed, states), over(self.slope, states), {}, curvature)
 
 
 def over(matrix: Matrix, states: Ints) -> Matrix:
@@ -44,7 +53,7 @@ class MapRequest:
 
     space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
     followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
-    most_at_edge: the population that a state may have in the two highest J.
+    most_at_edge: the population that a state may have in the two highest J. reach: the largest change of J that a field makes.
     """
 
     space: Callable[[int], FieldSpace]
@@ -58,6 +67,12 @@ class MapRequest:
     slope_unit_mhz: float
     diabatic_gap_mhz: float | None = None
     most_at_edge: float = MOST_AT_EDGE
+    reach: int = 2
+
+    @property
+    def margin(self) -> int:
+        """How many J beyond the basis the matrices need for a bound of what the basis leaves out."""
+        return 2 * self.reach
 
 
 class KnownSpaces:

@@ -26,13 +26,13 @@ from rotor.quantum.wigner import three_j
 Z = (0.0, 0.0, 1.0)
 
 
-def signed_states(request: MapRequest, block: FieldBlock, fields: Floats) -> list[BlockStates]:
+def signed_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> list[BlockStates]:
     """The states of a block, and of that of -M where the block stands for both."""
-    here = block_states(request, block, fields)
+    here = block_states(request, block, fields, jmax)
     if not isinstance(block, SpinFieldBlock) or not block.twice_m or axial_k_of(block):
         return [here]  # K and -K of one M are alike, and (K, -M) is a block of the map itself
     own = [replace(block, m=sign * block.m, twice_m=sign * block.twice_m, copies=1) for sign in (1, -1)]
-    return [here._replace(block=own[0]), block_states(request, own[1], fields)]
+    return [here._replace(block=own[0]), block_states(request, own[1], fields, jmax)]
 
 
 def pairs_with_spins(blocks: Sequence[FieldBlock]) -> list[BlockPair]:

@@ -49,13 +49,11 @@ def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
     return np.asarray(means.reshape(fields, states))
 
 
-def solve_fields(
-    terms: Terms, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float = 0.0
-) -> tuple[Floats, Matrix]:
+def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float = 0.0) -> tuple[Floats, Matrix, Floats]:
     """The lowest `count` states of Σ x^n H_n at many fields x.
 
-    Small matrices are solved for all fields at once, large ones one by one or, where many fields are asked for, in a
-    basis of their own eigenvectors at a few fields (`reduced_basis`).
+    Small matrices are solved for all fields at once, large ones one by one or, at many fields, in a basis of their own
+    eigenvectors at a few fields (`reduced_basis`).
 
     Parameters
     ----------
@@ -65,8 +63,6 @@ def solve_fields(
         Values of x.
     count : int
         How many states.
-    with_vectors : bool
-        False leaves eigenvectors out where they are not needed.
     tolerance_mhz : float, optional
         Largest error of an energy in the reduced basis; 0 solves every field in full.
 
@@ -75,60 +71,57 @@ def solve_fields(
     energies : (f, count) array
         MHz, rising.
     vectors : (f, n, count) array
-        Eigenvectors in columns; without columns where they are left out.
+        Eigenvectors in columns.
+    error : (f, count) array
+        Of energies in a reduced basis, MHz; 0 for full solutions.
     """
-    if with_vectors and len(fields) >= MANY_FIELDS and is_chain(terms):
-        found = chain_states([(terms, count)], fields)
-        if found is not None:
-            return found[0]
-    return _solve_matrices(terms, fields, count, with_vectors, tolerance_mhz)
+    if len(fields) >= MANY_FIELDS and is_chain(terms):
+        states = chain_states([(terms, count)], fields)
+        if states is not None:
+            return _exact(*states[0])
+    return _solve_matrices(terms, fields, count, tolerance_mhz)
 
 
 def solve_together(
     blocks: Sequence[tuple[Terms, int]], fields: Floats, tolerance_mhz: float
-) -> list[tuple[Floats, Matrix]]:
+) -> list[tuple[Floats, Matrix, Floats]]:
     """`solve_fields` of several blocks, each with its number of states; those that are chains are solved in one go."""
     if len(fields) >= MANY_FIELDS and all(is_chain(terms) for terms, _ in blocks):
-        found = chain_states(blocks, fields)
-        if found is not None:
-            return list(found)
-    return [solve_fields(terms, fields, count, True, tolerance_mhz) for terms, count in blocks]
+        states = chain_states(blocks, fields)
+        if states is not None:
+            return [_exact(*pair) for pair in states]
+    return [solve_fields(terms, fields, count, tolerance_mhz) for terms, count in blocks]
 
 
-def _solve_matrices(
-    terms: Terms, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float
-) -> tuple[Floats, Matrix]:
+def _exact(energies: Floats, vectors: Matrix) -> tuple[Floats, Matrix, Floats]:
+    """A full solution with its error of 0."""
+    return energies, vectors, np.zeros(energies.shape)
+
+
+def _solve_matrices(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix, Floats]:
     size = len(terms[0])
     if size <= DENSE:
-        stack = at_fields(terms, fields)
-        if not with_vectors:
-            return np.asarray(np.linalg.eigvalsh(stack)[:, :count], dtype=np.float64), stack[:, :, :0]
-        solved = np.linalg.eigh(stack)
-        return np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count]
+        solved = np.linalg.eigh(at_fields(terms, fields))
+        return _exact(np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count])
     if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < size // 4:
         return reduced_basis(terms, fields, count, tolerance_mhz)
-    return _each(terms, fields, count, with_vectors)
+    return _each(terms, fields, count)
 
 
-def _each(terms: Terms, fields: Floats, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
-    solved = [
-        _lowest(at_fields(terms, fields[place : place + 1])[0], count, with_vectors) for place in range(len(fields))
-    ]
-    return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
+def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
+    solved = [_lowest(at_fields(terms, fields[place : place + 1])[0], count) for place in range(len(fields))]
+    return _exact(np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved]))
 
 
-def _lowest(matrix: Matrix, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
+def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
     from scipy.linalg import eigh
 
     chosen = (0, min(count, len(matrix)) - 1)
-    if with_vectors:
-        energies, vectors = eigh(matrix, subset_by_index=chosen, overwrite_a=True, check_finite=False)
-        return energies, vectors
-    energies = eigh(matrix, subset_by_index=chosen, eigvals_only=True, overwrite_a=True, check_finite=False)
-    return energies, matrix[:, :0]
+    energies, vectors = eigh(matrix, subset_by_index=chosen, overwrite_a=True, check_finite=False)
+    return energies, vectors
 
 
-def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix]:
+def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix, Floats]:
     """The lowest states at many fields from full solutions at a few.
 
     Where no small basis serves, or the error in it exceeds the tolerance, each field is solved in full.
@@ -150,12 +143,14 @@ def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float
         MHz, rising.
     vectors : (f, n, count) array
         Eigenvectors in columns.
+    error : (f, count) array
+        |residual|²/gap, MHz.
     """
     basis = spanning(terms, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
     if basis is None:
         return _each(terms, fields, count)
     energies, vectors, error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)
-    return (energies, vectors) if error.max() <= tolerance_mhz else _each(terms, fields, count)
+    return (energies, vectors, error) if error.max() <= tolerance_mhz else _each(terms, fields, count)
 
 
 def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
@@ -187,7 +182,7 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
         basis = _orthonormal(np.concatenate(found, axis=1))
         if basis.shape[1] > len(terms[0]) // 2:
             return None
-        error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)[2]
+        error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)[2].max(axis=1)
         error[anchors] = 0.0
         worst = int(np.argmax(error))
         if error[worst] <= 0.1 * tolerance_mhz:
@@ -203,11 +198,11 @@ def _orthonormal(vectors: Matrix) -> Matrix:
 
 
 def _in_basis(basis: Matrix, moved: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
-    """Energies, vectors and the largest error estimate (fields,) of the lowest states in a basis; moved: H_n times it."""
+    """Energies, vectors and error estimates (fields, count) of the lowest states in a basis; moved: H_n times it."""
     energies, inside = np.linalg.eigh(at_fields(tuple(basis.conj().T @ one for one in moved), fields))
     gaps = np.maximum(energies[:, min(count + BUFFER, energies.shape[1]) - 1, None] - energies[:, :count], 1e-9)
     energies, inside = energies[:, :count], inside[:, :, :count]
     vectors = basis @ inside
     acted = sum(fields[:, None, None] ** n * (one @ inside) for n, one in enumerate(moved))
     residual = acted - energies[:, None, :] * vectors
-    return energies, vectors, ((np.abs(residual) ** 2).sum(axis=1) / gaps).max(axis=1)
+    return energies, vectors, (np.abs(residual) ** 2).sum(axis=1) / gaps

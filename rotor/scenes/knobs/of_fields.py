@@ -105,14 +105,14 @@ def _energies(asked: tuple[Any, int]) -> Any:
         request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
         request.direction, request.tolerance_mhz, None, request.effects,
     )  # fmt: skip
-    parts = each_block(of_map, jmax, partial(_of_block, of_map))
+    parts = each_block(of_map, jmax, partial(_of_block, of_map, jmax))
     return np.concatenate([part.ravel() for part in parts])
 
 
-def _of_block(request: Any, block: Any) -> Any:
+def _of_block(request: Any, jmax: int, block: Any) -> Any:
     from rotor.quantum.fields.block_states import block_states
 
-    found = block_states(request, block, fields=request.fields, with_vectors=False)
+    found = block_states(request, block, request.fields, jmax)
     return found.energies[:, block.levels.j[found.rows] <= request.j_highest]
 
 

@@ -29,7 +29,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import Z, checked_direction, map_request
 from rotor.quantum.fields.block_states import BlockStates, block_states
 from rotor.quantum.fields.blocks import FieldBlock
-from rotor.quantum.fields.field_map import converged_jmax, each_block
+from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.tilted_blocks import TiltedBlock
 from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks
@@ -203,7 +203,7 @@ def field_lines(
     request = map_request(
         top, fields_kv_per_cm, j_highest, None, intensity_w_per_cm2, direction, tolerance_mhz, effects=effects
     )
-    jmax, moved = converged_jmax(request, jmax, executor)
+    jmax = smallest_jmax(request, executor) if jmax is None else jmax
     solved = _solved(request, jmax, bool(effects), executor)
     found = populations_in_field(top, solved, temperature_k, populations, effects)
     seen = seen if isinstance(solved[0].block, TiltedBlock) else seen.about(unit)
@@ -221,7 +221,7 @@ def field_lines(
         populations=populations,
         field_kv_per_cm=np.tile(request.fields, len(columns["upper"]) // len(request.fields)),
         jmax=jmax,
-        accuracy_mhz=2 * float(moved.max(initial=0.0)),
+        accuracy_mhz=2 * _largest_error(solved, j_highest),
         q=found.q,
         request=request,
         blocks=tuple(states.block for states in solved),
@@ -229,13 +229,18 @@ def field_lines(
     )
 
 
+def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
+    """Bound of what the basis leaves out of energies of states that come from levels up to a J, MHz."""
+    return max(float(one.error[:, one.block.levels.j[one.rows] <= j_highest].max(initial=0.0)) for one in solved)
+
+
 def _solved(request: MapRequest, jmax: int, spins: bool, executor: Executor | None) -> list[BlockStates]:
     """The states of all blocks; with spins M_F and -M_F apart."""
     if not spins:
-        return each_block(request, jmax, partial(block_states, request, fields=request.fields), executor)
+        return each_block(request, jmax, partial(block_states, request, fields=request.fields, jmax=jmax), executor)
     from rotor.quantum.fields.mixed_transitions import signed_states
 
-    both = each_block(request, jmax, partial(signed_states, request, fields=request.fields), executor)
+    both = each_block(request, jmax, partial(signed_states, request, fields=request.fields, jmax=jmax), executor)
     return [one for pair in both for one in pair]
 
 
