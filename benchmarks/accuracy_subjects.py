@@ -329,8 +329,8 @@ SUBJECTS: Sequence[Subject] = (
         "stark",
         "Basis of a Stark map",
         "Largest error of an energy in fields up to 200 kV/cm by J max of the basis, beside six J more.",
-        "Leave `jmax` out and give a tolerance: from some J on each J more gains one to two digits, and the basis is raised "
-        "until the energies stand still.",
+        "Leave `jmax` out and give a tolerance: from some J on each J more gains one to two digits, and the smallest basis "
+        "within the tolerance is chosen.",
         stark,
     ),
     Subject(

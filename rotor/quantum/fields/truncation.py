@@ -45,7 +45,9 @@ def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors:
     (f, s) array
         MHz, not negative; 0 where the basis is the whole block.
     """
-    rest = np.setdiff1d(np.arange(len(problem.fixed)), places, assume_unique=True)
+    outside = np.ones(len(problem.fixed), dtype=bool)
+    outside[places] = False
+    rest = np.flatnonzero(outside)
     couplings = [one[np.ix_(rest, places)] for one in problem.coefficients]
     touched = np.flatnonzero(np.any([np.any(one, axis=1) for one in couplings], axis=0))
     if not len(touched):
