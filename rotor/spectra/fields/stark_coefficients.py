@@ -114,7 +114,7 @@ def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
     terms = request.problem(block).terms(np.arange(len(block)))
     sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
     turned = tuple(sign**n * term for n, term in enumerate(terms))
-    series = field_series(turned, count_of(request, block), _SUMMED, block.even_in_field)
+    series = field_series(turned, count_of(request, block, block.free_order), _SUMMED, block.even_in_field)
     return FieldSeries(series.coefficients * np.power(sign, np.arange(1, _SUMMED + 1)), series.errors)
 
 
