@@ -57,6 +57,8 @@ def field_series(terms: Terms, count: int, orders: int, even: bool = False) -> F
     FieldSeries
         In MHz per power of the unit of the field.
 
+    Examples
+    --------
     >>> two = (np.diag([0.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
     >>> field_series(two, 2, 4).coefficients.tolist()  # 1 -+ √(1 + x²)
     [[0.0, -0.5, 0.0, 0.125], [0.0, 0.5, 0.0, -0.125]]

@@ -78,6 +78,8 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
     StarkCoefficients
         One row for each curve of the map.
 
+    Examples
+    --------
     >>> from rotor.quantum.effects.stark import stark_map
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
