@@ -2,8 +2,9 @@
 
 χ² = Σ (T_obs - T_model)²/σ² is made least by `rotor.statistics.least_squares`, in ln N, ln T, v, ln Δv, ln θ (`variables`). Standard
 errors follow from the noise of the channels, and are multiplied by √(χ²/(n - m)) where that is above 1 (the model is then not all there
-is). Frequencies and intensities of catalogues have errors of their own: a line whose frequency is off by δ shifts the model by
-δ ∂T/∂ν, which enters the noise as one more term, of the size of the catalogue's error (`catalogue_noise`).
+is). Weak priors around the start (`PRIORS`) hold parameters that the spectrum does not determine; a parameter whose error is more than
+half of its prior is said to be undetermined. Frequencies of catalogues have errors of their own: a line that is off by δ shifts the model
+by δ ∂T/∂ν, which enters the noise as one more term, of the size of the catalogue's error (`catalogue_noise`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from rotor.statistics.least_squares import Iteration, Minimum, minimise
 from rotor.statistics.regression import Regression, regression
 from rotor.table import Table, counted
 
+PRIORS = {"column_per_cm2": 5.0, "excitation_k": 1.5, "velocity_km_s": 2.0, "fwhm_km_s": 1.0, "size_arcsec": 1.5}
+"""Standard deviations of the priors: of logarithms, and of velocities in widths."""
 NEEDED = 9.0  # gain in χ² for a component, beyond 2 for every parameter of its own
 
 
@@ -32,13 +35,15 @@ class FitChoices:
     """How a spectrum is fitted.
 
     free, shared: parameters, see `variables`. fixed: parameters of single components that stay. calibration: relative error of the
-    intensity scale and of the catalogues' intensities, added to the noise as a fraction of the model. most_iterations: of the search.
+    intensity scale and of the catalogues' intensities, added to the noise as a fraction of the spectrum. priors: whether
+    `PRIORS` hold what is not determined. most_iterations: of the search.
     """
 
     free: tuple[str, ...] = DEFAULT_FREE
     shared: tuple[str, ...] = ()
     fixed: tuple[tuple[int, str], ...] = ()
     calibration: float = 0.0
+    priors: bool = True
     most_iterations: int = 60
 
 
@@ -65,7 +70,7 @@ class SourceFit(Table):
     @property
     def chi_squared(self) -> float:
         """Σ (T_obs - T_model)²/σ²."""
-        return float(self.minimum.residuals @ self.minimum.residuals)
+        return float(np.sum((self.residuals_k / self.noise) ** 2))
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -110,6 +115,10 @@ class SourceFit(Table):
                 }
             )
         return out
+
+    def parameters_of(self, k: int) -> dict[str, dict[str, Any]]:
+        """The free parameters of a component by name."""
+        return {row["parameter"]: row for row in self.parameters if k in row["components"]}
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -196,7 +205,7 @@ def fit_source(
     if len(spectrum) <= len(free):
         raise ValueError(f"{len(spectrum)} channels for {len(free)} parameters; fit fewer of them, or more channels")
     noise = total_noise(spectrum, components, sight, choices)
-    minimum = minimum_of(spectrum, components, free, sight, noise, choices.most_iterations, progress)
+    minimum = minimum_of(spectrum, components, free, sight, noise, choices, progress)
     best = free.applied(components, minimum.parameters)
     seen = model(best, spectrum.frequency_mhz, sight)
     return SourceFit(
@@ -220,20 +229,32 @@ def minimum_of(
     free: Variables,
     sight: Sight,
     noise: Floats,
-    most_iterations: int = 60,
+    choices: FitChoices,
     progress: Callable[[Iteration], None] | None = None,
 ) -> Minimum:
-    """Where the search for the least χ² ends."""
+    """Where the search for the least χ² ends; the priors are the last residuals."""
+    start, widths = free.values(components), prior_widths(components, free)
+    rows = np.diag(1 / widths)
 
     def evaluate(values: Floats) -> tuple[Floats, Floats]:
         now = free.applied(components, values)
         seen = model(now, spectrum.frequency_mhz, sight, slopes=True)
         assert seen.slopes is not None
-        return (spectrum.intensity - seen.brightness_k) / noise, free.jacobian(now, seen.slopes) / noise[:, None]
+        residuals, jacobian = (
+            (spectrum.intensity - seen.brightness_k) / noise,
+            free.jacobian(now, seen.slopes) / noise[:, None],
+        )
+        if not choices.priors:
+            return residuals, jacobian
+        return np.concatenate([residuals, (start - values) / widths]), np.concatenate([jacobian, rows])
 
-    return minimise(
-        evaluate, free.values(components), most_iterations=most_iterations, progress=progress, tolerance=1e-3
-    )
+    return minimise(evaluate, start, most_iterations=choices.most_iterations, progress=progress, tolerance=1e-3)
+
+
+def prior_widths(components: Sequence[Component], free: Variables) -> Floats:
+    """Standard deviations (m,) of the priors of what a search moves."""
+    scale = [components[one.components[0]].fwhm_km_s if one.name == "velocity_km_s" else 1.0 for one in free.items]
+    return np.array([PRIORS[one.name] for one in free.items]) * scale
 
 
 def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> None:
@@ -319,20 +340,23 @@ def _without(fit: SourceFit, k: int) -> Floats:
         return np.zeros(len(fit.spectrum))
     fixed = tuple((i - (i > k), name) for i, name in fit.choices.fixed if i != k)
     free = variables(rest, fit.choices.free, fit.choices.shared, fixed)
-    minimum = minimum_of(fit.spectrum, rest, free, fit.sight, fit.noise, fit.choices.most_iterations)
+    minimum = minimum_of(fit.spectrum, rest, free, fit.sight, fit.noise, fit.choices)
     return model(free.applied(rest, minimum.parameters), fit.spectrum.frequency_mhz, fit.sight).brightness_k
 
 
 def upper_limit(fit: SourceFit, k: int, others_k: Floats | None = None, deviations: float = 3.0) -> float:
     """Column density of a component at which χ² is `deviations`² above its least value.
 
-    At the temperature with which the fit began (that of a species without lines means nothing), at the fitted velocity and width.
+    At the temperature with which the fit began (that of a species without lines means nothing); at the fitted velocity and width, or
+    those of the start where they are not determined.
     others_k: brightness (n,) of the other components, by default as they are in the fit.
     """
     if others_k is None:
         others = [one for i, one in enumerate(fit.components) if i != k]
         others_k = model(others, fit.spectrum.frequency_mhz, fit.sight).brightness_k if others else None
     component = replace(fit.components[k], excitation_k=fit.start[k].excitation_k)
+    if not fit.parameters_of(k).get("velocity_km_s", {"determined": True})["determined"]:
+        component = replace(component, velocity_km_s=fit.start[k].velocity_km_s, fwhm_km_s=fit.start[k].fwhm_km_s)
     return limit_of(fit.spectrum, fit.noise * fit.scale, component, fit.sight, others_k, deviations)
 
 

@@ -78,7 +78,8 @@ class Dust:
 class Sight:
     """How a source is seen.
 
-    background_k: behind it. beam_arcsec: full width of the beam at half maximum, needed where a component has a size. redshift: z of the
+    background_k: behind it, as observed; at the source it is hotter by 1 + z. beam_arcsec: full width of the beam at
+    half maximum, needed where a component has a size. redshift: z of the
     source; frequencies are observed ones, ν_rest/(1 + z), and a brightness is smaller by 1 + z. dust: within the layers.
     channel_mhz: width of a channel over which the model is averaged; None takes the value at its centre.
     """
@@ -210,7 +211,7 @@ def _layer(
     derivative: Floats | None,
 ) -> tuple[Floats, Floats]:
     """Brightness and optical depth of one layer; its derivatives are entered into `derivative`."""
-    behind = planck_k(grid, sight.background_k)
+    behind = planck_k(grid, sight.background_k * (1 + sight.redshift))
     contrast = [planck_k(grid, components[k].excitation_k) - behind for k in members]
     τ = np.sum([depths[k][0] for k in members], axis=0)
     emitted = np.sum([depths[k][0] * c for k, c in zip(members, contrast, strict=True)], axis=0)

@@ -86,7 +86,10 @@ def thin_templates(
         if low <= t <= high or low == high:
             depth = component_depth(Component(species, _UNIT_COLUMN, t, velocity, width), grid)[0]
             out[place] = (
-                depth * (planck_k(grid, t) - planck_k(grid, sight.background_k)) / _UNIT_COLUMN / spectrum.noise
+                depth
+                * (planck_k(grid, t) - planck_k(grid, sight.background_k * (1 + sight.redshift)))
+                / _UNIT_COLUMN
+                / spectrum.noise
             )
     return out
 

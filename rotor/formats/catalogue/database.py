@@ -1,0 +1,248 @@
+"""A local catalogue: the lines of many species in one DuckDB file, sorted by frequency.
+
+Tables: `species` (name, formula, tag, InChIKey, source, licence, citation, date, note), `partition` (Q at temperatures), `states`
+(quantum numbers as text, each once), `lines` (frequency, error, strength, lower energy, degeneracy, and numbers of the other tables). The
+lines are stored in order of frequency, so that a range of them is read without looking at the others: DuckDB keeps the least and the
+largest value of every block of rows. `SpeciesLines` come out as they went in.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.catalogue.names import hill_formula, same_species
+from rotor.observed.partition import PartitionTable
+from rotor.observed.species import SpeciesLines, species_lines
+from rotor.table import Table
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
+
+VERSION = 1
+SUFFIX = ".rotorcat"
+MEMORY_MB = 400
+SCHEMA = """
+CREATE TABLE about (key VARCHAR PRIMARY KEY, value VARCHAR);
+CREATE TABLE species (number INTEGER PRIMARY KEY, name VARCHAR, formula VARCHAR, tag INTEGER, inchikey VARCHAR, source VARCHAR,
+    database VARCHAR, licence VARCHAR, citation VARCHAR, date VARCHAR, note VARCHAR, lines BIGINT);
+CREATE TABLE partition (species INTEGER, temperature_k DOUBLE, q DOUBLE);
+CREATE TABLE states (number BIGINT, text VARCHAR);
+CREATE TABLE lines (frequency_mhz DOUBLE, error_mhz FLOAT, strength_nm2_mhz DOUBLE, energy_lower_k DOUBLE, g_upper FLOAT, species INTEGER,
+    upper BIGINT, lower BIGINT);
+"""
+_FACTS = ("name", "formula", "tag", "inchikey", "source", "database", "licence", "citation", "date", "note", "lines")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CatalogueSpecies(Table):
+    """The species of a catalogue, a row each: number, the facts of `species`, and how many lines."""
+
+    number: NDArray[np.int64]
+    facts: Mapping[str, NDArray[Any]]
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """number, name, formula, tag, inchikey, source, database, licence, citation, date, note, lines."""
+        return {"number": self.number, **self.facts}
+
+
+class LineCatalogue:
+    """A catalogue opened for reading; a context that closes it.
+
+    >>> # with LineCatalogue("lines.rotorcat") as catalogue: catalogue.species_between(100e3, 101e3)
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        if not self.path.is_file():
+            raise FileNotFoundError(f"{path}: no such catalogue; make it with 'rotor catalogue add'")
+        self._engine = connect(self.path, read_only=True)
+        self._texts: dict[int, str] = {}
+
+    def __enter__(self) -> LineCatalogue:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._engine.close()
+
+    def __len__(self) -> int:
+        """Number of lines."""
+        return int(scalar(self._engine, "SELECT count(*) FROM lines"))
+
+    def species(self) -> CatalogueSpecies:
+        """The table of species, in order of their names."""
+        found = self._engine.execute(
+            f"SELECT number, {', '.join(_FACTS)} FROM species ORDER BY name, number"
+        ).fetchall()
+        columns = list(zip(*found, strict=True)) if found else [()] * (1 + len(_FACTS))
+        facts = {
+            name: np.array([("" if value is None else value) for value in column])
+            for name, column in zip(_FACTS, columns[1:], strict=True)
+        }
+        return CatalogueSpecies(np.array(columns[0], dtype=np.int64), facts)
+
+    def numbers(self, word: str) -> list[int]:
+        """Numbers of the species that a word means: name, tag, formula or InChIKey; ValueError for none."""
+        rows = self._engine.execute(
+            "SELECT number, name, formula, tag, inchikey FROM species ORDER BY number"
+        ).fetchall()
+        found = [
+            row[0] for row in rows if row[1] == word or str(row[3]) == word.lstrip("0") or (row[4] and row[4] == word)
+        ]
+        found = found or [row[0] for row in rows if same_species(row[1], word)]
+        if not found and "," not in word:  # a state is behind a comma, and a formula means none
+            found = [row[0] for row in rows if row[2] and row[2] == hill_formula(word)]
+        if not found:
+            import difflib
+
+            near = difflib.get_close_matches(word, [row[1] for row in rows], n=3, cutoff=0.5)
+            hint = f"; similar names: {', '.join(near)}" if near else ""
+            raise ValueError(f"{self.path}: no species {word!r} by name, tag, formula or InChIKey{hint}")
+        return [int(one) for one in found]
+
+    def lines(self, first_mhz: float, last_mhz: float, words: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
+        """Lines of a range as columns, rising in frequency; of the species that words mean, or of all."""
+        chosen = sorted({number for word in words for number in self.numbers(word)})
+        where = f" AND species IN ({', '.join(map(str, chosen))})" if words else ""
+        columns = self._engine.execute(
+            f"SELECT * FROM lines WHERE frequency_mhz >= ? AND frequency_mhz <= ?{where} ORDER BY frequency_mhz, species",
+            [first_mhz, last_mhz],
+        ).fetchnumpy()
+        return {name: np.asarray(values) for name, values in columns.items()}
+
+    def species_between(self, first_mhz: float, last_mhz: float, words: Sequence[str] = ()) -> list[SpeciesLines]:
+        """Species with lines in a range of frequencies, in order of their numbers.
+
+        Parameters
+        ----------
+        first_mhz, last_mhz : float
+        words : sequence of str, optional
+            Names, tags, formulas or InChIKeys; all species by default. A formula may mean several.
+
+        Returns
+        -------
+        list of SpeciesLines
+            With the lines in the range alone.
+
+        Raises
+        ------
+        ValueError
+            For a word that means no species.
+        """
+        rows = self.lines(first_mhz, last_mhz, words)
+        self._read_texts(np.unique(np.concatenate([rows["upper"], rows["lower"]])))
+        order = np.argsort(rows["species"], kind="stable")
+        numbers, starts = np.unique(rows["species"][order], return_index=True)
+        pieces = np.split(order, starts[1:]) if len(numbers) else []
+        facts, tables = self._facts(numbers.tolist()), self._partitions(numbers.tolist())
+        return [
+            self._species(facts[number], tables[number], {name: values[piece] for name, values in rows.items()})
+            for number, piece in zip(numbers.tolist(), pieces, strict=True)
+        ]
+
+    def _partitions(self, numbers: Sequence[int]) -> dict[int, PartitionTable]:
+        """Q(T) of species."""
+        found = self._engine.execute(
+            f"SELECT * FROM partition WHERE species IN ({_listed(numbers)}) ORDER BY 1, 2"
+        ).fetchnumpy()
+        number, kelvin, q = (np.asarray(found[name]) for name in ("species", "temperature_k", "q"))
+        return {
+            one: PartitionTable(kelvin[number == one], q[number == one], f"{self.path}, species {one}")
+            for one in numbers
+        }
+
+    def _facts(self, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
+        """Rows of the table of species."""
+        found = self._engine.execute(
+            f"SELECT number, {', '.join(_FACTS)} FROM species WHERE number IN ({_listed(numbers)})"
+        ).fetchall()
+        return {row[0]: dict(zip(_FACTS, row[1:], strict=True)) for row in found}
+
+    def _species(
+        self, facts: Mapping[str, Any], partition: PartitionTable, rows: Mapping[str, NDArray[Any]]
+    ) -> SpeciesLines:
+        known = {
+            key: value
+            for key, value in facts.items()
+            if value not in (None, "") and key not in ("name", "source", "lines")
+        }
+        return species_lines(
+            facts["name"],
+            rows["frequency_mhz"],
+            rows["strength_nm2_mhz"],
+            rows["energy_lower_k"],
+            rows["g_upper"],
+            partition,
+            error_mhz=rows["error_mhz"],
+            upper=np.array([self._texts[one] for one in rows["upper"].tolist()], dtype=np.str_),
+            lower=np.array([self._texts[one] for one in rows["lower"].tolist()], dtype=np.str_),
+            source=facts["source"] or str(self.path),
+            identity=known,
+        )
+
+    def _read_texts(self, numbers: NDArray[Any]) -> None:
+        """Texts of states that were not read before."""
+        new = np.array([one for one in numbers.tolist() if one not in self._texts], dtype=np.int64)
+        if len(new):
+            self._engine.register("wanted", {"number": new})
+            rows = self._engine.execute(
+                "SELECT states.number, text FROM states JOIN wanted ON states.number = wanted.number"
+            ).fetchall()
+            self._engine.unregister("wanted")
+            self._texts |= dict(rows)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers)) or "NULL"
+
+
+def scalar(engine: DuckDBPyConnection, command: str) -> Any:
+    """The first value of the first row of an answer, None without one; the answer is read to its end."""
+    rows = engine.execute(command).fetchall()
+    return rows[0][0] if rows else None
+
+
+def connect(path: Path, *, read_only: bool = False) -> DuckDBPyConnection:
+    """An engine on a file; ValueError for one that is no catalogue of this version."""
+    import duckdb
+
+    try:
+        engine = duckdb.connect(str(path), read_only=read_only, config={"memory_limit": f"{MEMORY_MB}MB"})
+    except duckdb.IOException as error:
+        raise ValueError(f"{path}: not a catalogue: {str(error).splitlines()[0]}") from None
+    try:
+        version = scalar(engine, "SELECT value FROM about WHERE key = 'version'")
+    except duckdb.CatalogException:
+        engine.close()
+        raise ValueError(f"{path}: a DuckDB file, but not a catalogue of lines") from None
+    if version is None or int(version) != VERSION:
+        engine.close()
+        raise ValueError(
+            f"{path}: a catalogue of version {version}; this release reads version {VERSION}: build it anew"
+        )
+    return engine
+
+
+@contextmanager
+def new_catalogue(path: Path) -> Iterator[DuckDBPyConnection]:
+    """An engine on a new, empty catalogue."""
+    import duckdb
+
+    with duckdb.connect(
+        str(path), config={"memory_limit": f"{MEMORY_MB}MB", "temp_directory": str(path.parent / "sort")}
+    ) as engine:
+        engine.execute(SCHEMA)
+        engine.execute("INSERT INTO about VALUES ('version', ?)", [str(VERSION)])
+        yield engine
