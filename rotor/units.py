@@ -79,13 +79,22 @@ _KINDS: dict[str, dict[str, float]] = {
         "turns/s": 2 * math.pi,
         "rad/ps": 1e12,
     },
-    "number": {"": 1.0},
+    "number": {"": 1.0, "%": 0.01},
+    "density": {"g/cm3": 1.0, "kg/m3": 1e-3},
+    "speed": {"km/s": 1.0, "m/s": 1e-3, "cm/s": 1e-5},
+    "column density": {"1/cm2": 1.0, "1/m2": 1e-4},
+    "rate": {"1/ps": 1.0, "1/fs": 1e3, "1/ns": 1e-3, "1/s": 1e-12},
+    "angle": {"deg": 1.0, "rad": 180 / math.pi},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
 _ALIASES = {
     "cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "μm": "um", "Debye": "debye", "Angstrom": "angstrom",
     "Å^3": "Å3", "Å³": "Å3", "angstrom^3": "angstrom3",
     "kg m2": "kg*m2", "kg m^2": "kg*m2", "kg m²": "kg*m2", "g cm2": "g*cm2", "g cm^2": "g*cm2", "g cm²": "g*cm2",
+    "g/cm^3": "g/cm3", "g/cm³": "g/cm3", "kg/m^3": "kg/m3", "kg/m³": "kg/m3",
+    "cm-2": "1/cm2", "cm^-2": "1/cm2", "cm⁻²": "1/cm2", "/cm2": "1/cm2", "/cm^2": "1/cm2", "/cm²": "1/cm2", "1/cm²": "1/cm2",
+    "m-2": "1/m2", "m^-2": "1/m2", "m⁻²": "1/m2", "/m2": "1/m2", "/m^2": "1/m2", "/m²": "1/m2", "1/m²": "1/m2",
+    "/ps": "1/ps", "ps-1": "1/ps", "/fs": "1/fs", "/ns": "1/ns", "/s": "1/s", "°": "deg", "degrees": "deg", "degree": "deg",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
 LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
@@ -100,7 +109,7 @@ def _kind_of(unit: str) -> str:
 def _factor(unit: str, expected: str, text: str) -> float:
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_kind_of(expected)]
-    if not expected:
+    if not expected and unit not in table:
         raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
     if unit not in table:
         known = any(unit in other for other in _KINDS.values())
@@ -168,8 +177,8 @@ def parse_range(text: str, unit: str) -> tuple[float, float]:
     return first, last
 
 
-def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
-    """Points in `unit` from `start:stop:count` or a comma list whose last item may carry the unit.
+def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.float64]:
+    """Points in `unit` from `start:stop:count` or a comma list whose last item may carry the unit; points: the count where none is given.
 
     >>> parse_grid("0:200kV/cm:3", "kV/cm")
     array([  0., 100., 200.])
@@ -184,6 +193,7 @@ def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
         return np.array([n * _factor_or_one(u or shared, unit, text) for n, u in numbers])
 
     first, last, count = _bounds(text, unit)
+    count = str(points) if count is None and points is not None else count
     if count is None or not count.strip().isdecimal() or float(count) < 2:
         raise ValueError(f"{text!r}: a grid is start:stop:count with a whole count of 2 or more, or a comma list")
     if float(count) > MOST_POINTS:

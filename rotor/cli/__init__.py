@@ -14,7 +14,8 @@ import traceback
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import cast
+from importlib.util import find_spec
+from typing import Any, cast
 
 import typer
 
@@ -95,9 +96,22 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pass
 
     for verb in verbs:
-        module = import_module(f"rotor.cli.{FILES.get(verb, verb)}")
-        app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=folded(module.EXAMPLES))(module.command)
+        command, class_, examples = _command(verb)
+        app.command(verb, cls=class_, short_help=VERBS[verb], epilog=folded(examples))(command)
     return app
+
+
+def _command(name: str) -> tuple[Any, Any, str]:
+    """The function behind a verb, the class of its command, and its examples."""
+    if find_spec(f"rotor.verbs.{name}") is None:
+        module = import_module(f"rotor.cli.{FILES.get(name, name)}")
+        return module.command, PlainCommand, module.EXAMPLES
+    from rotor.cli.shared.command import PanelCommand, command_of
+    from rotor.cli.shared.runner import run_verb
+    from rotor.verbs.verb import verb_of
+
+    verb = verb_of(name)
+    return command_of(verb, run_verb), PanelCommand, verb.examples
 
 
 def _print_version(asked: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.raman import with_polarizability
+from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option, parsed, quantity
 from rotor.cli.shared.options import file_option, grouped, option
@@ -24,9 +24,9 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
-from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.reports.sources import with_sources
+from rotor.reports.top_facts import model_facts
 from rotor.table import counted
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def _with_anisotropy(top: Top, text: str) -> Top:
 
 def _content(answer: AlignAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     return {**begin(command, given.text), **answer.facts()}
 
@@ -230,7 +230,7 @@ def _ensemble_text(trace: AlignmentTrace) -> str:
 
 
 def _show(answer: AlignAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.reports.top_facts import heading
 
     trace = answer.trace
     print(heading(trace.top))
@@ -246,7 +246,7 @@ def _show(answer: AlignAnswer, content: dict[str, Any]) -> None:
 
 
 def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     top = trace.top
     acts_on = {pulse.acts_on for pulse in trace.pulses}

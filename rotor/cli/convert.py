@@ -47,7 +47,7 @@ def command(context: typer.Context, options: Options) -> None:
     _refuse_overwriting(source, target)
     top = top_with_errors(source)
 
-    from rotor.cli.shared.report import describe
+    from rotor.reports.top_facts import describe
 
     content = {**describe(top, source, context.obj), "files": files.names}
     done = f"{source} → {target}: {top.constants.text()}{_further(top)}"

@@ -12,7 +12,6 @@ from rotor.checks import require_whole
 from rotor.cli.shared import inputs, plot_options
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_of_each, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
-from rotor.cli.shared.line_tables import the_first
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     Files,
@@ -28,6 +27,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
+from rotor.reports.line_tables import the_first
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
@@ -193,7 +193,7 @@ def _range(options: Options) -> tuple[float, float]:
 
 def _content(answer: EmissionAnswer, options: Options, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     return {**begin(command, " ".join(_sources(options))), **answer.facts()}
 
@@ -219,8 +219,8 @@ def _writers(answer: EmissionAnswer, content: dict[str, Any], drawn: dict[str, A
 
 
 def _show(answer: EmissionAnswer, shown: int) -> None:
-    from rotor.cli.shared.sources import short_source
     from rotor.quantum.quanta import headings
+    from rotor.reports.sources import short_source
 
     request, source = answer.request, answer.request.source
     print(
@@ -263,8 +263,8 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
     """What is left out: of the source, and the largest of each molecule."""
-    from rotor.cli.shared.report import with_option
     from rotor.quantum.estimates.limits import model_limits, populated_j
+    from rotor.reports.top_facts import with_option
 
     request = answer.request
     facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]

@@ -18,9 +18,9 @@ from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
 from rotor.cli.shared.plot_options import ViewOptions, view_of
-from rotor.cli.shared.report import left_out_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.reports.sources import with_sources
+from rotor.reports.top_facts import left_out_facts
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
@@ -142,7 +142,7 @@ def progress(total: int, what: str) -> Iterator[Callable[[int], object] | None]:
 
 def _content(answer: GasAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     curves = answer.correlations
     rows = None if curves is None else rows_of(curves)
@@ -174,7 +174,7 @@ def _writers(answer: GasAnswer, content: dict[str, Any], view: View) -> dict[str
 
 
 def _show(answer: GasAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.reports.top_facts import heading
 
     curves = answer.correlations
     print(f"{heading(answer.request.top)}, a classical gas")

@@ -14,7 +14,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
-from rotor.cli.shared.sources import source_facts
+from rotor.reports.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -51,9 +51,9 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     files = Files.of(options)
     top = inputs.read_top(given)
 
-    from rotor.cli.shared.report import describe
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.estimates.limits import limit_facts, populated_j
+    from rotor.reports.top_facts import describe
     from rotor.thermodynamics.partition_table import partition_table
 
     content = describe(top, given.text, context.obj)
@@ -92,7 +92,7 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
 
 
 def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     print(report.heading(top))
     show_facts(_facts(top, content))
@@ -112,7 +112,7 @@ def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     facts: list[tuple[str, str]] = []
     if top.symmetry is not None:

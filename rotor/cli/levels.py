@@ -12,7 +12,6 @@ from rotor.checks import require_one_of, require_whole
 from rotor.cli.shared import inputs
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
-from rotor.cli.shared.line_tables import the_first
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -29,7 +28,8 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import source_facts
+from rotor.reports.line_tables import the_first
+from rotor.reports.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -103,7 +103,7 @@ def command(
     if "--plot" in files.paths and not len(answer.table):
         raise ComputationError("--plot: there is no level in this range")
 
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     content = {**begin(context.obj, given.text), **answer.facts(), "files": files.names}
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
@@ -154,7 +154,7 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str, view: Vie
 
 
 def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options, whole_sources: bool) -> None:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     print(report.heading(answer.request.top))
     show_facts(_facts(answer, content))
@@ -168,7 +168,7 @@ def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options, whole
 
 
 def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     top, request = answer.request.top, answer.request
     weights = report.weights_text(content["spin_weights"])

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,9 +139,40 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
         raise ComputationError(str(error)) from error
     for remark in _notes(result):
         note(remark)
+    if find_spec(f"rotor.verbs.{scene.kind}") is not None:
+        _deliver(result, options, files, command)
+        return
     content = _content(result, options, command)
     text = lambda: json_with_rows(result.table, "rows", content)  # noqa: E731
     deliver(files, {}, text, lambda: _show(result))
+
+
+def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
+    """What the verb of the scene prints, and the files and seconds of the run."""
+    from rotor.cli.shared.runner import report_of
+    from rotor.plots.view import WHOLE
+    from rotor.scenes.structures import given_of
+    from rotor.verbs.verb import verb_of
+
+    scene, verb = result.scene, verb_of(result.scene.kind)
+    head = {"command": command, "input": options.scene, "scene": options.scene, "kind_of_scene": scene.kind}
+    report = report_of(verb, result.answer, head, given_of(scene, verb), WHOLE)
+    content = {**report.content, **_of_run(result)}
+
+    def show() -> None:
+        """The report, after the title of the scene."""
+        if scene.title:
+            print(scene.title)
+        verb.show(result.answer, report)
+        files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
+        show_facts([("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)])
+
+    deliver(files, {}, lambda: json_with_rows(result.table, verb.rows, content), show)
+
+
+def _of_run(result: SceneResult) -> dict[str, Any]:
+    accuracy = None if result.reached is None else asdict(result.reached)
+    return {"accuracy": accuracy, "seconds": result.seconds, "files": [str(path) for path in result.files]}
 
 
 def _notes(result: SceneResult) -> list[str]:

@@ -17,7 +17,6 @@ from rotor.cli.shared import spcat_request as spcat
 from rotor.cli.shared.gas_layer import Layer, Vibration
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
-from rotor.cli.shared.line_tables import lines_table, pattern_records, patterns_table
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -33,7 +32,8 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import source_facts
+from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
+from rotor.reports.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -295,7 +295,7 @@ def _program_levels(prediction: Prediction, content: dict[str, Any], levels: Lev
 
 def _content(answer: SpectrumAnswer, given: Input, command: str, shown: int) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
@@ -330,8 +330,8 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
 
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
-    from rotor.cli.shared import report
     from rotor.quantum.quanta import headings, of_rotation
+    from rotor.reports import top_facts as report
 
     lines = answer.lines
     print(
@@ -355,7 +355,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     top = lines.top
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.checks import require_whole
-from rotor.cli.raman import with_polarizability
+from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.field_maps import (
     accuracy_fact,
@@ -31,9 +31,9 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
-from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.reports.sources import with_sources
+from rotor.reports.top_facts import model_facts
 from rotor.table import counted
 
 if TYPE_CHECKING:
@@ -312,7 +312,7 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any], view: View) ->
 
 
 def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.reports.top_facts import heading
 
     print(heading(top))
     show_facts(_facts(top, content))
@@ -352,7 +352,7 @@ def _along(direction: list[float]) -> str:
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     first, last, count = content["field_kv_per_cm"]
     facts = [

@@ -29,7 +29,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.process import one_thread_of_blas
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.reports.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -86,7 +86,7 @@ def command(
 ) -> None:
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
     one_thread_of_blas()
-    from rotor.cli.shared.report import model_facts
+    from rotor.reports.top_facts import model_facts
     from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)
@@ -128,7 +128,7 @@ def _settings(options: Options, vibration: Vibration) -> dict[str, Any]:
 
 def _content(answer: ThermoAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     return {**begin(command, given.text), **answer.facts()}
 
@@ -163,7 +163,7 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any], view: View) -> dict[
 
 
 def _show(functions: ThermoFunctions, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.reports.top_facts import heading
 
     print(heading(functions.top))
     show_facts(_facts(functions, content))
@@ -176,7 +176,7 @@ def _show(functions: ThermoFunctions, content: dict[str, Any]) -> None:
 
 
 def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     top = functions.top
     weights = report.weights_text(content["spin_weights"])

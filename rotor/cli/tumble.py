@@ -15,8 +15,8 @@ from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
 from rotor.cli.shared.tumble_inputs import Options, Start, read_start
+from rotor.reports.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.classical.motion import MotionTable
@@ -98,7 +98,7 @@ def _check_film(path: str | None) -> None:
 
 def _content(start: Start, answer: TumbleAnswer, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin, describe
+    from rotor.reports.top_facts import begin, describe
 
     if start.top is not None:
         about = describe(start.top, start.text, command)
@@ -151,7 +151,7 @@ def _writers(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> dic
 
 
 def _heading(start: Start) -> str:
-    from rotor.cli.shared.report import KINDS, heading
+    from rotor.reports.top_facts import KINDS, heading
 
     if start.top is not None:
         return heading(start.top)
@@ -162,8 +162,8 @@ def _heading(start: Start) -> str:
 
 
 def _picture_title(start: Start) -> str:
-    from rotor.cli.shared.report import KINDS
     from rotor.plots.picture import name_of_top
+    from rotor.reports.top_facts import KINDS
 
     return _heading(start) if start.top is None else f"{name_of_top(start.top)}: {KINDS[start.top.kind]}"
 

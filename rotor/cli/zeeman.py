@@ -29,9 +29,9 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
-from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.reports.sources import with_sources
+from rotor.reports.top_facts import model_facts
 from rotor.table import counted
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def _writers(answer: ZeemanAnswer, content: dict[str, Any], view: View) -> dict[
 
 
 def _show(answer: ZeemanAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.reports.top_facts import heading
 
     print(heading(answer.request.top))
     show_facts(_facts(answer, content))
@@ -227,7 +227,7 @@ def _table(states: FieldMap) -> Table:
 
 
 def _facts(answer: ZeemanAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared import report
+    from rotor.reports import top_facts as report
 
     first, last, count = content["field_tesla"]
     facts = [

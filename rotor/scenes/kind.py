@@ -8,14 +8,18 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.plots.view import WHOLE
+from rotor.requests.fill import renaming
 from rotor.scenes.molecule import named
 from rotor.scenes.scene import Scene
 from rotor.scenes.sections import Grid, MoleculeSection, QuantumEffects, VibrationSection
+from rotor.verbs.verb import Place, Report, Verb, Work, files_of, verb_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,8 +62,50 @@ class Kind:
 
 def kind_of(scene: Scene) -> Kind:
     """What computes a scene; only the module of its kind is imported."""
-    found: Kind = import_module(f"rotor.scenes.kinds.{scene.kind}").KIND
-    return found
+    return _kind(scene.kind)
+
+
+@cache
+def _kind(name: str) -> Kind:
+    from importlib.util import find_spec
+
+    if find_spec(f"rotor.scenes.kinds.{name}") is not None:
+        found: Kind = import_module(f"rotor.scenes.kinds.{name}").KIND
+        return found
+    return kind_of_verb(verb_of(name))
+
+
+def kind_of_verb(verb: Verb) -> Kind:
+    """How a kind of scene is computed whose verb declares it."""
+    from rotor.scenes.structures import given_of
+
+    def request(scene: Any, folder: Where) -> Any:
+        asked = verb.read(given_of(scene, verb), Place(folder))[0]
+        return asked if verb.adapt is None else verb.adapt(asked, outputs_of(scene, verb))
+
+    def answer(asked: Any, scene: Any, out: Where, executor: Executor | None) -> Any:
+        with renaming({one.name: one.key for one in verb.fields.values() if one.key}):
+            return verb.answer(asked, Work(executor, out, verb.read_shown(given_of(scene, verb)), outputs_of(scene, verb, out)))
+
+    def saved(asked: Any, molecule: Any) -> Scene:
+        raise NotImplementedError
+
+    def writers(found: Any, scene: Any) -> Mapping[str, Writer]:
+        report = Report({**found.facts(), **verb.content(found, verb.read_shown(given_of(scene, verb)))}, verb.read_shown(given_of(scene, verb)))
+        view = {} if verb.spectral else WHOLE
+        return {name: write for name, write in files_of(verb, found, replace(report, view=view)).items() if verb.output(name).write}
+
+    names = {one.name: one.key for one in verb.fields.values() if one.key}
+    grows = frozenset(one.name for one in verb.outputs if one.grows)
+    return Kind(request, answer, verb.table, saved, writers, grows, names)
+
+
+def outputs_of(scene: Any, verb: Verb, out: Where = ".") -> dict[str, tuple[Path, ...]]:
+    """The files that a scene names, counted from a folder."""
+    named = {one.name: getattr(scene.outputs, one.name) for one in verb.outputs if one.scene}
+    return {
+        name: tuple(Path(out) / one for one in (value if isinstance(value, list) else [value])) for name, value in named.items() if value
+    }
 
 
 def quantity(name: str, value: float | str, unit: str) -> float:

@@ -6,7 +6,7 @@ Nothing of the physics is imported here: a scene is data, checked for names and 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,8 +39,6 @@ from rotor.scenes.sections import (
     MoleculeSection,
     PulseSection,
     QuantumEffects,
-    RamanConditions,
-    RamanObservables,
     SpectrumConditions,
     SpectrumObservables,
     SpectrumOutputs,
@@ -60,6 +58,7 @@ from rotor.scenes.sections import (
     said,
 )
 from rotor.scenes.verbs import VERBS
+from rotor.verbs.verb import SCENE_VERBS
 
 if TYPE_CHECKING:
     from rotor.scenes.choice import Reached
@@ -136,19 +135,6 @@ class LevelsScene(Scene, frozen=True, tag="levels"):
     accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     observables: LevelsObservables = LevelsObservables()
     outputs: LevelsOutputs = LevelsOutputs()
-
-
-class RamanScene(Scene, frozen=True, tag="raman"):
-    """Rotational Raman lines of a molecule."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    effects: QuantumEffects = QuantumEffects()
-    accuracy: Annotated[str | float | None, said("of the shifts", "1 kHz")] = None
-    conditions: RamanConditions = RamanConditions()
-    observables: RamanObservables = RamanObservables()
-    vibration: VibrationSection = VibrationSection()
-    numerics: BasisNumerics = BasisNumerics()
-    outputs: TableOutputs = TableOutputs()
 
 
 class ThermoScene(Scene, frozen=True, tag="thermo"):
@@ -260,24 +246,9 @@ class EmissionScene(Scene, frozen=True, tag="emission"):
     outputs: EmissionOutputs = EmissionOutputs()
 
 
-AnyScene = (
-    SpectrumScene
-    | LevelsScene
-    | RamanScene
-    | ThermoScene
-    | TumbleScene
-    | GasScene
-    | FluidScene
-    | StarkScene
-    | ZeemanScene
-    | AlignScene
-    | FitScene
-    | EmissionScene
-)
-KINDS: Mapping[str, type[Scene]] = {
+_WRITTEN: Mapping[str, type[Scene]] = {
     "spectrum": SpectrumScene,
     "levels": LevelsScene,
-    "raman": RamanScene,
     "thermo": ThermoScene,
     "tumble": TumbleScene,
     "gas": GasScene,
@@ -288,6 +259,37 @@ KINDS: Mapping[str, type[Scene]] = {
     "fit": FitScene,
     "emission": EmissionScene,
 }
+
+
+class Kinds(Mapping[str, type[Scene]]):
+    """The structures of all kinds of scene, each made from the declaration of its verb when it is first used."""
+
+    def __getitem__(self, kind: str) -> type[Scene]:
+        if kind in _WRITTEN:
+            return _WRITTEN[kind]
+        if kind not in SCENE_VERBS:
+            raise KeyError(kind)
+        from rotor.scenes.structures import scene_class
+
+        found: type[Scene] = scene_class(kind)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(SCENE_VERBS)
+
+    def __len__(self) -> int:
+        return len(SCENE_VERBS)
+
+
+KINDS = Kinds()
+
+
+def __getattr__(name: str) -> Any:
+    """The structure of a kind: `RamanScene`."""
+    kind = name.removesuffix("Scene").lower()
+    if name.endswith("Scene") and kind in SCENE_VERBS and name == f"{kind.capitalize()}Scene":
+        return KINDS[kind]
+    raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
 
 
 def molecule_of(scene: Scene) -> MoleculeSection | None:

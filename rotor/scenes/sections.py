@@ -9,19 +9,12 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import msgspec
-from msgspec import Meta, Struct, field
+from msgspec import field
+
+from rotor.verbs.tables import Section, said
 
 Quantity = float | str
 Grid = list[float] | str
-
-
-def said(text: str, example: Any = None) -> Meta:
-    """The description of a field, and an example where its default is nothing."""
-    return Meta(description=text, examples=None if example is None else [example])
-
-
-class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A table of a scene file."""
 
 
 class MoleculeSection(Section, frozen=True):
@@ -147,20 +140,6 @@ class TableOutputs(Section, frozen=True):
     parquet: Annotated[str | None, said("the table", "out.parquet")] = None
     json: Annotated[str | None, said("the table", "out.json")] = None
     plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "out.png")] = None
-
-
-class RamanConditions(Section, frozen=True):
-    """The gas and the laser."""
-
-    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
-    laser: Annotated[Quantity, said("wavelength in vacuum (nm)")] = "532 nm"
-
-
-class RamanObservables(Section, frozen=True):
-    """Which lines."""
-
-    min_relative: Annotated[float | str, said('least cross section, of the strongest line, or "none"')] = 1e-6
-    q: Annotated[float | None, said("partition function instead of the summed one", 100.0)] = None
 
 
 class ThermoConditions(Section, frozen=True):
@@ -447,3 +426,15 @@ class EmissionOutputs(Section, frozen=True):
     json: Annotated[str | None, said("the lines", "lines.json")] = None
     profile_csv: Annotated[str | None, said("T_B and optical depth on a grid", "profile.csv")] = None
     plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "emission.png")] = None
+
+
+def __getattr__(name: str) -> Any:
+    """The structure of a table of a kind: `RamanConditions` is that of [conditions] of raman."""
+    from rotor.scenes.structures import tables_of
+    from rotor.verbs.verb import SCENE_VERBS, verb_of
+
+    kind = next((one for one in SCENE_VERBS if name.startswith(one.capitalize())), "")
+    tables = tables_of(verb_of(kind)) if kind else {}
+    if (table := name.removeprefix(kind.capitalize()).lower()) not in tables:
+        raise AttributeError(f"module 'rotor.scenes.sections' has no attribute {name!r}")
+    return tables[table]

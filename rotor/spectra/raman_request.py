@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Ints
-from rotor.checks import require_between, require_positive, require_top, require_whole
+from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Quantity, Whole
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
@@ -25,6 +27,7 @@ from rotor.spectra.raman import (
 from rotor.table import TextOf
 from rotor.thermodynamics import VibrationalStates
 from rotor.thermodynamics.partition_table import partition_facts
+from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -43,23 +46,24 @@ class RamanRequest:
     """
 
     top: Top
-    temperature_k: float = 300.0
-    laser_nm: float = DEFAULT_LASER_NM
-    jmax: int | None = None
-    min_relative: float | None = DEFAULT_MIN_RELATIVE
-    q: float | None = None
-    vibrations: VibrationalStates | None = None
-    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    temperature_k: float = declared(300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True)
+    laser_nm: float = declared(
+        DEFAULT_LASER_NM, Quantity("nm", above=0, metavar="W"), "Wavelength of the laser in vacuum (nm)", "conditions.laser", common=True
+    )
+    jmax: int | None = declared(None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40)
+    min_relative: float | None = declared(
+        DEFAULT_MIN_RELATIVE, Quantity(above=0, below=1), "Leave out lines below X of the strongest; or 'none'",
+        "observables.min_relative", none="none",
+    )  # fmt: skip
+    q: float | None = declared(
+        None, Quantity(above=0, metavar="Q"), "Partition function to use instead of the summed one", "observables.q", example=100.0
+    )
+    vibrations: VibrationalStates | None = vibrations_field()
+    effects: tuple[QuantumEffect, ...] = effects_field()
 
     def __post_init__(self) -> None:
         require_top(self.top)
-        require_positive("temperature_k", self.temperature_k)
-        require_positive("laser_nm", self.laser_nm)
-        require_whole("jmax", self.jmax, 0)
-        if self.q is not None:
-            require_positive("q", self.q)
-        if self.min_relative is not None:
-            require_between("min_relative", self.min_relative, 0, 1)
+        check_fields(self)
         if self.top.polarizability_abc_angstrom3 is None and self.top.kind != "spherical":
             raise ValueError(
                 f"the polarizability of {self.top.name or 'this top'} is not known; give one, in principal axes"

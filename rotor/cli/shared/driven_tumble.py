@@ -135,7 +135,7 @@ def _quaternion(text: str) -> tuple[float, float, float, float]:
 
 
 def _content(body: Body, answer: DrivenAnswer, driven: Driven, command: str) -> dict[str, Any]:
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     units = body.units
     named = {"time": units.time, "angular_momentum": units.angular_momentum, "energy": units.energy}

@@ -31,7 +31,7 @@ def refuse_picture_of_one_field(files: Files, fields: Sequence[float]) -> None:
 
 def content_of(answer: StarkAnswer | ZeemanAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
+    from rotor.reports.top_facts import begin
 
     return {**begin(command, given.text), **answer.facts()}
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
-import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.cli.shared.options import files_asked
+from rotor.reports.screen import Table as Table
+from rotor.reports.screen import json_text as json_text
+from rotor.reports.screen import json_with_rows as json_with_rows
+from rotor.reports.screen import plain as plain
+from rotor.reports.screen import rows_of as rows_of
+from rotor.reports.screen import show_facts as show_facts
+from rotor.reports.screen import show_table as show_table
+from rotor.reports.screen import table_text as table_text
 from rotor.temporary import locked_file
-
-if TYPE_CHECKING:
-    from rotor.table import Table as Columns
 
 Writer = Callable[[Path], None]
 _HELD = ExitStack()  # locks of the files that the command will write
@@ -63,107 +65,6 @@ def sum_progress() -> Callable[[int, int], None] | None:
 def note(text: str) -> None:
     """A line on standard error that the user must not miss."""
     print("note:", text, file=sys.stderr)
-
-
-@dataclass(frozen=True)
-class Table:
-    """A heading, column names, and rows of text; numbers are aligned to the right, columns named in `left` to the left."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left: frozenset[str] = frozenset()
-
-
-def show_table(table: Table) -> None:
-    """Print a table: drawn by rich on a terminal, as aligned text into a pipe or file."""
-    if sys.stdout.isatty():
-        _draw(table)
-    else:
-        print(table_text(table))
-
-
-def table_text(table: Table) -> str:
-    """The table as aligned text, two spaces between columns."""
-    widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
-    rows = []
-    for row in (table.columns, *table.rows):
-        cells = zip(row, widths, table.columns, strict=True)
-        rows.append("  ".join(t.ljust(w) if name in table.left else t.rjust(w) for t, w, name in cells).rstrip())
-    return "\n".join([table.title, *rows] if table.title else rows)
-
-
-def _draw(table: Table) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    drawn = RichTable(
-        title=table.title or None,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-    )
-    for name in table.columns:
-        drawn.add_column(Text(name), justify="left" if name in table.left else "right", no_wrap=True)
-    for row in table.rows:
-        drawn.add_row(*map(Text, row))
-    console = Console()
-    if console.measure(drawn, options=console.options.update(width=10_000)).maximum <= console.width:
-        console.print(drawn)
-    else:  # a terminal too narrow for it: lines break, numbers are not cut
-        print(table_text(table))
-
-
-def show_facts(facts: Iterable[tuple[str, str]]) -> None:
-    """Print names and what there is to say about them, folded to the width of the terminal."""
-    import textwrap
-
-    facts = list(facts)
-    indent = max(len(name) for name, _ in facts) + 2
-    width = max(60, min(120, shutil.get_terminal_size((120, 24)).columns))
-    for name, text in facts:
-        print(textwrap.fill(text, width, initial_indent=name.ljust(indent), subsequent_indent=" " * indent))
-
-
-def plain(thing: Any) -> Any:
-    """The same content in JSON's types: arrays as lists, numbers that are not finite as None."""
-    if isinstance(thing, Mapping):
-        return {str(key): plain(value) for key, value in thing.items()}
-    if hasattr(thing, "tolist"):
-        return plain(thing.tolist())
-    if isinstance(thing, list | tuple):
-        return [plain(item) for item in thing]
-    if isinstance(thing, float) and not math.isfinite(thing):
-        return None
-    return thing
-
-
-def json_text(content: Mapping[str, Any]) -> str:
-    """The content as JSON text, each number once and each record of a list on one line."""
-    items = (f"{json.dumps(str(key))}: {_json_value(value)}" for key, value in content.items())
-    return "{\n" + ",\n".join(items) + "\n}\n"
-
-
-def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
-    """The content as JSON text with all rows of a table, one record each, under the key."""
-    return json_text({**content, key: rows_of(table)})
-
-
-def rows_of(table: Columns) -> list[dict[str, Any]]:
-    """All rows of a table, one record each by the names of its columns."""
-    columns = {name: column.tolist() for name, column in table.columns.items()}
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-def _json_value(value: Any) -> str:
-    value = plain(value)
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return "[\n" + ",\n".join(json.dumps(item, ensure_ascii=False, allow_nan=False) for item in value) + "\n]"
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_one_of
 from rotor.cli.shared import inputs
 from rotor.cli.shared.options import option
 from rotor.cli.shared.output import Files
 from rotor.plots.view import Limits, View
+
+if TYPE_CHECKING:
+    from rotor.verbs.verb import Verb
 
 SCALES = {"linear": False, "log": True}
 UNITS = ("MHz", "GHz", "THz", "cm-1")
@@ -80,3 +85,15 @@ def _limits(name: str, text: str | None, unit: str) -> Limits | None:
     from rotor.units import parse_range
 
     return None if text is None else inputs.parsed(name, text, lambda value: parse_range(value, unit))
+
+
+PLOT_NAMES = ("plot_unit", "plot_title", "plot_range", "plot_vertical", "plot_scale")
+
+
+def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
+    """The view of a verb's picture from what was typed; drawn: whether there is a picture. Settings by name of a spectrum."""
+    texts = {name: typed[name] for name in PLOT_NAMES if name in typed}
+    files = Files({"--plot": Path()} if drawn else {})
+    if verb.spectral:
+        return settings_of(PlotOptions(**texts), files)
+    return view_of(ViewOptions(**texts), files, verb.drawn or "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rotor.cli.shared.output import Table
+from rotor.reports.screen import Table
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines

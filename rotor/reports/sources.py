@@ -77,7 +77,7 @@ def with_sources(
     callable
         Prints all of it.
     """
-    from rotor.cli.shared.output import show_facts
+    from rotor.reports.screen import show_facts
 
     def show_all() -> None:
         """The answer and what it was made from."""

@@ -1,0 +1,178 @@
+"""The command of a verb, made from its declaration: one option for each input and file, and help in panels."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from rotor.cli.shared.options import PlainCommand
+from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, Field
+from rotor.requests.readers import Flag
+from rotor.verbs.verb import Output, Verb
+
+JSON_HELP = "Everything printed, as JSON; - is standard output"
+SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One option of a command. identity: of the input, or the name of the file. kind: of the value of the parser."""
+
+    identity: str
+    flag: str
+    help: str
+    metavar: str = "TEXT"
+    panel: str = OUTPUT
+    common: bool = False
+    kind: Any = str
+    off: bool = False
+    many: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name of the parameter of the function behind it."""
+        return re.sub(r"\W", "_", self.flag.strip("-").lower()) + "_"
+
+
+def parameters_of(verb: Verb) -> list[Parameter]:
+    """Every option of a verb."""
+    found = [_input(one) for one in verb.options.values()]
+    found += [Parameter(one.option, one.option, one.help, one.metavar, one.panel, one.common, str, False, one.many) for one in verb.extras]
+    found += [_file(one) for one in verb.outputs]
+    found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
+    found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
+    if any(one.name == "plot" for one in verb.outputs) and verb.drawn is not None:
+        found += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
+    if verb.workers:
+        found.append(Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS))
+    return found
+
+
+def _left_out(verb: Verb) -> set[str]:
+    return ({"plot_unit"} if not verb.spectral else set()) | (set() if verb.scaled else {"plot_scale"})
+
+
+_PICTURE = (
+    ("plot_unit", "--plot-unit", "Unit of the picture's frequency axis: MHz, GHz, THz or cm-1", "UNIT"),
+    ("plot_title", "--plot-title", "Title of the picture", "TEXT"),
+    ("plot_range", "--plot-range", "Range of the horizontal axis, in its unit", "A:B"),
+    ("plot_vertical", "--plot-vertical", "Range of the vertical axis, in its unit", "A:B"),
+    ("plot_scale", "--plot-scale", "Vertical axis: linear or log", "NAME"),
+)
+
+
+def _input(one: Field) -> Parameter:
+    flag = isinstance(one.reader, Flag)
+    default = _default_text(one)
+    help_ = f"{one.help} [{default}]" if default else one.help
+    metavar = one.metavar or one.reader.metavar
+    off = isinstance(one.reader, Flag) and one.reader.off
+    return Parameter(one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many)
+
+
+def _default_text(one: Field) -> str:
+    if one.typed is not None:
+        return str(one.typed)
+    if one.default is None or one.default is False or one.default is True or one.default in ((), "", {}):
+        return ""
+    return one.reader.show(one.default)
+
+
+def _file(one: Output) -> Parameter:
+    return Parameter(one.name, one.flag, one.help, "FILE", OUTPUT, True, many=one.many)
+
+
+def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]], None]) -> Callable[..., None]:
+    """A function for typer with one parameter for each option of a verb; run: is given the texts by identity."""
+    every = parameters_of(verb)
+    by_name = {one.name: one for one in every}
+
+    def call(context: typer.Context, **typed: Any) -> None:
+        typed.pop("help_all", None)
+        run(verb, context, dict(_texts(by_name, typed)))
+
+    parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
+    parameters += [_signature_of(one) for one in every]
+    if any(not one.common for one in every):
+        everything = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
+        parameters.append(inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=everything, annotation=bool))
+    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    call.__annotations__ = {one.name: one.annotation for one in parameters}
+    call.__doc__ = verb.about
+    return call
+
+
+def _signature_of(one: Parameter) -> inspect.Parameter:
+    kind: Any = bool if one.kind is bool else list[str] if one.many else str
+    if not one.flag.startswith("-"):
+        default = typer.Argument(None, show_default=False, metavar=one.flag, help=f"{one.help}.")
+    else:
+        names = f"{one.flag}/--no-{one.flag[2:]}" if one.off else one.flag
+        settings = {} if one.kind is bool else {"metavar": one.metavar}
+        panel = f"{'' if one.common else '+'}{one.panel}"
+        default = typer.Option(None, names, show_default=False, help=f"{one.help}.", rich_help_panel=panel, **settings)
+    return inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
+
+
+def _texts(by_name: Mapping[str, Parameter], typed: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """What was typed, by identity; ValueError for an empty text."""
+    for name, value in typed.items():
+        one = by_name[name]
+        if value is None or value == [] or value == ():
+            continue
+        texts = value if isinstance(value, list | tuple) else [value]
+        if any(isinstance(text, str) and not text.strip() for text in texts):
+            raise ValueError(f"{one.flag}: the text given is empty; expected one that is not, or leave it out")
+        yield one.identity, tuple(value) if one.many else value
+
+
+def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) -> None:
+    """ValueError where a file that one option writes is a file that another option, or the source, names as what is read.
+
+    written: by option. typed: everything that may name a file that is read.
+    """
+    texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
+    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and _is_file(text)}
+    for name, path in written.items():
+        if os.path.realpath(path) in inputs:
+            raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # a text that no path can be: too long, or with a zero byte
+        return False
+
+
+class PanelCommand(PlainCommand):
+    """A command whose help has panels: the options that most people use first, all of them by --help-all."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Arguments and options, panel by panel."""
+        every = "--help-all" in (ctx.meta.get("rotor.help") or ())
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for one in self.get_params(ctx):
+            record = one.get_help_record(ctx)
+            panel = getattr(one, "rich_help_panel", None) or ("Arguments" if record and not one.opts[0].startswith("-") else "Help")
+            if record is not None and (every or not panel.startswith("+")):
+                panels.setdefault(panel.lstrip("+"), []).append(record)
+        for panel in ("Arguments", *PANELS, "Help"):
+            if panel in panels:
+                with formatter.section(panel):
+                    formatter.write_dl(panels[panel])
+
+
+def _show_all(context: typer.Context, value: bool) -> None:
+    """Print the help with all options and end."""
+    if value and not context.resilient_parsing:
+        context.meta["rotor.help"] = ("--help-all",)
+        typer.echo(context.command.get_help(context), color=context.color)
+        raise typer.Exit

@@ -1,0 +1,157 @@
+"""The one course of every verb on the command line: read, check, answer, then files, JSON and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.cli.shared.command import refuse_overwriting
+from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
+from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
+from rotor.reports.screen import json_with_rows
+from rotor.requests.fill import Given
+from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import typer
+
+
+def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
+    """Carry out a verb with the texts that were typed, by identity."""
+    given = Given(with_extras(verb, typed), "option")
+    shown, files = verb.read_shown(given), asked_files(verb, typed)
+    refuse_overwriting({f"{name}": path for name, path in files.paths.items()}, inputs_of(verb, typed))
+    view = picture_settings(verb, typed, "--plot" in files.paths)
+    request, subject = verb.read(given, Place(".", note))
+    outputs = {verb_name(name): path for name, path in files.paths.items()}
+    request = request if verb.adapt is None else verb.adapt(request, outputs)
+    if verb.check is not None:
+        verb.check(request, outputs, shown)
+    with working(verb, typed) as executor, answering() if verb.sound else naming(verb):
+        answer = answer_of(verb, request, Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True))
+    head = {"command": str(context.obj), "input": subject.text}
+    report = report_of(verb, answer, head, given, view)
+    refuse_nothing_to_draw(verb, answer, files)
+    for text in verb.notes(answer):
+        note(text)
+    report.content["files"] = files.names  # type: ignore[index]
+    writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
+    if "--save-scene" in files.paths:
+        writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
+    deliver(files, writers, lambda: json_with_rows(verb.table(answer), verb.rows, report.content), lambda: verb.show(answer, report))
+
+
+def answer_of(verb: Verb, request: Any, work: Work) -> Any:
+    """The answer; one that was not reached is no mistake of the user."""
+    try:
+        return verb.answer(request, work)
+    except NoAnswerError as error:
+        raise ComputationError(str(error)) from error
+
+
+def report_of(verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any) -> Report:
+    """What the report, the JSON and the files are made from. head: command or scene, and input."""
+    from rotor.version import version
+
+    shown = verb.read_shown(given)
+    with answering():
+        content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
+    return Report(content, shown, given, dict(head), view, bool(getattr(shown, "sources", False)))
+
+
+def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
+    """The texts, options that stand for others replaced by what they mean."""
+    values = {name: value for name, value in typed.items() if name in verb.fields}
+    for one in verb.extras:
+        if one.option in typed:
+            for other in one.instead_of:
+                if other in typed:
+                    raise ValueError(f"{one.option} and {verb.fields[other].flag}: give one of them")
+            try:
+                values |= one.read(typed[one.option])
+            except ValueError as error:
+                raise ValueError(f"{one.option}: {error}") from None
+    return values
+
+
+def inputs_of(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
+    """What was typed and may name a file that is read."""
+    outputs = {one.name for one in verb.outputs} | {"json", "save_scene", *PLOT_NAMES}
+    return {name: value for name, value in typed.items() if name not in outputs}
+
+
+def verb_name(option: str) -> str:
+    """The name of a file by its option."""
+    return option.strip().removeprefix("--").replace("-", "_")
+
+
+def flag_of(verb: Verb, name: str) -> str:
+    """The option of a file by its name."""
+    return verb.output(name).flag
+
+
+def asked_files(verb: Verb, typed: Mapping[str, Any]) -> Files:
+    """The files to write when all is done, each with a suffix that can be written."""
+    files = Files()
+    for one in verb.outputs:
+        for path in _paths(typed.get(one.name)):
+            files.ask(one.flag, path, one.suffixes)
+    files.ask("--save-scene", typed.get("save_scene"), (".toml",))
+    files.ask_json(typed.get("json"))
+    return files
+
+
+def _paths(value: Any) -> tuple[str, ...]:
+    return () if value is None else value if isinstance(value, tuple) else (value,)
+
+
+def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
+    """ComputationError where a picture or a profile is asked for and there is nothing to show in it."""
+    drawn = [name for name in ("--plot", "--profile-csv") if name in files.paths]
+    if drawn and (reason := verb.nothing(answer)):
+        raise ComputationError(f"{drawn[0]}: {reason}")
+
+
+@contextmanager
+def naming(verb: Verb) -> Iterator[None]:
+    """Inside, a ValueError that names a field of the request names its option."""
+    from rotor.requests.fill import renaming
+
+    with renaming({one.name: one.flag for one in verb.fields.values() if one.flag}):
+        yield
+
+
+def working(verb: Verb, typed: Mapping[str, Any]) -> Any:
+    """The executor that --workers asks for; None of a verb that has no such option."""
+    if not verb.workers:
+        return nullcontext()
+    from rotor.cli.shared.workers import working as pool
+    from rotor.requests.readers import Whole
+
+    try:
+        count = Whole().read(typed.get("workers", 1))
+    except ValueError as error:
+        raise ValueError(f"--workers: {error}") from None
+    executor: Executor | Any = pool(count, verb.workers.split()[0])
+    return executor
+
+
+def scene_writer(verb: Verb, request: Any, subject: Subject, given: Given, typed: Mapping[str, Any]) -> Any:
+    """What writes the scene that gives the same tables again; a note names files that a scene does not write."""
+    outputs = {one.name: typed[one.name] for one in verb.outputs if one.scene and one.name in typed}
+    if left := [one.flag for one in verb.outputs if not one.scene and one.name in typed]:
+        note(f"the scene writes no {', '.join(left)}; its other files are those of this command")
+
+    def write(path: Path) -> None:
+        """The scene as text."""
+        from rotor.scenes.scene_file import write_scene
+        from rotor.scenes.structures import saved_scene
+
+        folder = Path(typed["save_scene"]).parent
+        write_scene(saved_scene(verb, request, subject, folder, outputs, given), path)
+
+    return write

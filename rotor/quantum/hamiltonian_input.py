@@ -1,0 +1,107 @@
+"""Which effects a Hamiltonian has, as every verb of levels asks for them: distortion, and the spins of nuclei by some method."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.requests.field import declared, part
+from rotor.requests.readers import Flag, Quantity, Text
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+METHODS = ("exact", "N-diagonal", "first-order", "auto")
+_SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin"})
+_KNOWN = frozenset({"rigid rotor", "centrifugal distortion", "interacting states", "hyperfine method"})
+
+
+@dataclass(frozen=True)
+class HamiltonianInput:
+    """What the Hamiltonian consists of besides the rigid rotor."""
+
+    distortion: bool = declared(True, Flag(), "Centrifugal distortion, as far as constants are there", "effects.distortion", option="")
+    hyperfine: bool | None = declared(
+        None, Flag(off=True), "Split by the spins of nuclei; by default where their constants are given", "effects.hyperfine",
+        common=True, example=True,
+    )  # fmt: skip
+    hyperfine_method: str = declared(
+        "exact", Text(METHODS, "NAME"), "exact, N-diagonal, first-order, or auto: the cheapest that keeps the tolerance",
+        "effects.hyperfine_method",
+    )  # fmt: skip
+    hyperfine_tolerance: float = declared(
+        1e-4, Quantity("MHz", above=0, metavar="D"), "With auto: how far it may be off exact levels (MHz)",
+        "effects.hyperfine_tolerance", typed="0.1 kHz",
+    )  # fmt: skip
+
+
+def effects_field() -> Any:
+    """The field `effects` of a request: a tuple of effects."""
+    return part(HamiltonianInput, effects_from, saved_effects, SEMI_RIGID)
+
+
+def takes_spins(hyperfine: bool | None, subject: Any) -> bool:
+    """Whether spins take part: as asked for, by default where their constants were given with the molecule."""
+    given = any(one.spin_constants is not None for one in subject.molecules)
+    return given if hyperfine is None else hyperfine
+
+
+def effects_from(given: HamiltonianInput, subject: Any) -> Any:
+    """The Hamiltonian that is asked for, of the top of a subject."""
+    _refuse_method_alone(given, subject)
+    return effects_of_top(given, subject.top, takes_spins(given.hyperfine, subject))
+
+
+def effects_of_top(given: HamiltonianInput, top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
+    """The Hamiltonian of one top, with or without spins."""
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.quantum.effects.watson import Centrifugal
+
+    found = effects_of(top, hyperfine, given.hyperfine_method, given.hyperfine_tolerance)
+    return found if given.distortion else tuple(one for one in found if not isinstance(one, Centrifugal))
+
+
+def _refuse_method_alone(given: HamiltonianInput, subject: Any) -> None:
+    if given.hyperfine_method != "exact" and not takes_spins(given.hyperfine, subject):
+        raise ValueError(
+            f"hyperfine_method {given.hyperfine_method}: without hyperfine or constants of spins nothing is split; add one of them"
+        )
+
+
+def effects_of_each(given: HamiltonianInput, subject: Any) -> Any:
+    """The Hamiltonian of each of several tops: those with constants of spins are split, and a note names the others."""
+    _refuse_method_alone(given, subject)
+    tops: Sequence[Top] = subject.values["tops"]
+    known, asked = [top.spin_constants is not None for top in tops], takes_spins(given.hyperfine, subject)
+    if not asked or not any(known) or all(known):
+        return tuple(effects_of_top(given, top, asked) for top in tops)
+    unsplit = ", ".join(top.name or f"molecule {number}" for number, top in enumerate(tops, 1) if not known[number - 1])
+    subject.note(f"hyperfine: no constants of spins are known of {unsplit}, whose lines are not split")
+    plain = HamiltonianInput(distortion=given.distortion)
+    return tuple(effects_of_top(given if split else plain, top, split) for top, split in zip(tops, known, strict=True))
+
+
+def saved_effects(effects: Iterable[QuantumEffect], request: Any) -> HamiltonianInput:
+    """What asks for these effects of a request's top again.
+
+    Raises ValueError for effects that have no name here.
+    """
+    return saved_of_top(effects, request.top)
+
+
+def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput:
+    """The same of a top."""
+    every = {effect.name: effect for effect in effects}
+    if unknown := every.keys() - _SPINS - _KNOWN:
+        raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")
+    hyperfine = None if top.spin_constants is None else bool(every.keys() & _SPINS)
+    distortion, method = "centrifugal distortion" in every, every.get("hyperfine method")
+    if method is None:
+        return HamiltonianInput(distortion=distortion, hyperfine=hyperfine)
+    from rotor.quantum.spins.method import HyperfineMethod
+
+    assert isinstance(method, HyperfineMethod)
+    return HamiltonianInput(distortion, hyperfine, method.method, method.tolerance_mhz)

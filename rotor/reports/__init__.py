@@ -1,0 +1,1 @@
+"""Results as text: facts with their names, tables for people, JSON for programs."""

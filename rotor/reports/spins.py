@@ -1,0 +1,15 @@
+"""How spins of nuclei were treated, as a line of a report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def hyperfine_lines(used: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """Which method split the levels, and by how much it may differ from the exact one."""
+    if used is None:
+        return []
+    if used["method"] == "exact":
+        return [("hyperfine", "exact: all N that a tensor connects")]
+    estimate = f"{1000 * used['estimate_mhz']:.2g} kHz"
+    return [("hyperfine", f"{used['method']}: differs from exact by less than {estimate}, estimated")]

@@ -1,0 +1,145 @@
+"""From what was typed, or stands in a scene, to a request, and back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from rotor.requests.field import Field, Part, all_fields, names_of, own_fields, parts_of
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a user gave. values: by the identity of the field. style: how errors call fields: "option", "key" or "name"."""
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    style: str = "name"
+
+    def of(self, one: Field) -> Any:
+        """The value of a field as given; None for none."""
+        return self.values.get(one.identity)
+
+    def has(self, one: Field) -> bool:
+        """Whether a field was given."""
+        return self.values.get(one.identity) is not None
+
+    def among(self, structure: type) -> list[Field]:
+        """The fields of a dataclass that were given."""
+        return [one for one in all_fields(structure).values() if self.has(one)]
+
+
+def read_fields(structure: type, given: Given, subject: Any = None) -> dict[str, Any]:
+    """Values of the fields of a dataclass that were given, by name, parts made for a subject; what was not given is left out."""
+    values = {name: one.read(given.of(one), given.style) for name, one in own_fields(structure).items() if given.has(one)}
+    for name, one in parts_of(structure).items():
+        made = _make(one, given, subject)
+        if made is not None:
+            values[name] = made
+    return values
+
+
+def _make(part: Part, given: Given, subject: Any) -> Any:
+    present = given.among(part.inputs)
+    inner = read_fields(part.inputs, given, subject)
+    if part.whole and present and len(present) < len(all_fields(part.inputs)):
+        names = " and ".join(one.called(given.style) for one in all_fields(part.inputs).values())
+        raise ValueError(f"{names}: {part.why}")
+    if part.single and len(present) > 1:
+        raise ValueError(f"{' and '.join(one.called(given.style) for one in present)}: {part.why}")
+    if part.whole and not present:
+        return None
+    with called(part.inputs, given.style):
+        return part.make(part.inputs(**inner), subject)
+
+
+def read_instance(structure: type, given: Given, subject: Any = None) -> Any:
+    """An instance of a dataclass whose fields are all declared."""
+    with called(structure, given.style):
+        return structure(**read_fields(structure, given, subject))
+
+
+@contextmanager
+def called(structure: type, style: str) -> Iterator[None]:
+    """Inside, a ValueError that names fields of a request calls them as the user does."""
+    with renaming({name: text for name, text in names_of(structure, style) if text}):
+        yield
+
+
+@contextmanager
+def renaming(names: Mapping[str, str]) -> Iterator[None]:
+    """Inside, a ValueError calls fields by other names.
+
+    A name with an underscore is replaced wherever it stands; one that is an ordinary word only at the start.
+    """
+    try:
+        yield
+    except ValueError as error:
+        text = renamed(str(error), names)
+        if text == str(error):
+            raise
+        raise ValueError(text) from None
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """A text with fields called by other names."""
+    patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b" for name in names]
+    return re.sub("|".join(patterns), lambda found: names[found[0]], text) if patterns else text
+
+
+def written_fields(request: Any) -> dict[str, Any]:
+    """What a scene holds of a request, by the key, values that are the default left out."""
+    found: dict[str, Any] = {}
+    structure = type(request)
+    for name, one in own_fields(structure).items():
+        value = getattr(request, name)
+        if one.key and not equal(value, one.default):
+            found[one.key] = one.write(value)
+    for name, each in parts_of(structure).items():
+        inner = each.split(getattr(request, name), request)
+        if inner is not None:
+            found |= written_fields(inner)
+    return found
+
+
+def equal(value: Any, default: Any) -> bool:
+    """Whether a value is the default, sequences compared item by item."""
+    if value is default:
+        return True
+    if isinstance(value, list | tuple) and isinstance(default, list | tuple):
+        return len(value) == len(default) and all(map(equal, value, default))
+    return (type(value) is type(default) and bool(value == default)) or (
+        isinstance(value, int | float) and isinstance(default, int | float) and not isinstance(value, bool) and value == default
+    )
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables from values by dotted key.
+
+    >>> nested({"a.b": 1, "c": 2, "a.d": 3})
+    {'a': {'b': 1, 'd': 3}, 'c': 2}
+    """
+    tables: dict[str, Any] = {}
+    for key, value in flat.items():
+        *path, last = key.split(".")
+        inner = tables
+        for name in path:
+            inner = inner.setdefault(name, {})
+        inner[last] = value
+    return tables
+
+
+def flattened(tables: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    """Values of tables by those dotted keys that they have."""
+    found: dict[str, Any] = {}
+    for key in keys:
+        inner: Any = tables
+        for name in key.split("."):
+            inner = inner.get(name) if isinstance(inner, Mapping) else None
+        if inner is not None:
+            found[key] = inner
+    return found
+
+

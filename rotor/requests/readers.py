@@ -1,0 +1,334 @@
+"""How the value of a field is read from a text or a number, and written back: one class a kind of value.
+
+A text comes from the command line, a text or a TOML value from a scene, any value from Python. Errors quote what was typed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid, parse_quantity, parse_range
+
+MOST_WHOLE = 10**15  # beyond it a double no longer holds every whole number
+MOST_POINTS = 10_000_000  # of a grid on the command line or in a scene
+INFINITE = (0.0, math.inf)
+
+
+class Reader:
+    """A kind of value. metavar: of its option. scene_type: what a scene file holds. many: whether its option is repeatable."""
+
+    metavar: str = "TEXT"
+    scene_type: Any = str
+    many: bool = False
+    unit: str = ""
+
+    def read(self, given: Any) -> Any:
+        """The value of a text, a TOML value or a Python value; ValueError, without a name, for anything else."""
+        return given
+
+    def write(self, value: Any) -> Any:
+        """What a scene file holds of a value; `read` gives the same value back."""
+        return value
+
+    def show(self, value: Any) -> str:
+        """A default in the help of an option."""
+        return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Text(Reader):
+    """A text, or one of several words. words: those allowed; empty: any."""
+
+    words: Collection[str] = ()
+    metavar: str = "TEXT"
+
+    def read(self, given: Any) -> str:
+        """The text."""
+        if not isinstance(given, str):
+            raise ValueError(f"{given!r}: expected a text")
+        if self.words and given not in self.words:
+            raise ValueError(f"{given!r}: expected one of {', '.join(self.words)}")
+        return given
+
+
+@dataclass(frozen=True)
+class Flag(Reader):
+    """True or false. off: whether there is an option --no-... too."""
+
+    off: bool = False
+    scene_type = bool
+
+    def read(self, given: Any) -> bool:
+        """The truth value."""
+        if not isinstance(given, bool):
+            raise ValueError(f"{given!r}: expected true or false")
+        return given
+
+
+@dataclass(frozen=True)
+class Whole(Reader):
+    """A whole number between bounds."""
+
+    least: int | None = None
+    most: int | None = None
+    metavar: str = "N"
+    scene_type = int
+
+    def read(self, given: Any) -> int:
+        """The number."""
+        value = given
+        if isinstance(given, str):
+            try:
+                value = int(given)
+            except ValueError:
+                raise ValueError(f"{given!r:.60}: expected a whole number") from None
+        if isinstance(value, bool) or not hasattr(value, "__index__"):
+            raise ValueError(f"{given!r}: expected a whole number")
+        if abs(value) > MOST_WHOLE:
+            raise ValueError(f"a number of {len(str(abs(value)))} digits; expected at most {MOST_WHOLE}")
+        self.check(value)
+        return int(value)
+
+    def check(self, value: int) -> None:
+        """ValueError for a number out of bounds."""
+        low, high = self.least, self.most
+        if (low is not None and value < low) or (high is not None and value > high):
+            bounds = f"of {low} or more" if high is None else f"from {low} to {high}"
+            raise ValueError(f"{value}: expected a whole number {bounds}")
+
+
+@dataclass(frozen=True)
+class Quantity(Reader):
+    """A number with a unit. above, below: bounds that are not allowed themselves; least, most: bounds that are."""
+
+    unit: str = ""
+    above: float | None = None
+    below: float | None = None
+    least: float | None = None
+    most: float | None = None
+    metavar: str = "X"
+    scene_type = float | str
+
+    def read(self, given: Any) -> float:
+        """The number in `unit`."""
+        if isinstance(given, bool) or not isinstance(given, str | int | float):
+            raise ValueError(f"{given!r}: expected a number{' with a unit' if self.unit else ''}")
+        value = parse_quantity(given, self.unit)
+        self.check(value, given)
+        return value
+
+    def check(self, value: float, given: Any = None) -> None:
+        """ValueError for a number out of bounds; given: what was typed."""
+        text = f"{value:g}" if given is None or not isinstance(given, str) else given
+        if (self.above is not None and not value > self.above) or (self.below is not None and not value < self.below):
+            raise ValueError(f"{text}: expected {self._rule()}")
+        if (self.least is not None and value < self.least) or (self.most is not None and value > self.most):
+            raise ValueError(f"{text}: expected {self._rule()}")
+        if self.unit == "K":
+            check_temperature(value, text)
+
+    def _rule(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        if self.above is not None and self.below is not None:
+            return f"a number between {self.above:g} and {self.below:g}{unit}"
+        if self.above is not None and self.most is None:
+            return f"a finite number above {self.above:g}{unit}"
+        if self.above is not None:
+            return f"a number above {self.above:g} and up to {self.most:g}{unit}"
+        if self.least is not None and self.most is None:
+            return f"a finite number of {self.least:g}{unit} or more"
+        if self.least is not None:
+            return f"a number from {self.least:g} to {self.most:g}{unit}"
+        return f"a number up to {self.most if self.below is None else self.below:g}{unit}"
+
+    def write(self, value: float) -> Any:
+        """The same double, with its unit."""
+        return f"{float(value)!r} {self.unit}" if self.unit else value
+
+    def show(self, value: float) -> str:
+        """With its unit."""
+        return f"{value:g} {self.unit}".rstrip()
+
+
+def check_temperature(value: float, text: str) -> None:
+    """ValueError for a temperature at which there is no gas of molecules; 0 is left to the rule of the field."""
+    if value > MOST_KELVIN:
+        raise ValueError(f"{text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
+    if 0 < value < LEAST_KELVIN:
+        raise ValueError(f"{text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
+
+
+@dataclass(frozen=True)
+class Grid(Reader):
+    """Numbers in a unit: start:stop:count, a list between commas, or a list. points: the count of a grid that gives none."""
+
+    unit: str = ""
+    points: int | None = None
+    most_points: int = MOST_POINTS
+    each: Quantity | None = None
+    metavar: str = "GRID"
+    scene_type = list[float] | str
+
+    def read(self, given: Any) -> tuple[float, ...]:
+        """The numbers."""
+        if isinstance(given, str):
+            values = self._of_text(given)
+        elif isinstance(given, int | float) and not isinstance(given, bool):
+            values = (float(given),)
+        else:
+            values = tuple(map(float, given))
+        if not all(map(math.isfinite, values)):
+            raise ValueError(f"{given!r:.60}: expected finite numbers")
+        for value in values if self.each is not None else ():
+            assert self.each is not None
+            try:
+                self.each.check(value)
+            except ValueError as error:
+                raise ValueError(f"{given!r:.60}: {error}" if isinstance(given, str) else str(error)) from None
+        return values
+
+    def _of_text(self, text: str) -> tuple[float, ...]:
+        count = text.rpartition(":")[2].strip()
+        if text.count(":") == 2 and count.isdecimal() and int(count) > self.most_points:
+            raise ValueError(f"{text!r}: at most {self.most_points} numbers; ask for fewer")
+        return tuple(parse_grid(text, self.unit, self.points).tolist())
+
+    def write(self, value: Any) -> list[float]:
+        """The numbers as a list."""
+        return [float(one) for one in value]
+
+    def show(self, value: Any) -> str:
+        """The first and the last of them."""
+        return f"{len(value)} from {value[0]:g} to {value[-1]:g} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Range(Reader):
+    """Two ends first:last in a unit; all of it for (0, infinity)."""
+
+    unit: str = "MHz"
+    metavar: str = "A:B"
+
+    def read(self, given: Any) -> tuple[float, float]:
+        """Both ends."""
+        if isinstance(given, str):
+            return parse_range(given, self.unit)
+        first, last = map(float, given)
+        if not first < last:
+            raise ValueError(f"{first:g} to {last:g} {self.unit}: expected a range that rises")
+        return first, last
+
+    def write(self, value: tuple[float, float]) -> str:
+        """Both ends with the unit."""
+        return f"{value[0]!r}:{value[1]!r} {self.unit}"
+
+    def show(self, value: tuple[float, float]) -> str:
+        """Both ends; nothing of all."""
+        return "" if value == INFINITE else self.write(value)
+
+
+@dataclass(frozen=True)
+class Numbers(Reader):
+    """Numbers between commas, in a unit, or a list of numbers; counts: how many there may be, empty: any number of them."""
+
+    unit: str = ""
+    counts: Collection[int] = ()
+    example: str = "0,0,1"
+    metavar: str = "LIST"
+    scene_type = list[float]
+
+    def read(self, given: Any) -> tuple[float, ...]:
+        """The numbers."""
+        if isinstance(given, str):
+            values = tuple(parse_grid(given, self.unit).tolist()) if ":" not in given else ()
+        else:
+            values = tuple(map(float, given))
+        if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
+            words = {1: "one", 3: "three"}
+            count = " or ".join(words.get(n, str(n)) for n in self.counts)
+            raise ValueError(f"{given!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
+        return values
+
+    def write(self, value: Any) -> list[float]:
+        """The numbers as a list."""
+        return [float(one) for one in value]
+
+    def show(self, value: Any) -> str:
+        """The numbers between commas."""
+        return ",".join(f"{one:g}" for one in value)
+
+
+@dataclass(frozen=True)
+class Names(Reader):
+    """Texts: an option that may be repeated, a list in a scene."""
+
+    metavar: str = "NAME"
+    scene_type = list[str]
+    many: bool = True
+
+    def read(self, given: Any) -> tuple[str, ...]:
+        """The texts."""
+        return (given,) if isinstance(given, str) else tuple(given)
+
+    def write(self, value: Any) -> list[str]:
+        """The texts as a list."""
+        return list(value)
+
+    def show(self, value: Any) -> str:
+        """The texts between commas."""
+        return ", ".join(value)
+
+
+@dataclass(frozen=True)
+class Pairs(Reader):
+    """Numbers by name: `ee=1,eo=3`, or a table. number: of a text, the type of the values."""
+
+    number: type = int
+    example: str = "ee=1"
+    metavar: str = "LIST"
+    lower: bool = False
+
+    @property
+    def scene_type(self) -> Any:  # type: ignore[override]
+        """A table of numbers."""
+        return dict[str, self.number]  # type: ignore[name-defined]
+
+    def read(self, given: Any) -> dict[str, Any]:
+        """The numbers by name."""
+        if isinstance(given, Mapping):
+            return {str(name): self.number(value) for name, value in given.items()}
+        table: dict[str, Any] = {}
+        for item in given.split(","):
+            name, _, number = (part.strip() for part in item.partition("="))
+            name = name.lower() if self.lower else name
+            if not name or not self._is_number(number) or name in table:
+                rule = f"name=number, each once, such as {self.example}"
+                raise ValueError(f"{item.strip()!r} in {given!r}: expected {rule}")
+            table[name] = self.number(number)
+        return table
+
+    def _is_number(self, text: str) -> bool:
+        pattern = r"\d+" if self.number is int else r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+        return re.fullmatch(pattern, text) is not None
+
+
+@dataclass(frozen=True)
+class Custom(Reader):
+    """A value that functions read and write."""
+
+    reading: Callable[[Any], Any]
+    writing: Callable[[Any], Any] = lambda value: value
+    metavar: str = "TEXT"
+    scene_type: Any = str
+
+    def read(self, given: Any) -> Any:
+        """By the function."""
+        return self.reading(given)
+
+    def write(self, value: Any) -> Any:
+        """By the function."""
+        return self.writing(value)

@@ -1,0 +1,56 @@
+"""Vibrational states that a partition function counts, as verbs ask for them: fundamentals or a list of states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rotor.requests.field import declared, part
+from rotor.requests.readers import Custom
+from rotor.thermodynamics.vibration import VibrationalStates
+
+SCENE_TYPE = str | list[list[float]]
+
+
+def _reader(harmonic: bool) -> Custom:
+    """Of energies in cm⁻¹ with degeneracies, as a text or as pairs."""
+
+    def read(given: Any) -> VibrationalStates:
+        if isinstance(given, VibrationalStates):
+            return given
+        if isinstance(given, str):
+            return VibrationalStates.parse(given, harmonic=harmonic)
+        if any(len(pair) != 2 for pair in given):
+            raise ValueError("expected pairs of an energy and its degeneracy")
+        return VibrationalStates(tuple(pair[0] for pair in given), tuple(int(pair[1]) for pair in given), harmonic)
+
+    def write(states: VibrationalStates) -> list[list[float]]:
+        return [[e, float(g)] for e, g in zip(states.energies_cm, states.degeneracies, strict=True)]
+
+    return Custom(read, write, "LIST", SCENE_TYPE)
+
+
+@dataclass(frozen=True)
+class VibrationInput:
+    """Vibrational states that the partition function counts; one of the two."""
+
+    fundamentals: VibrationalStates | None = declared(
+        None, _reader(True), 'Fundamentals (cm⁻¹) whose harmonic factor multiplies Q: "667.4x2,1388,2349"', "vibration.fundamentals",
+        option="--vibration", example="667.4x2,1388,2349",
+    )  # fmt: skip
+    states: VibrationalStates | None = declared(
+        None, _reader(False), "Energies (cm⁻¹) of vibrational states that Q counts, likewise", "vibration.states",
+        option="--vibrational-states", example="859,520x2",
+    )  # fmt: skip
+
+
+def vibrations_field() -> Any:
+    """The field `vibrations` of a request."""
+    why = "give one of them, fundamentals or a list of states"
+    return part(VibrationInput, lambda given, _: given.fundamentals or given.states, _split, single=True, why=why)
+
+
+def _split(states: VibrationalStates | None, _: Any) -> VibrationInput | None:
+    if states is None:
+        return None
+    return VibrationInput(fundamentals=states) if states.harmonic else VibrationInput(states=states)

@@ -1,0 +1,389 @@
+"""The molecule of a verb: one declaration for the command line, scenes and Python, and the top that it means."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
+from rotor.requests.fill import Given, read_instance, renamed
+from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
+    from rotor.tops.top import Top
+
+T = TypeVar("T")
+USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
+STATES = ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
+_GEOMETRY = {
+    "isotopes": "bare constants have no atoms; give the constants of the isotopologue itself",
+    "calculator": "bare constants have no geometry to refine; give a molecule",
+    "symmetry_tolerance": "bare constants have no nuclei; give a geometry",
+    "hessian": "bare constants have no geometry that it belongs to; give a molecule",
+}  # inputs that need a geometry, and what is said without one
+
+
+@dataclass(frozen=True)
+class MoleculeInput:
+    """Which molecule; either `source` or `constants`."""
+
+    source: Any = declared(
+        None, Text(), "File, name, SMILES:... or - for standard input", "molecule.source", option="SOURCE", example="water"
+    )
+    constants: str | None = declared(
+        None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz)', "molecule.constants",
+        common=True, example="A=9.2 B=3 C=2.5 GHz",
+    )  # fmt: skip
+    isotopes: tuple[str, ...] = declared(
+        (), Names(metavar="1=2H"), "Another isotope, by atom number or element; repeatable", "molecule.isotopes", option="--isotope",
+        common=True, example=["1=2H"],
+    )  # fmt: skip
+    dipole: tuple[float, ...] | None = declared(
+        None, Numbers("D", (3,), "0,0,1.85 (debye)", "X,Y,Z"), "Dipole in the frame of the input (D)", "molecule.dipole",
+        common=True, example=[0.0, 0.0, 1.85],
+    )  # fmt: skip
+    dipole_abc: tuple[float, ...] | None = declared(
+        None, Numbers("D", (3,), "0,0,1.85 (debye)", "A,B,C"), "Dipole in principal axes (D)", "molecule.dipole_abc",
+        common=True, example=[0.0, 1.85, 0.0],
+    )  # fmt: skip
+    polarizability: tuple[float, ...] | None = declared(
+        None, Numbers("Å3", (), "aa,bb,cc or parallel,perpendicular"),
+        "In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)", "molecule.polarizability",
+        common=True, example=[8.0, 4.0],
+    )  # fmt: skip
+    anisotropy: float | None = declared(
+        None, Quantity("Å3"), "α∥ - α⊥ of a linear or symmetric top (Å³), instead of the polarizability",
+        "molecule.anisotropy", example=4.0,
+    )  # fmt: skip
+    spin_weights: Mapping[str, int] | None = declared(
+        None, Pairs(int), 'Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3"', "molecule.spin_weights", panel=SPINS,
+        example={"ee": 1, "eo": 3, "oe": 3, "oo": 1},
+    )  # fmt: skip
+    spin_constants: str | None = declared(
+        None, Text(), 'Constants of spins: "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" (MHz)', "molecule.spin_constants",
+        panel=SPINS, example="chi_aa(14N)=-4.22 MHz",
+    )  # fmt: skip
+    spins: str | None = declared(
+        None, Text(metavar="LIST"), 'Sizes and order of the spins: "S=1/2 14N"; "35Cl_1+35Cl_2" have a total spin', "molecule.spins",
+        panel=SPINS, example="14N=1",
+    )  # fmt: skip
+    state_constants: str | None = declared(
+        None, Text(), 'Further states and couplings: "E[1]=120GHz A[1]=... G_c[0,1]=450 W[0,1]=3 MHz" (MHz)',
+        "molecule.state_constants", panel=SPINS, example="E[1]=120GHz B[1]=10GHz W[0,1]=3 MHz",
+    )  # fmt: skip
+    state_dipoles: str | None = declared(
+        None, Text(), 'Dipoles in and between states, axes a, b, c: "[1] 0,0,1.3 [0,1] 0,0,1.47" (D)', "molecule.state_dipoles",
+        panel=SPINS, example="[1] 0,0,1.3 [0,1] 0,0,1.47",
+    )  # fmt: skip
+    state_weights: str | None = declared(
+        None, Text(), 'Spin weights of states: "[0] even=1,odd=3 [1] none"; none: all its levels alike', "molecule.state_weights",
+        panel=SPINS, example="[0] even=1,odd=3 [1] even=3,odd=1",
+    )  # fmt: skip
+    state_symmetry: str | None = declared(
+        None, Text(metavar="GROUP"), "Group of the states, whose couplings are checked by it: C2v, Cs(ab), C2(c), ...",
+        "molecule.state_symmetry", panel=SPINS, example="C2v",
+    )  # fmt: skip
+    state_names: str | None = declared(
+        None, Text(metavar="LIST"), "Names of all states, from 0 on: 0+,0-", "molecule.state_names", panel=SPINS, example="0+,0-"
+    )
+    calculator: str | None = declared(
+        None, Text(metavar="NAME"), "Refine the geometry with an ASE calculator of that name, such as xtb or psi4",
+        "molecule.calculator", example="xtb",
+    )  # fmt: skip
+    hessian: str | None = declared(
+        None, Text(metavar="FILE"),
+        "Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the word "
+        "'calculator', from one that the calculator makes",
+        "molecule.hessian", example="hessian.txt",
+    )  # fmt: skip
+    symmetry_tolerance: float | None = declared(
+        None, Quantity("Å", above=0, metavar="DISTANCE"), "How far nuclei may be off the symmetry that is taken, such as 0.005 (Å)",
+        "molecule.symmetry_tolerance", panel=MOLECULE, example="0.005 Å",
+    )  # fmt: skip
+
+
+FIELDS = {one.name: one for one in all_fields(MoleculeInput).values()}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A molecule being read. style: how errors call its inputs. folder: from which files are counted. note: takes remarks."""
+
+    given: MoleculeInput
+    style: str = "name"
+    folder: str | os.PathLike[str] = "."
+    note: Callable[[str], None] = lambda _: None
+
+    def named(self, name: str) -> str:
+        """How errors call an input."""
+        return FIELDS[name].called(self.style)
+
+    def source(self, name: str, how: str = "") -> str:
+        """Where a number is from that was given by hand."""
+        return f"given{how} ({self.named(name)})" if self.style != "name" else f"given{how}"
+
+    def within(self, name: str, make: Callable[[], T]) -> T:
+        """What `make` makes; a ValueError says which input it is about."""
+        try:
+            return make()
+        except ValueError as error:
+            raise ValueError(f"{self.named(name)}: {error}") from None
+
+    def path(self, name: str) -> str:
+        """A file beside the scene, other words as they are."""
+        beside = str(Path(self.folder) / name)
+        return beside if self.style == "key" and not name.startswith("SMILES:") and _is_file(beside) else name
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_molecule(given: Given) -> MoleculeInput:
+    """The inputs that were given."""
+    found: MoleculeInput = read_instance(MoleculeInput, given)
+    return found
+
+
+def top_of(reading: Reading) -> Top:
+    """The top that the inputs mean.
+
+    Raises ValueError, with the input, for contradictions and for what no top can have.
+
+    >>> top_of(Reading(MoleculeInput(constants="B=57.6 GHz", dipole_abc=(0.1, 0.0, 0.0)))).kind
+    'linear'
+    """
+    given = reading.given
+    _refuse_contradictions(reading)
+    top = _from_source(reading) if given.constants is None else _from_constants(reading)
+    if given.dipole_abc is not None:
+        abc = given.dipole_abc
+        top = reading.within("dipole_abc", lambda: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes")))
+    if given.dipole is not None:
+        top = reading.within("dipole", lambda: _with_dipole_of_input(top, reading))
+    if given.polarizability is not None or given.anisotropy is not None:
+        top = _with_polarizability(top, reading)
+    if given.spin_weights is not None:
+        weights = given.spin_weights
+        top = reading.within("spin_weights", lambda: top.with_weights(dict(weights), reading.source("spin_weights")))
+    top = _with_states(_with_spins(top, reading), reading)
+    _refuse_weights_of_another_kind(top)
+    for text in top.notes:
+        reading.note(text)
+    return top
+
+
+def _refuse_contradictions(reading: Reading) -> None:
+    given, named = reading.given, reading.named
+    if (given.source is None) == (given.constants is None):
+        both = "both were given" if given.source is not None else "neither was given"
+        source = "a source" if reading.style == "option" else named("source")
+        raise ValueError(
+            f"expected either {source} or {named('constants')}, and {both}; give one of them, such as the name water"
+        )
+    for one, other, more in (
+        ("dipole", "dipole_abc", ", in the frame of the input or in principal axes"),
+        ("polarizability", "anisotropy", ""),
+    ):
+        if getattr(given, one) is not None and getattr(given, other) is not None:
+            raise ValueError(f"{named(one)} and {named(other)}: give one of them{more}")
+    for name, text in _GEOMETRY.items() if given.constants is not None else ():
+        if getattr(given, name):
+            raise ValueError(f"{named(name)}: {text}")
+
+
+def _from_constants(reading: Reading) -> Top:
+    from rotor.tops.top import Top
+
+    text = reading.given.constants or ""
+    top = reading.within("constants", lambda: Top.from_constants(text, source=reading.source("constants")))
+    if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
+        reading.note(f"{reading.named('constants')}: no unit is given, so the numbers are MHz; for GHz write '{text} GHz'")
+    return top
+
+
+def has_unit(text: str) -> bool:
+    """Whether the text of an option has a unit of frequency somewhere.
+
+    >>> has_unit("A=9.2 B=3 C=2.5 GHz"), has_unit("A=9.2(1) B=3"), has_unit("2:18"), has_unit("2GHz:18")
+    (True, False, False, True)
+    """
+    return bool(re.search(r"[\d).]\s*(?:[kMGT]?Hz|cm(?:-1|\^-1|⁻¹)|1/cm|K)(?!\w)", text))
+
+
+def _from_source(reading: Reading) -> Top:
+    from rotor.formats import read
+    from rotor.tops.top import Top
+
+    given = reading.given
+    if isinstance(given.source, Top):
+        return given.source
+    source = reading.path(given.source) if isinstance(given.source, str) else given.source
+    if source == "-" and reading.style == "key":
+        raise ValueError(f"{reading.named('source')}: '-': a scene reads no standard input; give a file")
+    top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(given.isotopes) or None))
+    if not isinstance(top, Top):
+        raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
+    if given.calculator is not None:
+        calculator, geometry = given.calculator, top
+        top = reading.within("calculator", lambda: _refined(geometry, calculator))
+    if given.symmetry_tolerance is not None:
+        reach, loose = given.symmetry_tolerance, top
+        top = reading.within("symmetry_tolerance", lambda: loose.with_symmetry_within(reach))
+    if given.hessian is None:
+        return top
+    rigid = top
+    return reading.within("hessian", lambda: _semirigid(rigid, reading))
+
+
+def _named_in_scenes(reading: Reading, make: Callable[[], T]) -> T:
+    return reading.within("source", make) if reading.style == "key" else make()
+
+
+def _geometry(top: Top) -> Molecule:
+    if top.molecule is None:
+        raise ValueError(f"{top.name or 'the source'} has constants alone; expected a geometry")
+    return top.molecule
+
+
+def _refined(top: Top, name: str) -> Top:
+    from rotor.molecules.optimise import refine
+    from rotor.tops.top import Top
+
+    return Top.from_molecule(refine(_geometry(top), name))
+
+
+def _semirigid(top: Top, reading: Reading) -> Top:
+    """The top with the distortion that a Hessian gives, of a file or, by the word "calculator", of the calculator."""
+    from rotor.molecules.force_field import force_field_from_calculator, read_hessian
+    from rotor.molecules.optimise import calculator_by_name
+    from rotor.tops.distortion import semirigid_top
+
+    given = reading.given
+    if given.hessian != "calculator":
+        return semirigid_top(read_hessian(reading.path(str(given.hessian)), _geometry(top)))
+    if given.calculator is None:
+        raise ValueError(f"the word 'calculator' needs {reading.named('calculator')}; else give a file")
+    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(given.calculator)))
+
+
+def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
+    import numpy as np
+
+    if top.frame is None:
+        raise ValueError(f"this is in the frame of a geometry, and there is none here; use {reading.named('dipole_abc')}")
+    vector = (top.frame.axes @ np.array(reading.given.dipole)).tolist()
+    return top.with_dipole(vector, reading.source("dipole", " in the frame of the input"))
+
+
+def _with_polarizability(top: Top, reading: Reading) -> Top:
+    given = reading.given
+    if given.anisotropy is not None:
+        anisotropy = given.anisotropy
+        return reading.within("anisotropy", lambda: _with_anisotropy(top, anisotropy, reading))
+    numbers = tuple(given.polarizability or ())
+    source = reading.source("polarizability", " in principal axes")
+    return reading.within("polarizability", lambda: with_tensor(top, numbers, source))
+
+
+def with_tensor(top: Top, numbers: tuple[float, ...], source: str) -> Top:
+    """The top with a polarizability: 2 numbers along and across its axis, 3 of the diagonal, or 6 with ab, ac, bc."""
+    text = ",".join(f"{x:g}" for x in numbers)
+    if len(numbers) == 2 and top.kind in ("linear", "prolate", "oblate"):
+        along, across = numbers
+        numbers = (across, across, along) if top.kind == "oblate" else (along, across, across)
+    if len(numbers) not in (3, 6):
+        raise ValueError(
+            f"{text!r}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc, or parallel,perpendicular of a linear or symmetric top"
+        )
+    aa, bb, cc, ab, ac, bc = [*numbers, 0.0, 0.0, 0.0][:6]
+    return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
+
+
+def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
+    import numpy as np
+
+    if top.kind not in ("linear", "prolate", "oblate"):
+        raise ValueError(
+            f"a top of the kind {top.kind} has no single anisotropy; give {reading.named('polarizability')} aa,bb,cc"
+        )
+    tensor = np.zeros((3, 3))
+    axis = 2 if top.kind == "oblate" else 0
+    tensor[axis, axis] = anisotropy
+    how = f"the anisotropy {reading.source('anisotropy')}; the mean, which turns nothing, is left out"
+    return top.with_polarizability(tensor, how)
+
+
+def _with_spins(top: Top, reading: Reading) -> Top:
+    given = reading.given
+    if given.spin_constants is None:
+        if given.spins is not None:
+            named = reading.named
+            raise ValueError(f"{named('spins')}: says how large the spins of {named('spin_constants')} are; give those too")
+        return top
+    from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
+
+    text, spins = given.spin_constants, given.spins
+    if spins is not None:
+        reading.within("spins", lambda: parse_coupled(spins))
+
+    def read() -> SpinConstants:
+        constants = SpinConstants.parse(text, spins, reading.source("spin_constants"))
+        refuse_other_nuclei(constants, top.molecule)
+        return constants
+
+    return replace(top, spin_constants=reading.within("spin_constants", read))
+
+
+def _with_states(top: Top, reading: Reading) -> Top:
+    """The top with the states that are given, and what is to be said of their couplings among its notes."""
+    texts = {name: text for name in STATES if (text := getattr(reading.given, name)) is not None}
+    if texts:
+        from rotor.tops.states.state_texts import with_state_texts
+
+        source = f"given ({', '.join(map(reading.named, texts))})"
+        try:
+            top = with_state_texts(top, texts, source)
+        except ValueError as error:
+            raise ValueError(renamed(str(error), {name: reading.named(name) for name in STATES})) from None
+    notes = () if top.states is None else tuple(text for text in top.states.notes if text not in top.notes)
+    return replace(top, notes=(*top.notes, *notes)) if notes else top
+
+
+def _refuse_weights_of_another_kind(top: Top) -> None:
+    """ValueError where the levels of lowest J show spin weights of another kind of top, or a coupling of unlike weights."""
+    from rotor.quantum.solve import solve_levels
+
+    solve_levels(top, 1, vectors=False)
+
+
+def with_some_dipole(top: Top, reading: Reading) -> Top:
+    """The top with an estimated dipole, noted as such, where none is known; ValueError where it cannot be estimated either."""
+    from rotor.tops.estimated_dipole import with_dipole_estimate
+
+    try:
+        found = with_dipole_estimate(top)
+    except ValueError as error:
+        of_input = f"{reading.named('dipole')} x,y,z (frame of the input) or " if top.frame is not None else ""
+        raise ValueError(f"{error}: give {of_input}{reading.named('dipole_abc')} a,b,c (principal axes)") from None
+    for text in found.notes[len(top.notes) :]:
+        reading.note(text)
+    return found
+
+
+def with_known_polarizability(top: Top, reading: Reading) -> Top:
+    """The top, whose polarizability is known; ValueError, with what to give, where it is not."""
+    if top.polarizability_abc_angstrom3 is None and top.kind != "spherical":
+        raise ValueError(
+            f"the polarizability is not known: give {reading.named('polarizability')} aa,bb,cc (principal axes, Å³), or "
+            "parallel,perpendicular of a linear or symmetric top"
+        )
+    return top

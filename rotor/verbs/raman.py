@@ -1,0 +1,126 @@
+"""`raman`: rotational Raman lines of a molecule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports import top_facts
+from rotor.reports.line_tables import the_first
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.reports.spins import hyperfine_lines
+from rotor.requests.field import OUTPUT, declared
+from rotor.requests.readers import Whole
+from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
+from rotor.verbs.molecule import with_known_polarizability
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb
+
+if TYPE_CHECKING:
+    from rotor.spectra.raman import RamanLines
+
+EXAMPLES = """\b
+Examples:
+  rotor raman N2
+  rotor raman CO2 --laser 488 --temperature 500 --csv co2.csv --plot co2.png
+  rotor raman HCN --polarizability 3.9,2.0 --temperature 10 --hyperfine
+  rotor raman --constants "B=1.98958 cm-1" --polarizability 2.22,1.53 --spin-weights even=2,odd=1"""
+
+
+@dataclass(frozen=True)
+class RamanShown(Shown):
+    """How much is shown."""
+
+    top_lines: int = declared(20, Whole(0), "How many of the strongest lines are shown", option="--top", panel=OUTPUT)
+
+
+def draw(answer: RamanAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.raman import plot_raman
+
+    plot_raman(answer.lines, path, view=report.view, provenance=report.command)
+
+
+def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
+    """The rows of the strongest lines."""
+    return {"strongest": answer.strongest(shown.top_lines)}
+
+
+def show(answer: RamanAnswer, report: Report) -> None:
+    """Print constants, conditions and the strongest lines."""
+    lines, record = answer.lines, report.content
+    print(top_facts.heading(lines.top))
+    show_facts(_facts(lines, record))
+    if not len(lines):
+        print(f"\nno lines: {answer.why_no_lines}")
+    elif len(record["strongest"]):
+        print()
+        show_table(_table(lines, record["strongest"]))
+    print()
+    tables = ("constants", "polarizability", "spin weights")
+    show_facts([*source_facts(lines.top, tables, report.sources), *top_facts.model_facts(record)])
+
+
+def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top, least = lines.top, record["min_relative"]
+    count = f"{len(lines)}, together {record['band_cross_section_cm2_per_sr']:.4g} cm²/sr" if len(lines) else "none"
+    return [
+        ("constants", top_facts.constants_text(top)),
+        ("polarizability", top_facts.tensor_text(top)),
+        ("anisotropy", f"{record['anisotropy_angstrom3']:.6g} Å³"),
+        ("spin weights", top_facts.weights_text(record["spin_weights"])),
+        *top_facts.states_facts(top)[:1],
+        ("temperature", f"{lines.temperature_k:g} K"),
+        ("laser", f"{lines.laser_nm:g} nm in vacuum"),
+        ("Q", top_facts.q_text(record["q"])),
+        ("J max", f"{lines.jmax}: {record['jmax_source']}"),
+        ("cut", "none: every allowed line" if least is None else f"{least:g} of the strongest"),
+        *hyperfine_lines(record["hyperfine"]),
+        ("lines", count),
+    ]
+
+
+def _table(lines: RamanLines, rows: Any) -> Table:
+    """The strongest lines in order of shift."""
+    from rotor.quantum import quanta
+
+    selected = lines.where(rows)
+    names = quanta.headings(lines.quanta_names)
+    columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
+    wavenumber = "{:.6f}" if "f" in lines.quanta_names else "{:.4f}"  # spins move levels by some 1e-5 cm⁻¹
+    formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
+    cells = [[form.format(x) for x in column] for form, column in zip(formats, selected.columns.values(), strict=False)]
+    labels = [selected.levels.labels(states) for states in (selected.initial, selected.final)]
+    title = the_first(len(selected), "strongest line") if len(selected) < len(lines) else "all lines"
+    return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))
+
+
+VERB = Verb(
+    name="raman",
+    about="Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections.",
+    examples=EXAMPLES,
+    request=RamanRequest,
+    answer=lambda request, work: answer_raman(request, work.executor),
+    table=lambda answer: answer.lines,
+    rows="lines",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write all lines as CSV", example="lines.csv"),
+        Output("parquet", (".parquet",), "Write all lines as Parquet", example="lines.parquet"),
+        Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw, "lines.png"),
+    ),
+    subject=OneMolecule(
+        ("dipole", "dipole_abc", "anisotropy", "state_dipoles", "calculator", "hessian"),
+        lambda top, reading, given: with_known_polarizability(top, reading),
+    ),
+    shown=RamanShown,
+    content=content,
+    notes=lambda answer: answer.lines.warnings,
+    nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
+    drawn="cm-1",
+    accuracy="of the shifts",
+    start={"molecule": "N2", "conditions.temperature": "300 K", "outputs.csv": "raman.csv"},
+)

@@ -1,0 +1,102 @@
+"""What verbs compute of: a molecule that is read from its inputs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rotor.requests.field import Field
+from rotor.requests.fill import Given, written_fields
+from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
+from rotor.verbs.verb import Place, Subject, SubjectKind
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+    from rotor.verbs.verb import Verb
+
+FILES = ("source", "hessian")  # inputs of a molecule that may name a file
+
+
+def unprepared(top: Top, reading: Reading, given: Given) -> Top:
+    """The top as it was read."""
+    return top
+
+
+@dataclass(frozen=True)
+class OneMolecule(SubjectKind):
+    """A molecule. without: inputs that the verb has no option for. prepare: what the verb needs of the top."""
+
+    without: tuple[str, ...] = ()
+    prepare: Callable[[Top, Reading, Given], Top] = unprepared
+
+    fields = {one.identity: one for one in FIELDS.values()}  # noqa: RUF012
+
+    @property
+    def options(self) -> Mapping[str, Field]:
+        """The inputs of a molecule that the verb has options for."""
+        return {one.identity: one for name, one in FIELDS.items() if name not in self.without}
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The top of the molecule that was given."""
+        molecule = read_molecule(given)
+        reading = Reading(molecule, given.style, place.folder, place.note)
+        top = self.prepare(top_of(reading), reading, given)
+        return Subject({"top": top}, (molecule,), str(molecule.source or molecule.constants or ""), place.note)
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """The key `molecule`: a name, a file, SMILES:... or a table."""
+        return [("molecule", _molecule_type(), msgspec.NODEFAULT)]
+
+    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
+        """The tables, a name alone being the source."""
+        molecule = content.get("molecule")
+        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The inputs of the molecule, files counted from the folder of the scene."""
+        return saved_molecule(subject.molecules[0], folder)
+
+
+def _molecule_type() -> Any:
+    from typing import Annotated
+
+    about = msgspec.Meta(description="a name, a file, SMILES:..., or a table")
+    return Annotated[str | molecule_section(), about]
+
+
+def molecule_section() -> Any:
+    """The structure of a table of a molecule."""
+    from rotor.verbs.tables import section_class
+
+    return section_class("molecule", tuple(FIELDS.values()))
+
+
+def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
+    """The inputs of a molecule by dotted key, files counted from a folder.
+
+    Raises ValueError for what no scene holds.
+    """
+    if molecule.source == "-":
+        raise ValueError("--save-scene: the molecule came from standard input, which a scene has not; give a file")
+    if molecule.source is not None and not isinstance(molecule.source, str):
+        raise ValueError(f"a scene holds no {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants")
+    if molecule.source is not None and molecule.source.endswith(".int"):
+        raise ValueError("--save-scene: an .int file and the constants beside it say all themselves; a scene holds none")
+    content = written_fields(molecule)
+    for name in FILES:
+        key = f"molecule.{name}"
+        if key in content:
+            content[key] = beside(content[key], folder)
+    if list(content) == ["molecule.source"]:
+        return {"molecule": content["molecule.source"]}
+    return content
+
+
+def beside(name: str, folder: Path) -> str:
+    """A file as it is counted from a folder; other words stay."""
+    return os.path.relpath(name, folder) if Path(name).is_file() else name

@@ -1,0 +1,95 @@
+"""Tables of scene files as structures, made from declarations: keys, types, descriptions and defaults."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from rotor.requests.field import Field
+from rotor.requests.readers import Flag, Grid, Names, Pairs, Quantity, Range, Text
+from rotor.verbs.verb import Output
+
+
+class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A table of a scene file."""
+
+
+def said(text: str, example: Any = None) -> Meta:
+    """The description of a field, and an example where its default is nothing."""
+    return Meta(description=text, examples=None if example is None else [example])
+
+
+TITLES = {
+    "molecule": "Which molecule; either `source` or `constants`.",
+    "effects": "What the Hamiltonian consists of besides the rigid rotor.",
+    "conditions": "The conditions.",
+    "observables": "What is computed.",
+    "numerics": "Knobs; what is left out is chosen.",
+    "vibration": "Vibrational states that the partition function counts; one of the two.",
+    "outputs": "Files to write.",
+    "magnetic": "What a magnetic field acts on; by default what the file of the molecule has in its table [magnetic].",
+}
+
+
+@cache
+def section_class(table: str, inputs: tuple[Field, ...]) -> Any:
+    """The structure of a table."""
+    return _structure(table, [_entry(one) for one in inputs])
+
+
+def _structure(table: str, entries: list[Any]) -> Any:
+    made = msgspec.defstruct(
+        table.rpartition(".")[2].capitalize() + "Section", entries, bases=(Section,), frozen=True, kw_only=True,
+        forbid_unknown_fields=True, omit_defaults=True, module=__name__,
+    )  # fmt: skip
+    made.__doc__ = TITLES.get(table, "Settings.")
+    return made
+
+
+def _entry(one: Field) -> tuple[str, Any, Any]:
+    help_ = one.help[:1].lower() + one.help[1:] if one.help[1:2].islower() else one.help
+    kind, default = one.reader.scene_type, _default(one)
+    if one.none:
+        kind |= str
+    if default is None:
+        kind |= None
+    if isinstance(default, list | dict):
+        return one.last, Annotated[kind, said(help_, one.example)], _made_anew(default)
+    return one.last, Annotated[kind, said(help_, one.example)], default
+
+
+def _made_anew(default: Any) -> Any:
+    """An empty list or table is a default that a file leaves out."""
+    return msgspec.field(default_factory=(lambda: default) if default else type(default))
+
+
+def _default(one: Field) -> Any:
+    """What a template shows."""
+    if one.typed is not None:
+        return one.typed
+    if isinstance(one.reader, Names):
+        return list(one.default)
+    if one.default is None or isinstance(one.reader, Flag | Text):
+        return one.default
+    if isinstance(one.reader, Range):
+        return one.reader.show(one.default) or None
+    if isinstance(one.reader, Quantity) and one.reader.unit:
+        return one.reader.show(one.default)
+    return one.reader.write(one.default) if isinstance(one.reader, Grid | Pairs) or isinstance(one.default, tuple) else one.default
+
+
+@cache
+def outputs_class(kind: str, files: tuple[Output, ...], settings: tuple[Field, ...]) -> Any:
+    """The structure of [outputs]: files, and settings of files."""
+    entries: list[Any] = []
+    for one in files:
+        if one.many:
+            entries.append((one.name, Annotated[list[str], said(one.help, [one.example])], msgspec.field(default_factory=list)))
+        else:
+            entries.append((one.name, Annotated[str | None, said(one.help, one.example)], None))
+    if any(one.name == "parquet" for one in files):
+        entries.insert(2, ("json", Annotated[str | None, said("Write the table as JSON", "out.json")], None))
+    return _structure("outputs", [*entries, *map(_entry, settings)])

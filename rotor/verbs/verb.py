@@ -1,0 +1,274 @@
+"""What a verb consists of, and its course: inputs become a request, the request an answer, the answer tables, files and a report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rotor.requests.field import Field, all_fields, declared
+from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
+from rotor.requests.readers import Flag
+from rotor.table import Table
+
+PICTURES = (".png", ".pdf", ".svg")
+Note = Callable[[str], None]
+
+
+class NoAnswerError(RuntimeError):
+    """The input is sound, but no answer was reached: exit code 1; nothing is written."""
+
+
+def silent(_: str) -> None:
+    """Takes a remark that nobody reads."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a call is made. folder: from which files that are read are counted. note: takes remarks."""
+
+    folder: str | os.PathLike[str] = "."
+    note: Note = silent
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks."""
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    molecules: tuple[Any, ...] = ()
+    text: str = ""
+    note: Note = silent
+
+    @property
+    def top(self) -> Any:
+        """The top, where there is one."""
+        return self.values["top"]
+
+
+@dataclass(frozen=True)
+class Work:
+    """How an answer is made. executor: shares the work. out: folder of files that grow. shown: the options of the verb itself."""
+
+    executor: Executor | None = None
+    out: str | os.PathLike[str] = "."
+    shown: Any = None
+    files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    note: Note = silent
+    progress: bool = False
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a report and files are made from. content: as of the JSON. shown: options of the verb. typed: what was given.
+    provenance: of files. view: of a picture. sources: printed whole.
+    """
+
+    content: Mapping[str, Any]
+    shown: Any
+    given: Given = field(default_factory=Given)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    view: Any = None
+    sources: bool = False
+
+    @property
+    def command(self) -> dict[str, Any]:
+        """The provenance of pictures: the command or the scene alone."""
+        return {name: self.provenance[name] for name in ("command", "scene") if name in self.provenance}
+
+
+Writer = Callable[[Any, Path, Report], None]
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file that a verb writes. name: of the key in [outputs] and of the option. write: by default the table itself, by its suffix.
+
+    of: the table that is written. empty: why there is nothing to write. grows: the answer itself writes it. many: repeatable.
+    scene: whether scenes have it too.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    help: str
+    write: Writer | None = None
+    example: str = ""
+    option: str = ""
+    grows: bool = False
+    many: bool = False
+    scene: bool = True
+
+    @property
+    def flag(self) -> str:
+        """The option."""
+        return self.option or "--" + self.name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Options of every verb that has a report."""
+
+    sources: bool = declared(False, Flag(), "Print the sources of the numbers in full", option="--sources")
+
+
+def no_notes(answer: Any) -> Iterable[str]:
+    """No remarks."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Extra:
+    """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. read: values by identity from the text."""
+
+    option: str
+    metavar: str
+    help: str
+    read: Callable[[str], Mapping[str, Any]]
+    instead_of: tuple[str, ...] = ()
+    panel: str = ""
+    common: bool = False
+    many: bool = False
+
+
+class SubjectKind:
+    """How a verb is told what it computes of; the base class: of nothing."""
+
+    fields: Mapping[str, Field] = {}  # noqa: RUF012
+
+    @property
+    def options(self) -> Mapping[str, Field]:
+        """Those of them that are options of the command line."""
+        return self.fields
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """What was given, read and checked."""
+        return Subject(note=place.note)
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """What a scene in a folder holds of it, by dotted key."""
+        return {}
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """Name, type and default of what a scene has of it beside plain tables."""
+        return []
+
+    tables_read: tuple[str, ...] = ()  # keys that are read whole
+
+    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
+        """The tables of a scene, with those of the subject as its inputs read them."""
+        return content
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb.
+
+    about: one line. examples: of the command line. request: a dataclass of declared fields. answer: of a request. table: of an answer,
+    and rows: its key in the JSON. show: prints the report. content: further keys of the JSON. notes: remarks on an answer. nothing: why
+    there is nothing to draw. shown: options of printing and files, a dataclass of declared fields. drawn: unit of the horizontal
+    axis of the picture; None where there is none to change; spectral: a picture of a spectrum. workers: whether --workers spreads the
+    work, and over what. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user. start: what a template has switched on. check: of a request beside the files that are asked for.
+    """
+
+    name: str
+    about: str
+    examples: str
+    request: type
+    answer: Callable[[Any, Work], Any]
+    table: Callable[[Any], Table]
+    rows: str
+    show: Callable[[Any, Report], None]
+    outputs: tuple[Output, ...]
+    subject: SubjectKind
+    shown: type = Shown
+    content: Callable[[Any, Any], Mapping[str, Any]] = lambda answer, shown: {}
+    notes: Callable[[Any], Iterable[str]] = no_notes
+    nothing: Callable[[Any], str] = lambda answer: ""
+    drawn: str | None = ""
+    spectral: bool = False
+    scaled: bool = True
+    workers: str = ""
+    start: Mapping[str, Any] = field(default_factory=dict)
+    extras: tuple[Extra, ...] = ()
+    accuracy: str = ""
+    accuracy_example: Any = "1 kHz"
+    sound: bool = True
+    build: Callable[[Verb, Given, Subject], Any] | None = None
+    adapt: Callable[[Any, Mapping[str, Any]], Any] | None = None
+    check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
+
+    @cached_property
+    def fields(self) -> dict[str, Field]:
+        """Every declared input by its identity: of the subject, the request and of what is shown."""
+        return {**self.subject.fields, **all_fields(self.request), **all_fields(self.shown)}
+
+    @cached_property
+    def options(self) -> dict[str, Field]:
+        """The declared inputs that the command line has options for."""
+        inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
+        return {name: one for name, one in inputs.items() if one.flag}
+
+    def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
+        """The request that was asked for, and of what.
+
+        Raises ValueError, with the input as the user calls it, for what cannot be.
+        """
+        early = Given({name: value for name, value in given.values.items() if name not in self.subject.fields}, given.style)
+        check_early(self.request, early)
+        subject = self.subject.read(given, place, self)
+        names = {one.name: one.called(given.style) for one in self.fields.values() if one.called(given.style)}
+        with renaming(names):
+            if self.build is not None:
+                return self.build(self, given, subject), subject
+            values = read_fields(self.request, given, subject)
+            return self.request(**subject.values, **values), subject
+
+    def read_shown(self, given: Given) -> Any:
+        """The options of the verb itself."""
+        return read_instance(self.shown, given)
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """What a scene in a folder holds, by dotted key, to ask for the same again."""
+        return {**self.subject.saved(request, subject, folder), **written_fields(request)}
+
+    def output(self, name: str) -> Output:
+        """A file by its name."""
+        return next(one for one in self.outputs if one.name == name)
+
+
+def check_early(structure: type, given: Given) -> None:
+    """ValueError for a text that no subject could make right: before anything is read."""
+    for one in all_fields(structure).values():
+        if given.has(one):
+            one.read(given.of(one), given.style)
+
+
+def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Path], None]]:
+    """What writes each file of a verb, by its name."""
+
+    def rows(path: Path) -> None:
+        """The table as a file."""
+        from rotor.formats import write
+
+        write(verb.table(answer), path, settings=dict(report.provenance))
+
+    def writer(one: Output) -> Callable[[Path], None]:
+        return rows if one.write is None else lambda path: one.write(answer, path, report)  # type: ignore[misc]
+
+    return {one.name: writer(one) for one in verb.outputs if not one.grows}
+
+
+SCENE_VERBS = (
+    "spectrum", "levels", "raman", "thermo", "tumble", "gas", "fluid", "stark", "zeeman", "align", "fit", "emission",
+)  # fmt: skip
+
+
+def verb_of(name: str) -> Verb:
+    """The verb of a name; only its module is imported."""
+    found: Verb = import_module(f"rotor.verbs.{name}").VERB
+    return found
