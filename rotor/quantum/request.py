@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_positive, require_top, require_whole
+from rotor.checks import require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.limits import limit_facts
+from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 
@@ -40,21 +42,23 @@ class LevelsRequest:
     """
 
     top: Top
-    jmax: int = DEFAULT_JMAX
-    jmin: int = 0
-    kmin: int | None = None
-    kmax: int | None = None
-    max_energy_mhz: float | None = None
-    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    jmax: int = declared(DEFAULT_JMAX, Whole(0), "Highest J", "observables.jmax", common=True)
+    jmin: int = declared(0, Whole(0), "Lowest J", "observables.jmin", option="--j", hidden=True)
+    kmin: int | None = declared(
+        None, Whole(0), "Lowest |K|, or Ka (Kc of a near-oblate top)", "observables.kmin", option="--k", hidden=True, example=0
+    )
+    kmax: int | None = declared(None, Whole(0), "Highest |K|, likewise", "observables.kmax", option="--k", hidden=True, example=3)
+    max_energy_mhz: float | None = declared(
+        None, Quantity("MHz", above=0, metavar="E"), "Highest energy above the lowest level that exists (MHz; 10cm-1, 50K)",
+        "observables.max_energy", common=True, example="10 cm-1",
+    )  # fmt: skip
+    effects: tuple[QuantumEffect, ...] = effects_field()
 
     def __post_init__(self) -> None:
         require_top(self.top)
-        require_whole("jmin", self.jmin, 0)
+        check_fields(self)
         require_whole("jmax", self.jmax, self.jmin)
-        require_whole("kmin", self.kmin, 0)
         require_whole("kmax", self.kmax, self.kmin or 0)
-        if self.max_energy_mhz is not None:
-            require_positive("max_energy_mhz", self.max_energy_mhz)
         if (self.kmin is not None or self.kmax is not None) and self.top.kind in ("linear", "spherical"):
             raise ValueError(f"kmax: the levels of a {self.top.kind} top have no K; give J alone")
 

@@ -35,7 +35,7 @@ class Field:
 
     reader: how a value is read and written, with its unit and bounds. help: one line, without the unit. key: table and key of a scene;
     without a table a key that stands before the first; "" is not in a scene. option: on the command line; None: derived from the key, "":
-    none. none: the word for None. common: whether --help shows the option, --help-all shows all. example: of a template, where the
+    none. hidden: the option is one that stands for several fields, see `rotor.verbs.verb.Extra`. none: the word for None. common: whether --help shows the option, --help-all shows all. example: of a template, where the
     default is nothing. typed: the default as a person writes it, where it is not plain. panel: heading in --help. name, default: filled in.
     """
 
@@ -43,6 +43,7 @@ class Field:
     help: str
     key: str = ""
     option: str | None = None
+    hidden: bool = False
     none: str | None = None
     common: bool = False
     example: Any = None

@@ -332,3 +332,18 @@ class Custom(Reader):
     def write(self, value: Any) -> Any:
         """By the function."""
         return self.writing(value)
+
+
+def whole_range(text: str) -> tuple[int, int]:
+    """First and last of a range of whole numbers.
+
+    >>> whole_range("2:5"), whole_range("3")
+    ((2, 5), (3, 3))
+    """
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) > 2 or not all(part.isdecimal() for part in parts):
+        raise ValueError(f"{text!r}: expected a whole number or a range of them, such as 2:5")
+    first, last = int(parts[0]), int(parts[-1])
+    if first > last:
+        raise ValueError(f"{text!r}: expected a range that rises, but {first} is above {last}")
+    return first, last

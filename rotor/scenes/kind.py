@@ -81,7 +81,7 @@ def kind_of_verb(verb: Verb) -> Kind:
 
     def request(scene: Any, folder: Where) -> Any:
         asked = verb.read(given_of(scene, verb), Place(folder))[0]
-        return asked if verb.adapt is None else verb.adapt(asked, outputs_of(scene, verb))
+        return asked if verb.adapt is None else verb.adapt(asked, outputs_of(scene, verb), given_of(scene, verb))
 
     def answer(asked: Any, scene: Any, out: Where, executor: Executor | None) -> Any:
         with renaming({one.name: one.key for one in verb.fields.values() if one.key}):

@@ -13,16 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of, require_positive, require_top, require_whole
+from rotor.checks import require_one_of, require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.field import check_fields, declared, identical, part
+from rotor.requests.readers import INFINITE, Flag, Quantity, Range, Text, Whole
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
 from rotor.thermodynamics import VibrationalStates
 from rotor.thermodynamics.partition_table import partition_facts
+from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts, without_constants
 
@@ -40,12 +43,19 @@ NO_DIPOLE = "none: a rigid spherical top has no rotational lines"
 class GasLayer:
     """A layer of gas: partial pressure of the molecules meant in bar, length in cm."""
 
-    pressure_bar: float
-    path_cm: float
+    pressure_bar: float = declared(
+        None, Quantity("bar", above=0, metavar="P"), "Pressure of these molecules (bar), for optical depths; with the path",
+        "conditions.pressure", example="1 mbar",
+    )  # fmt: skip
+    path_cm: float = declared(
+        None, Quantity("cm", above=0, metavar="L"), "Length of the layer of gas (cm); with the pressure", "conditions.path", example="1 m"
+    )
 
     def __post_init__(self) -> None:
-        require_positive("pressure_bar", self.pressure_bar)
-        require_positive("path_cm", self.path_cm)
+        for name in ("pressure_bar", "path_cm"):
+            if getattr(self, name) is None:
+                raise ValueError(f"{name}: an optical depth needs it")
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -61,30 +71,39 @@ class SpectrumRequest:
     """
 
     top: Top
-    temperature_k: float = 300.0
-    jmax: int | None = None
-    min_lgint: float | None = DEFAULT_MIN_LGINT
-    range_mhz: tuple[float, float] = (0.0, math.inf)
-    q: float | None = None
-    vibrational_factor: float = 1.0
-    vibrations: VibrationalStates | None = None
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
+    )
+    jmax: int | None = declared(None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40)
+    min_lgint: float | None = declared(
+        DEFAULT_MIN_LGINT, Quantity(least=-300, most=300), "Leave out lines with log10(nm² MHz) below; or 'none'",
+        "observables.min_lgint", none="none", common=True,
+    )  # fmt: skip
+    range_mhz: tuple[float, float] = declared(
+        INFINITE, Range("MHz"), "First and last frequency, such as 0:2000GHz (MHz)", "conditions.range", common=True, example="2:18GHz"
+    )
+    q: float | None = declared(
+        None, Quantity(above=0, metavar="Q"), "Partition function to use instead of the summed one", "observables.q", example=1000.0
+    )
+    vibrational_factor: float = declared(1.0, Quantity(above=0), "Multiplies Q", "observables.vibrational_factor")
+    vibrations: VibrationalStates | None = vibrations_field()
     covariance: Covariance | None = None
-    profile: str | None = None
-    fwhm_mhz: float | None = None
-    layer: GasLayer | None = None
-    untrusted: bool = False
-    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    profile: str | None = declared(
+        None, Text(PROFILES, "NAME"), "sticks, gaussian, lorentzian or voigt", "observables.profile", common=True, example="gaussian"
+    )
+    fwhm_mhz: float | None = declared(
+        None, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum (MHz); by default Doppler's", "observables.fwhm",
+        common=True, example="1 MHz",
+    )  # fmt: skip
+    layer: GasLayer | None = part(GasLayer, identical, identical, whole=True, why="an optical depth needs both")
+    untrusted: bool = declared(
+        False, Flag(), "List lines of levels beyond the reach of the constants too", "observables.untrusted"
+    )
+    effects: tuple[QuantumEffect, ...] = effects_field()
 
     def __post_init__(self) -> None:
         require_top(self.top)
-        require_positive("temperature_k", self.temperature_k)
-        require_whole("jmax", self.jmax, 0)
-        require_positive("vibrational_factor", self.vibrational_factor)
-        for name in ("q", "fwhm_mhz"):
-            if getattr(self, name) is not None:
-                require_positive(name, getattr(self, name))
-        if self.min_lgint is not None and not math.isfinite(self.min_lgint):
-            raise ValueError(f"min_lgint: {self.min_lgint}: expected a finite number, or None for every allowed line")
+        check_fields(self)
         first, last = self.range_mhz
         if not first < last:
             raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")

@@ -172,7 +172,7 @@ class Verb:
     and rows: its key in the JSON. show: prints the report. content: further keys of the JSON. notes: remarks on an answer. nothing: why
     there is nothing to draw. shown: options of printing and files, a dataclass of declared fields. drawn: unit of the horizontal
     axis of the picture; None where there is none to change; spectral: a picture of a spectrum. workers: whether --workers spreads the
-    work, and over what. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user. start: what a template has switched on. check: of a request beside the files that are asked for.
+    work, and over what. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user. start: what a template has switched on. check: of a request beside the files that are asked for. adapt: the request to those files.
     """
 
     name: str
@@ -199,7 +199,7 @@ class Verb:
     accuracy_example: Any = "1 kHz"
     sound: bool = True
     build: Callable[[Verb, Given, Subject], Any] | None = None
-    adapt: Callable[[Any, Mapping[str, Any]], Any] | None = None
+    adapt: Callable[[Any, Mapping[str, Any], Given], Any] | None = None
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
 
     @cached_property
@@ -211,7 +211,7 @@ class Verb:
     def options(self) -> dict[str, Field]:
         """The declared inputs that the command line has options for."""
         inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
-        return {name: one for name, one in inputs.items() if one.flag}
+        return {name: one for name, one in inputs.items() if one.flag and not one.hidden}
 
     def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
         """The request that was asked for, and of what.

@@ -28,7 +28,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     view = picture_settings(verb, typed, "--plot" in files.paths)
     request, subject = verb.read(given, Place(".", note))
     outputs = {verb_name(name): path for name, path in files.paths.items()}
-    request = request if verb.adapt is None else verb.adapt(request, outputs)
+    request = request if verb.adapt is None else verb.adapt(request, outputs, given)
     if verb.check is not None:
         verb.check(request, outputs, shown)
     with working(verb, typed) as executor, answering() if verb.sound else naming(verb):
