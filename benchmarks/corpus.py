@@ -18,6 +18,7 @@ import io
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 import tempfile
@@ -27,7 +28,11 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-TIMED = re.compile(r"\"(seconds|processor_time_s)\": [^,\n]*|seconds +\S+|\(\S+ s\)|rotor_version\": \"[^\"]*\"|\"version\": \"[^\"]*\"")
+CASES = HERE / "corpus_cases"
+SCENES = (CASES / "scenes.txt").read_text(encoding="utf-8").split("\n----\n")
+TIMED = re.compile(
+    r"\"(seconds|processor_time_s)\": [^,\n]*|seconds +\S+|\(\S+ s\)|rotor_version\": \"[^\"]*\"|\"version\": \"[^\"]*\""
+)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 MOST_SECONDS = 60
 BINARY = (".png", ".pdf", ".svg", ".parquet", ".npz", ".traj")
@@ -35,11 +40,9 @@ BINARY = (".png", ".pdf", ".svg", ".parquet", ".npz", ".traj")
 
 def cases() -> list[tuple[str, list[str]]]:
     """Name and words of every case; a scene is written to s.toml and run."""
-    import corpus_cases
-
-    commands = [(f"{number:03d} {line}", words_of(line)) for number, line in enumerate(corpus_cases.COMMANDS)]
-    scenes = [(f"scene {number:02d}", ["run", "s.toml"]) for number in range(len(corpus_cases.SCENES))]
-    return commands + scenes
+    lines = (CASES / "commands.txt").read_text(encoding="utf-8").splitlines()
+    commands = [(f"{number:03d} {line}", words_of(line)) for number, line in enumerate(lines)]
+    return commands + [(f"scene {number:02d}", ["run", "s.toml"]) for number in range(len(SCENES))]
 
 
 def words_of(text: str) -> list[str]:
@@ -50,20 +53,16 @@ def words_of(text: str) -> list[str]:
 def record(path: Path, checkout: Path, only: str) -> None:
     """Run every case with the package of a checkout, or those whose name has a text or whose scene is of that kind."""
     sys.path.insert(0, str(checkout))
-    sys.path.insert(1, str(HERE))
-    import corpus_cases
-
     import rotor
 
     assert Path(rotor.__file__).resolve().parents[1] == checkout, rotor.__file__
     results: dict[str, Any] = {}
     for name, words in cases():
-        scene = corpus_cases.SCENES[int(name[6:])] if name.startswith("scene ") else ""
+        scene = SCENES[int(name[6:])] if name.startswith("scene ") else ""
         if not (only in name or f'kind = "{only}"' in scene):
             continue
         with tempfile.TemporaryDirectory(prefix="corpus-") as folder:
-            for file, text in corpus_cases.FILES.items():
-                Path(folder, file).write_text(text, encoding="utf-8")
+            shutil.copytree(CASES / "inputs", folder, dirs_exist_ok=True)
             if name.startswith("scene "):
                 Path(folder, "s.toml").write_text(scene, encoding="utf-8")
             inputs = {one.name for one in Path(folder).iterdir()}
@@ -94,7 +93,9 @@ def run(words: list[str], folder: Path, inputs: set[str]) -> dict[str, Any]:
         if path.is_file() and path.name not in inputs:
             binary = path.suffix in BINARY
             files[path.name] = "binary" if binary else path.read_text("utf-8", errors="replace")[:40_000]
-    texts = {"out": out.getvalue()[:60_000], "err": err.getvalue()} | {f"file {name}": text for name, text in files.items()}
+    texts = {"out": out.getvalue()[:60_000], "err": err.getvalue()} | {
+        f"file {name}": text for name, text in files.items()
+    }
     clean = {name: TIMED.sub("", text.replace(str(folder), "FOLDER")) for name, text in texts.items()}
     return {"code": code, "seconds": round(time.process_time() - start, 3), **clean}
 

@@ -206,7 +206,7 @@ def slow(path):
     Path(path).write_text("half")
     print("writing", flush=True)
     time.sleep(60)
-import rotor.cli.spectrum as spectrum
+import rotor.verbs.spectrum as spectrum
 from rotor.cli.shared.output import Files
 write = Files.write
 Files.write = lambda self, writers: write(self, dict.fromkeys(writers, slow))

@@ -120,23 +120,15 @@ def test_the_json_schema_knows_every_key():
     assert '"description"' in schema
 
 
-def test_nothing_of_the_physics_is_loaded_by_a_scene_alone():
+def test_nothing_heavy_is_loaded_by_a_scene_alone():
     code = (
         "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
         f"parse_scene({HEAD!r})\n"
-        "print(sorted(m for m in sys.modules if m.startswith('rotor.') or m in ('numpy', 'scipy', 'pydantic', 'numba')))"
+        "print(sorted(m for m in sys.modules if '.' not in m))"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert eval(ran.stdout) == [
-        "rotor.scenes",
-        "rotor.scenes.effect_sections",
-        "rotor.scenes.fit_sections",
-        "rotor.scenes.scene",
-        "rotor.scenes.scene_file",
-        "rotor.scenes.sections",
-        "rotor.scenes.verbs",
-        "rotor.version",
-    ]
+    loaded = {name.partition(".")[0] for name in eval(ran.stdout)}
+    assert loaded.isdisjoint({"scipy", "pydantic", "numba", "ase", "rdkit", "matplotlib"})
 
 
 def test_defaults_are_left_out_of_a_file():

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option, parsed, quantity
 from rotor.cli.shared.options import file_option, grouped, option
@@ -23,6 +22,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.reports.sources import with_sources

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.checks import require_whole
-from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.field_maps import (
     accuracy_fact,
@@ -31,6 +30,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.polarizability import with_polarizability
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.reports.sources import with_sources
 from rotor.reports.top_facts import model_facts

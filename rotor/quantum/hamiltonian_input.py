@@ -23,7 +23,9 @@ _KNOWN = frozenset({"rigid rotor", "centrifugal distortion", "interacting states
 class HamiltonianInput:
     """What the Hamiltonian consists of besides the rigid rotor."""
 
-    distortion: bool = declared(True, Flag(), "Centrifugal distortion, as far as constants are there", "effects.distortion", option="")
+    distortion: bool = declared(
+        True, Flag(), "Centrifugal distortion, as far as constants are there", "effects.distortion", option=""
+    )
     hyperfine: bool | None = declared(
         None, Flag(off=True), "Split by the spins of nuclei; by default where their constants are given", "effects.hyperfine",
         common=True, example=True,
@@ -52,6 +54,8 @@ def takes_spins(hyperfine: bool | None, subject: Any) -> bool:
 def effects_from(given: HamiltonianInput, subject: Any) -> Any:
     """The Hamiltonian that is asked for, of the top of a subject."""
     _refuse_method_alone(given, subject)
+    if "top" not in subject.values:  # files that name their effects themselves
+        return SEMI_RIGID
     return effects_of_top(given, subject.top, takes_spins(given.hyperfine, subject))
 
 

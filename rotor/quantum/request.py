@@ -45,9 +45,17 @@ class LevelsRequest:
     jmax: int = declared(DEFAULT_JMAX, Whole(0), "Highest J", "observables.jmax", common=True)
     jmin: int = declared(0, Whole(0), "Lowest J", "observables.jmin", option="--j", hidden=True)
     kmin: int | None = declared(
-        None, Whole(0), "Lowest |K|, or Ka (Kc of a near-oblate top)", "observables.kmin", option="--k", hidden=True, example=0
+        None,
+        Whole(0),
+        "Lowest |K|, or Ka (Kc of a near-oblate top)",
+        "observables.kmin",
+        option="--k",
+        hidden=True,
+        example=0,
     )
-    kmax: int | None = declared(None, Whole(0), "Highest |K|, likewise", "observables.kmax", option="--k", hidden=True, example=3)
+    kmax: int | None = declared(
+        None, Whole(0), "Highest |K|, likewise", "observables.kmax", option="--k", hidden=True, example=3
+    )
     max_energy_mhz: float | None = declared(
         None, Quantity("MHz", above=0, metavar="E"), "Highest energy above the lowest level that exists (MHz; 10cm-1, 50K)",
         "observables.max_energy", common=True, example="10 cm-1",

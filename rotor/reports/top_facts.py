@@ -27,9 +27,9 @@ NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitud
 
 def begin(command: str, text: str) -> dict[str, Any]:
     """The first keys of every JSON: version, command line, and the input as given."""
-    import rotor
+    from rotor.version import version
 
-    return {"rotor_version": rotor.__version__, "command": command, "input": text}
+    return {"rotor_version": version(), "command": command, "input": text}
 
 
 def describe(top: Top, text: str, command: str) -> dict[str, Any]:

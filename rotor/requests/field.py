@@ -33,10 +33,12 @@ _DECLARED, _PART = "declared", "part"
 class Field:
     """What is known of a field.
 
-    reader: how a value is read and written, with its unit and bounds. help: one line, without the unit. key: table and key of a scene;
+    reader: how a value is read and written, with its unit and bounds. help: one line, without a full stop. key: table and key of a scene;
     without a table a key that stands before the first; "" is not in a scene. option: on the command line; None: derived from the key, "":
-    none. hidden: the option is one that stands for several fields, see `rotor.verbs.verb.Extra`. none: the word for None. common: whether --help shows the option, --help-all shows all. example: of a template, where the
-    default is nothing. typed: the default as a person writes it, where it is not plain. panel: heading in --help. name, default: filled in.
+    none; one that does not begin with "-" stands without a name. hidden: the option is one that stands for several fields, see
+    `rotor.verbs.verb.Extra`. none: the word for None. common: whether --help shows the option; --help-all shows all. example: of a
+    template, where the default is nothing. typed: the default as a person writes it, where it is not plain. panel: heading in --help.
+    name, default: filled in.
     """
 
     reader: Reader
@@ -117,9 +119,9 @@ class Field:
 class Part:
     """A field of a request that is made from several declared values, which stand in a dataclass of their own.
 
-    inputs: that dataclass. make: the value of the field from an instance and the subject (a molecule, ...). split: the instance that gives
-    a value back, from the value and the request; None where all is left out. whole: all of the inputs or none of them; single: at most one of
-    them; why: what an error says of that.
+    inputs: that dataclass. make: the value of the field from an instance and the subject (a molecule, ...). split: the instance that
+    gives a value back, from the value and the request; None where all is left out. whole: all of the inputs or none of them; single: at
+    most one of them; why: what an error says of that.
     """
 
     inputs: type
@@ -138,7 +140,9 @@ def declared(default: Any, reader: Reader, help: str, key: str = "", **more: Any
     return dataclass_field(default=default, metadata=metadata)
 
 
-def part(inputs: type, make: Callable[[Any, Any], Any], split: Callable[[Any, Any], Any], default: Any = None, **more: Any) -> Any:
+def part(
+    inputs: type, make: Callable[[Any, Any], Any], split: Callable[[Any, Any], Any], default: Any = None, **more: Any
+) -> Any:
     """A field of a dataclass that several declared values make; default: of the field."""
     return dataclass_field(default=default, metadata={_PART: Part(inputs, make, split, **more)})
 
@@ -149,40 +153,46 @@ def identical(value: Any, _: Any) -> Any:
 
 
 @cache
-def own_fields(structure: type) -> dict[str, Field]:
+def own_fields(structure: Any) -> dict[str, Field]:
     """The declared fields of a dataclass by their names, parts left out."""
     from dataclasses import replace
 
     assert is_dataclass(structure)
-    return {one.name: replace(one.metadata[_DECLARED], name=one.name) for one in fields(structure) if _DECLARED in one.metadata}
+    return {
+        one.name: replace(one.metadata[_DECLARED], name=one.name)
+        for one in fields(structure)
+        if _DECLARED in one.metadata
+    }
 
 
 @cache
-def parts_of(structure: type) -> dict[str, Part]:
+def parts_of(structure: Any) -> dict[str, Part]:
     """The parts of a dataclass by their names."""
-    return {one.name: one.metadata[_PART] for one in fields(structure) if _PART in one.metadata}  # type: ignore[arg-type]
+    return {one.name: one.metadata[_PART] for one in fields(structure) if _PART in one.metadata}
 
 
 @cache
-def all_fields(structure: type) -> dict[str, Field]:
+def all_fields(structure: Any) -> dict[str, Field]:
     """Every declared field of a request by its identity, those of its parts among them, in the order in which they stand."""
     found: dict[str, Field] = {}
-    for one in fields(structure):  # type: ignore[arg-type]
+    for one in fields(structure):
         if _DECLARED in one.metadata:
             field = own_fields(structure)[one.name]
             found[field.identity] = field
         elif _PART in one.metadata:
-            found |= all_fields(one.metadata[_PART].inputs)
+            inner: Any = parts_of(structure)[one.name].inputs
+            found |= all_fields(inner)
     return found
 
 
 def check_fields(request: Any) -> None:
     """ValueError, with the name of the field, for a value of a request that the bounds of its declaration exclude."""
-    for name, field in own_fields(type(request)).items():
+    structure: Any = type(request)
+    for name, field in own_fields(structure).items():
         field.check(getattr(request, name))
 
 
-def names_of(structure: type, style: str) -> Iterator[tuple[str, str]]:
+def names_of(structure: Any, style: str) -> Iterator[tuple[str, str]]:
     """Name of every field of a request, and how errors call it."""
     for field in all_fields(structure).values():
         yield field.name, field.called(style)

@@ -26,14 +26,16 @@ class Given:
         """Whether a field was given."""
         return self.values.get(one.identity) is not None
 
-    def among(self, structure: type) -> list[Field]:
+    def among(self, structure: Any) -> list[Field]:
         """The fields of a dataclass that were given."""
         return [one for one in all_fields(structure).values() if self.has(one)]
 
 
-def read_fields(structure: type, given: Given, subject: Any = None) -> dict[str, Any]:
+def read_fields(structure: Any, given: Given, subject: Any = None) -> dict[str, Any]:
     """Values of the fields of a dataclass that were given, by name, parts made for a subject; what was not given is left out."""
-    values = {name: one.read(given.of(one), given.style) for name, one in own_fields(structure).items() if given.has(one)}
+    values = {
+        name: one.read(given.of(one), given.style) for name, one in own_fields(structure).items() if given.has(one)
+    }
     for name, one in parts_of(structure).items():
         made = _make(one, given, subject)
         if made is not None:
@@ -55,14 +57,14 @@ def _make(part: Part, given: Given, subject: Any) -> Any:
         return part.make(part.inputs(**inner), subject)
 
 
-def read_instance(structure: type, given: Given, subject: Any = None) -> Any:
+def read_instance(structure: Any, given: Given, subject: Any = None) -> Any:
     """An instance of a dataclass whose fields are all declared."""
     with called(structure, given.style):
         return structure(**read_fields(structure, given, subject))
 
 
 @contextmanager
-def called(structure: type, style: str) -> Iterator[None]:
+def called(structure: Any, style: str) -> Iterator[None]:
     """Inside, a ValueError that names fields of a request calls them as the user does."""
     with renaming({name: text for name, text in names_of(structure, style) if text}):
         yield
@@ -92,7 +94,7 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 def written_fields(request: Any) -> dict[str, Any]:
     """What a scene holds of a request, by the key, values that are the default left out."""
     found: dict[str, Any] = {}
-    structure = type(request)
+    structure: Any = type(request)
     for name, one in own_fields(structure).items():
         value = getattr(request, name)
         if one.key and not equal(value, one.default):
@@ -111,7 +113,10 @@ def equal(value: Any, default: Any) -> bool:
     if isinstance(value, list | tuple) and isinstance(default, list | tuple):
         return len(value) == len(default) and all(map(equal, value, default))
     return (type(value) is type(default) and bool(value == default)) or (
-        isinstance(value, int | float) and isinstance(default, int | float) and not isinstance(value, bool) and value == default
+        isinstance(value, int | float)
+        and isinstance(default, int | float)
+        and not isinstance(value, bool)
+        and value == default
     )
 
 
@@ -141,5 +146,3 @@ def flattened(tables: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
         if inner is not None:
             found[key] = inner
     return found
-
-

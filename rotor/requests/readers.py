@@ -123,7 +123,9 @@ class Quantity(Reader):
 
     def check(self, value: float, given: Any = None) -> None:
         """ValueError for a number out of bounds; given: what was typed."""
-        text = f"{value:g}" if given is None or not isinstance(given, str) else given
+        text = given if isinstance(given, str) else f"{value:g}"
+        if not math.isfinite(value):
+            raise ValueError(f"{text}: expected a finite number")
         if (self.above is not None and not value > self.above) or (self.below is not None and not value < self.below):
             raise ValueError(f"{text}: expected {self._rule()}")
         if (self.least is not None and value < self.least) or (self.most is not None and value > self.most):
@@ -250,7 +252,9 @@ class Numbers(Reader):
         if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
             words = {1: "one", 3: "three"}
             count = " or ".join(words.get(n, str(n)) for n in self.counts)
-            raise ValueError(f"{given!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
+            raise ValueError(
+                f"{given!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}"
+            )
         return values
 
     def write(self, value: Any) -> list[float]:
@@ -285,17 +289,18 @@ class Names(Reader):
 
 @dataclass(frozen=True)
 class Pairs(Reader):
-    """Numbers by name: `ee=1,eo=3`, or a table. number: of a text, the type of the values."""
+    """Numbers by name: `ee=1,eo=3`, or a table. number: the type of the values. what: the names are of."""
 
     number: type = int
+    what: str = "class"
     example: str = "ee=1"
     metavar: str = "LIST"
     lower: bool = False
 
     @property
-    def scene_type(self) -> Any:  # type: ignore[override]
+    def scene_type(self) -> Any:
         """A table of numbers."""
-        return dict[str, self.number]  # type: ignore[name-defined]
+        return dict[str, int] if self.number is int else dict[str, float]
 
     def read(self, given: Any) -> dict[str, Any]:
         """The numbers by name."""
@@ -306,7 +311,7 @@ class Pairs(Reader):
             name, _, number = (part.strip() for part in item.partition("="))
             name = name.lower() if self.lower else name
             if not name or not self._is_number(number) or name in table:
-                rule = f"name=number, each once, such as {self.example}"
+                rule = f"{self.what}=number, each {self.what} once, such as {self.example}"
                 raise ValueError(f"{item.strip()!r} in {given!r}: expected {rule}")
             table[name] = self.number(number)
         return table

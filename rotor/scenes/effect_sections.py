@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 
 import msgspec
 
-from rotor.scenes.sections import Section, said
+from rotor.verbs.tables import Section, said
 
 Vector = list[float]
 Matrix = list[float | list[float]]

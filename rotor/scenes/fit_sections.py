@@ -6,7 +6,8 @@ from typing import Annotated
 
 from msgspec import field
 
-from rotor.scenes.sections import Quantity, Section, said
+from rotor.scenes.sections import Quantity
+from rotor.verbs.tables import Section, said
 
 
 class FitLines(Section, frozen=True):

@@ -37,7 +37,7 @@ class NoResultError(RuntimeError):
     """A scene that could be run and has no result, such as a fit that does not converge; nothing is written."""
 
 
-def _no_writers(answer: Any, scene: Any) -> Mapping[str, Writer]:
+def _no_writers(answer: Any, scene: Any, provenance: Mapping[str, Any]) -> Mapping[str, Writer]:
     return {}
 
 
@@ -55,7 +55,7 @@ class Kind:
     answer: Callable[[Any, Any, Where, Executor | None], Any]
     table: Callable[[Any], Table]
     saved: Callable[[Any, MoleculeSection | None], Scene]
-    writers: Callable[[Any, Any], Mapping[str, Writer]] = _no_writers
+    writers: Callable[..., Mapping[str, Writer]] = _no_writers
     grows: frozenset[str] = frozenset()
     names: Mapping[str, str] = field(default_factory=dict)
 
@@ -70,8 +70,9 @@ def _kind(name: str) -> Kind:
     from importlib.util import find_spec
 
     if find_spec(f"rotor.scenes.kinds.{name}") is not None:
-        found: Kind = import_module(f"rotor.scenes.kinds.{name}").KIND
-        return found
+        written: Kind = import_module(f"rotor.scenes.kinds.{name}").KIND
+        old = written.writers
+        return written if old is _no_writers else replace(written, writers=lambda answer, scene, _: old(answer, scene))
     return kind_of_verb(verb_of(name))
 
 
@@ -85,15 +86,19 @@ def kind_of_verb(verb: Verb) -> Kind:
 
     def answer(asked: Any, scene: Any, out: Where, executor: Executor | None) -> Any:
         with renaming({one.name: one.key for one in verb.fields.values() if one.key}):
-            return verb.answer(asked, Work(executor, out, verb.read_shown(given_of(scene, verb)), outputs_of(scene, verb, out)))
+            return verb.answer(
+                asked, Work(executor, out, verb.read_shown(given_of(scene, verb)), outputs_of(scene, verb, out))
+            )
 
     def saved(asked: Any, molecule: Any) -> Scene:
         raise NotImplementedError
 
-    def writers(found: Any, scene: Any) -> Mapping[str, Writer]:
-        report = Report({**found.facts(), **verb.content(found, verb.read_shown(given_of(scene, verb)))}, verb.read_shown(given_of(scene, verb)))
-        view = {} if verb.spectral else WHOLE
-        return {name: write for name, write in files_of(verb, found, replace(report, view=view)).items() if verb.output(name).write}
+    def writers(found: Any, scene: Any, provenance: Mapping[str, Any]) -> Mapping[str, Writer]:
+        given = given_of(scene, verb)
+        shown = verb.read_shown(given)
+        content = {**found.facts(), **verb.content(found, shown)}
+        report = Report(content, shown, given, provenance, {} if verb.spectral else WHOLE)
+        return files_of(verb, found, report)
 
     names = {one.name: one.key for one in verb.fields.values() if one.key}
     grows = frozenset(one.name for one in verb.outputs if one.grows)
@@ -104,7 +109,9 @@ def outputs_of(scene: Any, verb: Verb, out: Where = ".") -> dict[str, tuple[Path
     """The files that a scene names, counted from a folder."""
     named = {one.name: getattr(scene.outputs, one.name) for one in verb.outputs if one.scene}
     return {
-        name: tuple(Path(out) / one for one in (value if isinstance(value, list) else [value])) for name, value in named.items() if value
+        name: tuple(Path(out) / one for one in (value if isinstance(value, list) else [value]))
+        for name, value in named.items()
+        if value
     }
 
 

@@ -169,6 +169,6 @@ def _write(
 
         write(table, path, settings=provenance)
 
-    writers: dict[str, Writer] = {"csv": rows, "parquet": rows, "json": rows, **kind.writers(answer, scene)}
+    writers: dict[str, Writer] = {"csv": rows, "parquet": rows, "json": rows, **kind.writers(answer, scene, provenance)}
     asked = {path: writers[name] for name, paths in targets.items() if name not in kind.grows for path in paths}
     write_together(asked)

@@ -20,7 +20,6 @@ from rotor.scenes.sections import (
     AlignConditions,
     AlignNumerics,
     AlignObservables,
-    BasisNumerics,
     BodySection,
     EmissionConditions,
     EmissionObservables,
@@ -33,15 +32,10 @@ from rotor.scenes.sections import (
     GasConditions,
     GasNumerics,
     GasObservables,
-    LevelsObservables,
-    LevelsOutputs,
     MagneticSection,
     MoleculeSection,
     PulseSection,
     QuantumEffects,
-    SpectrumConditions,
-    SpectrumObservables,
-    SpectrumOutputs,
     StarkConditions,
     StarkNumerics,
     StarkObservables,
@@ -55,9 +49,9 @@ from rotor.scenes.sections import (
     ZeemanConditions,
     ZeemanNumerics,
     ZeemanObservables,
-    said,
 )
 from rotor.scenes.verbs import VERBS
+from rotor.verbs.tables import said
 from rotor.verbs.verb import SCENE_VERBS
 
 if TYPE_CHECKING:
@@ -112,29 +106,6 @@ class SceneResult:
     files: tuple[Path, ...]
     seconds: float
     reached: Reached | None = None
-
-
-class SpectrumScene(Scene, frozen=True, tag="spectrum"):
-    """Rotational lines of a molecule."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    effects: QuantumEffects = QuantumEffects()
-    accuracy: Annotated[str | float | None, said("of the frequencies", "1 kHz")] = None
-    conditions: SpectrumConditions = SpectrumConditions()
-    observables: SpectrumObservables = SpectrumObservables()
-    vibration: VibrationSection = VibrationSection()
-    numerics: BasisNumerics = BasisNumerics()
-    outputs: SpectrumOutputs = SpectrumOutputs()
-
-
-class LevelsScene(Scene, frozen=True, tag="levels"):
-    """Energy levels of a molecule."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    effects: QuantumEffects = QuantumEffects()
-    accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
-    observables: LevelsObservables = LevelsObservables()
-    outputs: LevelsOutputs = LevelsOutputs()
 
 
 class ThermoScene(Scene, frozen=True, tag="thermo"):
@@ -247,8 +218,6 @@ class EmissionScene(Scene, frozen=True, tag="emission"):
 
 
 _WRITTEN: Mapping[str, type[Scene]] = {
-    "spectrum": SpectrumScene,
-    "levels": LevelsScene,
     "thermo": ThermoScene,
     "tumble": TumbleScene,
     "gas": GasScene,
@@ -295,7 +264,7 @@ def __getattr__(name: str) -> Any:
 def molecule_of(scene: Scene) -> MoleculeSection | None:
     """The molecule of a scene as a table, a name alone being its source; None where the scene has none.
 
-    >>> molecule_of(SpectrumScene(molecule="water")).source
+    >>> molecule_of(ThermoScene(molecule="water")).source
     'water'
     """
     given = getattr(scene, "molecule", None)

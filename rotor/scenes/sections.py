@@ -73,64 +73,10 @@ class VibrationSection(Section, frozen=True):
     states: Annotated[str | list[list[float]] | None, said("of single states, likewise (cm⁻¹)", "859,520x2")] = None
 
 
-class SpectrumConditions(Section, frozen=True):
-    """The gas, and the range that is looked at."""
-
-    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
-    range: Annotated[str | None, said("first and last frequency (MHz)", "2:18GHz")] = None
-    pressure: Annotated[Quantity | None, said("of these molecules, for optical depths; with path (bar)", "1 mbar")] = (
-        None
-    )
-    path: Annotated[Quantity | None, said("length of the layer of gas (cm)", "1 m")] = None
-
-
-class SpectrumObservables(Section, frozen=True):
-    """Which lines, and their shape."""
-
-    min_lgint: Annotated[float | str, said('least log10 of the intensity (nm² MHz), or "none"')] = -12.0
-    profile: Annotated[str | None, said("sticks, gaussian, lorentzian or voigt", "gaussian")] = None
-    fwhm: Annotated[Quantity | None, said("full width at half maximum; Doppler's by default (MHz)", "1 MHz")] = None
-    untrusted: Annotated[bool, said("lines of levels beyond the reach of the distortion constants too")] = False
-    q: Annotated[float | None, said("partition function instead of the summed one", 1000.0)] = None
-    vibrational_factor: Annotated[float, said("multiplies the partition function")] = 1.0
-
-
 class BasisNumerics(Section, frozen=True):
     """Knobs; what is left out is chosen."""
 
     jmax: Annotated[int | None, said("highest J", 40)] = None
-
-
-class SpectrumOutputs(Section, frozen=True):
-    """Files to write."""
-
-    csv: Annotated[str | None, said("all lines", "lines.csv")] = None
-    parquet: Annotated[str | None, said("all lines", "lines.parquet")] = None
-    json: Annotated[str | None, said("all lines", "lines.json")] = None
-    cat: Annotated[str | None, said("catalogue of 80 columns", "lines.cat")] = None
-    tag: Annotated[int, said("tag of the species in the catalogue")] = 0
-    profile_csv: Annotated[str | None, said("the profile on its grid", "profile.csv")] = None
-    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "lines.png")] = None
-
-
-class LevelsObservables(Section, frozen=True):
-    """Which levels."""
-
-    jmin: Annotated[int, said("lowest J")] = 0
-    jmax: Annotated[int, said("highest J")] = 10
-    kmin: Annotated[int | None, said("lowest |K|, or Ka (Kc of a near-oblate top)", 0)] = None
-    kmax: Annotated[int | None, said("highest |K|, likewise", 3)] = None
-    max_energy: Annotated[Quantity | None, said("above the lowest level that exists (MHz)", "10 cm-1")] = None
-
-
-class LevelsOutputs(Section, frozen=True):
-    """Files to write."""
-
-    csv: Annotated[str | None, said("all levels", "levels.csv")] = None
-    parquet: Annotated[str | None, said("all levels", "levels.parquet")] = None
-    json: Annotated[str | None, said("all levels", "levels.json")] = None
-    egy: Annotated[str | None, said("list of SPCAT", "levels.egy")] = None
-    plot: Annotated[str | None, said("term diagram (.png, .pdf, .svg)", "levels.png")] = None
 
 
 class TableOutputs(Section, frozen=True):

@@ -14,6 +14,7 @@ from rotor.requests.fill import Given, flattened, nested
 from rotor.verbs.tables import outputs_class, said, section_class
 from rotor.verbs.verb import Verb, verb_of
 
+
 def keyed(verb: Verb) -> dict[str, Field]:
     """The inputs of a verb that stand in a scene, by dotted key."""
     return {one.key: one for one in verb.fields.values() if one.key}
@@ -44,11 +45,11 @@ def tables_of(verb: Verb) -> dict[str, Any]:
     """The tables of a verb's scene, outputs last."""
     grouped: dict[str, list[Field]] = {}
     taken = {name for name, _, _ in verb.subject.scene_fields()}
-    for key, one in keyed(verb).items():
+    for one in keyed(verb).values():
         if one.table.partition(".")[0] not in taken and one.table:
             grouped.setdefault(one.table, []).append(one)
     outputs = tuple(grouped.pop("outputs", ()))
-    tables = {table: section_class(table, tuple(grouped[table])) for table in sorted(grouped, key=_place)}
+    tables = {table: section_class(table, tuple(grouped[table]), verb.name) for table in sorted(grouped, key=_place)}
     return tables | {"outputs": outputs_class(verb.name, tuple(one for one in verb.outputs if one.scene), outputs)}
 
 
@@ -70,7 +71,10 @@ def saved_scene(verb: Verb, request: Any, subject: Any, folder: Path, outputs: M
     """The scene of a request that was answered. outputs: files by name. given: settings of files among it."""
     from rotor.scenes.scene_file import scene_of
 
-    flat = {**verb.saved(request, subject, folder), **{f"outputs.{name}": _plain(value) for name, value in outputs.items()}}
+    flat = {
+        **verb.saved(request, subject, folder),
+        **{f"outputs.{name}": _plain(value) for name, value in outputs.items()},
+    }
     for key, one in keyed(verb).items():
         if one.table == "outputs" and given.has(one):
             flat[key] = one.write(one.read(given.of(one), given.style))

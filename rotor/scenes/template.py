@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, get_args, get_type_hints
 
 import msgspec
 
 from rotor.scenes.scene import KINDS, SCHEMA
 from rotor.scenes.scene_file import structures_in, toml_value
+from rotor.verbs.verb import verb_of
 
 STARTS: dict[str, dict[str, Any]] = {
-    "spectrum": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "spectrum.csv"},
-    "levels": {"molecule.source": "water", "observables.jmax": 10, "outputs.csv": "levels.csv"},
-    "raman": {"molecule.source": "N2", "conditions.temperature": "300 K", "outputs.csv": "raman.csv"},
     "thermo": {"molecule.source": "water", "conditions.temperature": "10:1000K:100", "outputs.csv": "thermo.csv"},
     "tumble": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},
     "gas": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "gas.csv"},
@@ -65,6 +64,15 @@ def template(kind: str) -> str:
     return "\n".join([*head, *_lines(KINDS[kind], kind, ""), ""])
 
 
+@cache
+def _start(kind: str) -> dict[str, Any]:
+    """What a template has switched on, by dotted name."""
+    found = dict(STARTS[kind] if kind in STARTS else verb_of(kind).start)
+    if isinstance(found.get("molecule"), str):
+        found["molecule.source"] = found.pop("molecule")
+    return found
+
+
 def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
     """Lines of a table: its keys, then the tables in it."""
     hints = get_type_hints(structure, include_extras=True)
@@ -76,7 +84,7 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
         if structures:
             inner.append((one.name, structures[0], one.name == "body" or (one.name == "effects" and kind == "tumble")))
         else:
-            yield _key_line(one, hints[one.name], STARTS[kind].get(f"{place}{one.name}"))
+            yield _key_line(one, hints[one.name], _start(kind).get(f"{place}{one.name}"))
     for name, table, absent in inner:
         many = name in ("pulses", "molecules") or (name == "effects" and kind == "tumble")
         hash_ = "# " if absent else ""

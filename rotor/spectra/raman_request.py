@@ -46,17 +46,29 @@ class RamanRequest:
     """
 
     top: Top
-    temperature_k: float = declared(300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True)
-    laser_nm: float = declared(
-        DEFAULT_LASER_NM, Quantity("nm", above=0, metavar="W"), "Wavelength of the laser in vacuum (nm)", "conditions.laser", common=True
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
     )
-    jmax: int | None = declared(None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40)
+    laser_nm: float = declared(
+        DEFAULT_LASER_NM,
+        Quantity("nm", above=0, metavar="W"),
+        "Wavelength of the laser in vacuum (nm)",
+        "conditions.laser",
+        common=True,
+    )
+    jmax: int | None = declared(
+        None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40
+    )
     min_relative: float | None = declared(
         DEFAULT_MIN_RELATIVE, Quantity(above=0, below=1), "Leave out lines below X of the strongest; or 'none'",
         "observables.min_relative", none="none",
     )  # fmt: skip
     q: float | None = declared(
-        None, Quantity(above=0, metavar="Q"), "Partition function to use instead of the summed one", "observables.q", example=100.0
+        None,
+        Quantity(above=0, metavar="Q"),
+        "Partition function to use instead of the summed one",
+        "observables.q",
+        example=100.0,
     )
     vibrations: VibrationalStates | None = vibrations_field()
     effects: tuple[QuantumEffect, ...] = effects_field()

@@ -48,7 +48,11 @@ class GasLayer:
         "conditions.pressure", example="1 mbar",
     )  # fmt: skip
     path_cm: float = declared(
-        None, Quantity("cm", above=0, metavar="L"), "Length of the layer of gas (cm); with the pressure", "conditions.path", example="1 m"
+        None,
+        Quantity("cm", above=0, metavar="L"),
+        "Length of the layer of gas (cm); with the pressure",
+        "conditions.path",
+        example="1 m",
     )
 
     def __post_init__(self) -> None:
@@ -74,22 +78,38 @@ class SpectrumRequest:
     temperature_k: float = declared(
         300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
     )
-    jmax: int | None = declared(None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40)
+    jmax: int | None = declared(
+        None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40
+    )
     min_lgint: float | None = declared(
         DEFAULT_MIN_LGINT, Quantity(least=-300, most=300), "Leave out lines with log10(nm² MHz) below; or 'none'",
         "observables.min_lgint", none="none", common=True,
     )  # fmt: skip
     range_mhz: tuple[float, float] = declared(
-        INFINITE, Range("MHz"), "First and last frequency, such as 0:2000GHz (MHz)", "conditions.range", common=True, example="2:18GHz"
+        INFINITE,
+        Range("MHz"),
+        "First and last frequency, such as 0:2000GHz (MHz)",
+        "conditions.range",
+        common=True,
+        example="2:18GHz",
     )
     q: float | None = declared(
-        None, Quantity(above=0, metavar="Q"), "Partition function to use instead of the summed one", "observables.q", example=1000.0
+        None,
+        Quantity(above=0, metavar="Q"),
+        "Partition function to use instead of the summed one",
+        "observables.q",
+        example=1000.0,
     )
     vibrational_factor: float = declared(1.0, Quantity(above=0), "Multiplies Q", "observables.vibrational_factor")
     vibrations: VibrationalStates | None = vibrations_field()
     covariance: Covariance | None = None
     profile: str | None = declared(
-        None, Text(PROFILES, "NAME"), "sticks, gaussian, lorentzian or voigt", "observables.profile", common=True, example="gaussian"
+        None,
+        Text(PROFILES, "NAME"),
+        "sticks, gaussian, lorentzian or voigt",
+        "observables.profile",
+        common=True,
+        example="gaussian",
     )
     fwhm_mhz: float | None = declared(
         None, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum (MHz); by default Doppler's", "observables.fwhm",

@@ -33,7 +33,12 @@ class MoleculeInput:
     """Which molecule; either `source` or `constants`."""
 
     source: Any = declared(
-        None, Text(), "File, name, SMILES:... or - for standard input", "molecule.source", option="SOURCE", example="water"
+        None,
+        Text(),
+        "File, name, SMILES:... or - for standard input",
+        "molecule.source",
+        option="SOURCE",
+        example="water",
     )
     constants: str | None = declared(
         None, Text(), 'Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz)', "molecule.constants",
@@ -89,7 +94,12 @@ class MoleculeInput:
         "molecule.state_symmetry", panel=SPINS, example="C2v",
     )  # fmt: skip
     state_names: str | None = declared(
-        None, Text(metavar="LIST"), "Names of all states, from 0 on: 0+,0-", "molecule.state_names", panel=SPINS, example="0+,0-"
+        None,
+        Text(metavar="LIST"),
+        "Names of all states, from 0 on: 0+,0-",
+        "molecule.state_names",
+        panel=SPINS,
+        example="0+,0-",
     )
     calculator: str | None = declared(
         None, Text(metavar="NAME"), "Refine the geometry with an ASE calculator of that name, such as xtb or psi4",
@@ -166,7 +176,9 @@ def top_of(reading: Reading) -> Top:
     top = _from_source(reading) if given.constants is None else _from_constants(reading)
     if given.dipole_abc is not None:
         abc = given.dipole_abc
-        top = reading.within("dipole_abc", lambda: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes")))
+        top = reading.within(
+            "dipole_abc", lambda: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes"))
+        )
     if given.dipole is not None:
         top = reading.within("dipole", lambda: _with_dipole_of_input(top, reading))
     if given.polarizability is not None or given.anisotropy is not None:
@@ -185,6 +197,8 @@ def _refuse_contradictions(reading: Reading) -> None:
     given, named = reading.given, reading.named
     if (given.source is None) == (given.constants is None):
         both = "both were given" if given.source is not None else "neither was given"
+        if reading.style == "key":
+            raise ValueError("molecule: give either source or constants")
         source = "a source" if reading.style == "option" else named("source")
         raise ValueError(
             f"expected either {source} or {named('constants')}, and {both}; give one of them, such as the name water"
@@ -206,7 +220,9 @@ def _from_constants(reading: Reading) -> Top:
     text = reading.given.constants or ""
     top = reading.within("constants", lambda: Top.from_constants(text, source=reading.source("constants")))
     if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
-        reading.note(f"{reading.named('constants')}: no unit is given, so the numbers are MHz; for GHz write '{text} GHz'")
+        reading.note(
+            f"{reading.named('constants')}: no unit is given, so the numbers are MHz; for GHz write '{text} GHz'"
+        )
     return top
 
 
@@ -279,7 +295,9 @@ def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
     import numpy as np
 
     if top.frame is None:
-        raise ValueError(f"this is in the frame of a geometry, and there is none here; use {reading.named('dipole_abc')}")
+        raise ValueError(
+            f"this is in the frame of a geometry, and there is none here; use {reading.named('dipole_abc')}"
+        )
     vector = (top.frame.axes @ np.array(reading.given.dipole)).tolist()
     return top.with_dipole(vector, reading.source("dipole", " in the frame of the input"))
 
@@ -327,7 +345,9 @@ def _with_spins(top: Top, reading: Reading) -> Top:
     if given.spin_constants is None:
         if given.spins is not None:
             named = reading.named
-            raise ValueError(f"{named('spins')}: says how large the spins of {named('spin_constants')} are; give those too")
+            raise ValueError(
+                f"{named('spins')}: says how large the spins of {named('spin_constants')} are; give those too"
+            )
         return top
     from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
 

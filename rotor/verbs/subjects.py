@@ -84,9 +84,13 @@ def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
     if molecule.source == "-":
         raise ValueError("--save-scene: the molecule came from standard input, which a scene has not; give a file")
     if molecule.source is not None and not isinstance(molecule.source, str):
-        raise ValueError(f"a scene holds no {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants")
+        raise ValueError(
+            f"a scene holds no {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
+        )
     if molecule.source is not None and molecule.source.endswith(".int"):
-        raise ValueError("--save-scene: an .int file and the constants beside it say all themselves; a scene holds none")
+        raise ValueError(
+            "--save-scene: an .int file and the constants beside it say all themselves; a scene holds none"
+        )
     content = written_fields(molecule)
     for name in FILES:
         key = f"molecule.{name}"

@@ -34,16 +34,22 @@ TITLES = {
 }
 
 
-@cache
-def section_class(table: str, inputs: tuple[Field, ...]) -> Any:
-    """The structure of a table."""
-    return _structure(table, [_entry(one) for one in inputs])
+_MADE: dict[tuple[Any, ...], Any] = {}
 
 
-def _structure(table: str, entries: list[Any]) -> Any:
+def section_class(table: str, inputs: tuple[Field, ...], owner: str = "") -> Any:
+    """The structure of a table; the same inputs have the same structure. owner: the kind of scene, for the name."""
+    key = (table, inputs)
+    if key not in _MADE:
+        _MADE[key] = _structure(table, [_entry(one) for one in inputs], owner)
+    return _MADE[key]
+
+
+def _structure(table: str, entries: list[Any], owner: str) -> Any:
+    name = owner.capitalize() + table.rpartition(".")[2].capitalize()
     made = msgspec.defstruct(
-        table.rpartition(".")[2].capitalize() + "Section", entries, bases=(Section,), frozen=True, kw_only=True,
-        forbid_unknown_fields=True, omit_defaults=True, module=__name__,
+        name, entries, bases=(Section,), frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True,
+        module=__name__,
     )  # fmt: skip
     made.__doc__ = TITLES.get(table, "Settings.")
     return made
@@ -78,7 +84,11 @@ def _default(one: Field) -> Any:
         return one.reader.show(one.default) or None
     if isinstance(one.reader, Quantity) and one.reader.unit:
         return one.reader.show(one.default)
-    return one.reader.write(one.default) if isinstance(one.reader, Grid | Pairs) or isinstance(one.default, tuple) else one.default
+    return (
+        one.reader.write(one.default)
+        if isinstance(one.reader, Grid | Pairs) or isinstance(one.default, tuple)
+        else one.default
+    )
 
 
 @cache
@@ -87,9 +97,13 @@ def outputs_class(kind: str, files: tuple[Output, ...], settings: tuple[Field, .
     entries: list[Any] = []
     for one in files:
         if one.many:
-            entries.append((one.name, Annotated[list[str], said(one.help, [one.example])], msgspec.field(default_factory=list)))
+            entries.append(
+                (one.name, Annotated[list[str], said(one.help, [one.example])], msgspec.field(default_factory=list))
+            )
         else:
             entries.append((one.name, Annotated[str | None, said(one.help, one.example)], None))
-    if any(one.name == "parquet" for one in files):
-        entries.insert(2, ("json", Annotated[str | None, said("Write the table as JSON", "out.json")], None))
-    return _structure("outputs", [*entries, *map(_entry, settings)])
+    names = [one.name for one in files]
+    if "parquet" in names:
+        after = names.index("parquet") + 1
+        entries.insert(after, ("json", Annotated[str | None, said("Write the table as JSON", "out.json")], None))
+    return _structure("outputs", [*entries, *map(_entry, settings)], kind)

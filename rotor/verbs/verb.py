@@ -138,7 +138,7 @@ class Extra:
 class SubjectKind:
     """How a verb is told what it computes of; the base class: of nothing."""
 
-    fields: Mapping[str, Field] = {}  # noqa: RUF012
+    fields: Mapping[str, Field] = {}
 
     @property
     def options(self) -> Mapping[str, Field]:
@@ -169,10 +169,14 @@ class Verb:
     """One verb.
 
     about: one line. examples: of the command line. request: a dataclass of declared fields. answer: of a request. table: of an answer,
-    and rows: its key in the JSON. show: prints the report. content: further keys of the JSON. notes: remarks on an answer. nothing: why
-    there is nothing to draw. shown: options of printing and files, a dataclass of declared fields. drawn: unit of the horizontal
-    axis of the picture; None where there is none to change; spectral: a picture of a spectrum. workers: whether --workers spreads the
-    work, and over what. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user. start: what a template has switched on. check: of a request beside the files that are asked for. adapt: the request to those files.
+    and rows: its key in the JSON. show: prints the report. outputs: files. subject: what is computed of. shown: options of printing and
+    files, a dataclass of declared fields. content: further keys of the JSON. notes: remarks on an answer. nothing: why there is nothing
+    to draw. drawn: unit of the horizontal axis of the picture, None where there is none to change; spectral: a picture of a spectrum;
+    scaled: with --plot-scale. workers: what --workers spreads. start: what a template has switched on. extras: options that stand for
+    several fields. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
+
+    build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
+    these files.
     """
 
     name: str
@@ -218,10 +222,12 @@ class Verb:
 
         Raises ValueError, with the input as the user calls it, for what cannot be.
         """
-        early = Given({name: value for name, value in given.values.items() if name not in self.subject.fields}, given.style)
+        early = Given(
+            {name: value for name, value in given.values.items() if name not in self.subject.fields}, given.style
+        )
         check_early(self.request, early)
         subject = self.subject.read(given, place, self)
-        names = {one.name: one.called(given.style) for one in self.fields.values() if one.called(given.style)}
+        names = {one.name: one.called(given.style) for one in all_fields(self.request).values()}
         with renaming(names):
             if self.build is not None:
                 return self.build(self, given, subject), subject

@@ -44,14 +44,19 @@ class Parameter:
 def parameters_of(verb: Verb) -> list[Parameter]:
     """Every option of a verb."""
     found = [_input(one) for one in verb.options.values()]
-    found += [Parameter(one.option, one.option, one.help, one.metavar, one.panel, one.common, str, False, one.many) for one in verb.extras]
+    found += [
+        Parameter(one.option, one.option, one.help, one.metavar, one.panel, one.common, str, False, one.many)
+        for one in verb.extras
+    ]
     found += [_file(one) for one in verb.outputs]
     found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
     if any(one.name == "plot" for one in verb.outputs) and verb.drawn is not None:
         found += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
     if verb.workers:
-        found.append(Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS))
+        found.append(
+            Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS)
+        )
     return found
 
 
@@ -74,7 +79,9 @@ def _input(one: Field) -> Parameter:
     help_ = f"{one.help} [{default}]" if default else one.help
     metavar = one.metavar or one.reader.metavar
     off = isinstance(one.reader, Flag) and one.reader.off
-    return Parameter(one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many)
+    return Parameter(
+        one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many
+    )
 
 
 def _default_text(one: Field) -> str:
@@ -102,7 +109,9 @@ def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]
     parameters += [_signature_of(one) for one in every]
     if any(not one.common for one in every):
         everything = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
-        parameters.append(inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=everything, annotation=bool))
+        parameters.append(
+            inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=everything, annotation=bool)
+        )
     call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     call.__annotations__ = {one.name: one.annotation for one in parameters}
     call.__doc__ = verb.about
@@ -115,7 +124,7 @@ def _signature_of(one: Parameter) -> inspect.Parameter:
         default = typer.Argument(None, show_default=False, metavar=one.flag, help=f"{one.help}.")
     else:
         names = f"{one.flag}/--no-{one.flag[2:]}" if one.off else one.flag
-        settings = {} if one.kind is bool else {"metavar": one.metavar}
+        settings: dict[str, Any] = {} if one.kind is bool else {"metavar": one.metavar}
         panel = f"{'' if one.common else '+'}{one.panel}"
         default = typer.Option(None, names, show_default=False, help=f"{one.help}.", rich_help_panel=panel, **settings)
     return inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
@@ -161,7 +170,9 @@ class PanelCommand(PlainCommand):
         panels: dict[str, list[tuple[str, str]]] = {}
         for one in self.get_params(ctx):
             record = one.get_help_record(ctx)
-            panel = getattr(one, "rich_help_panel", None) or ("Arguments" if record and not one.opts[0].startswith("-") else "Help")
+            panel = getattr(one, "rich_help_panel", None) or (
+                "Arguments" if record and not one.opts[0].startswith("-") else "Help"
+            )
             if record is not None and (every or not panel.startswith("+")):
                 panels.setdefault(panel.lstrip("+"), []).append(record)
         for panel in ("Arguments", *PANELS, "Help"):

@@ -32,7 +32,9 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     if verb.check is not None:
         verb.check(request, outputs, shown)
     with working(verb, typed) as executor, answering() if verb.sound else naming(verb):
-        answer = answer_of(verb, request, Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True))
+        answer = answer_of(
+            verb, request, Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True)
+        )
     head = {"command": str(context.obj), "input": subject.text}
     report = report_of(verb, answer, head, given, view)
     refuse_nothing_to_draw(verb, answer, files)
@@ -42,7 +44,12 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
     if "--save-scene" in files.paths:
         writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
-    deliver(files, writers, lambda: json_with_rows(verb.table(answer), verb.rows, report.content), lambda: verb.show(answer, report))
+    deliver(
+        files,
+        writers,
+        lambda: json_with_rows(verb.table(answer), verb.rows, report.content),
+        lambda: verb.show(answer, report),
+    )
 
 
 def answer_of(verb: Verb, request: Any, work: Work) -> Any:

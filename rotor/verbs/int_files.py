@@ -1,0 +1,155 @@
+"""`rotor spectrum case.int`: what SPCAT computes from that file and the .var or .par beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.requests.fill import Given
+from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
+from rotor.verbs.verb import Note, Report
+
+if TYPE_CHECKING:
+    from rotor.formats.spcat.predict import Prediction
+    from rotor.formats.spcat.text.egy import LevelList
+
+# what the .int and its parameter file say themselves: input of the verb -> field of the files
+ANSWERED = {
+    "conditions.temperature": "TEMP",
+    "numerics.jmax": "FEND",
+    "observables.min_lgint": "STR0 and STR1",
+    "conditions.range": "FQLIM",
+    "observables.q": "QROT",
+    "observables.vibrational_factor": "QROT",
+    "vibration.fundamentals": "QROT",
+    "vibration.states": "QROT",
+    "outputs.tag": "TAG",
+    "molecule.dipole": "the dipoles",
+    "molecule.dipole_abc": "the dipoles",
+    "molecule.isotopes": "the constants",
+    "molecule.spin_weights": "WTPL and WTMN",
+    "molecule.spin_constants": "the constants",
+    "molecule.spins": "SPIND",
+    "molecule.state_constants": "the constants",
+    "molecule.state_dipoles": "the dipoles",
+    "molecule.state_weights": "EWT",
+    "molecule.state_symmetry": "the constants",
+    "molecule.state_names": "the constants",
+    "effects.hyperfine": "SPIND",
+    "effects.hyperfine_method": "SPIND",
+    "effects.hyperfine_tolerance": "SPIND",
+    "molecule.constants": "the constants",
+    "molecule.calculator": "the constants",
+}
+
+
+@dataclass(frozen=True)
+class PredictedRequest(SpectrumRequest):
+    """The request that the files of SPCAT make; prediction: its lines. source: the .int file. basis: how it was chosen."""
+
+    prediction: Any = None
+    source: str = ""
+    basis: tuple[tuple[str, bool], ...] = ()
+
+
+def is_int_file(source: Any) -> bool:
+    """Whether the source is an .int file."""
+    return isinstance(source, str) and source.lower().endswith(".int")
+
+
+def predicted(source: str, given: Given, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
+    """The prediction of an .int file; its notes are remarks. Inputs that the files answer themselves are refused.
+
+    called: the name of an input, by its identity. basis: as_spcat and full_basis.
+    """
+    for identity, field in ANSWERED.items():
+        if given.values.get(identity) is not None:
+            raise ValueError(
+                f"{called(identity)}: {source} says that itself ({field}); change it there, or give its .var instead"
+            )
+    from rotor.formats.spcat.predict import predict_file
+
+    prediction = predict_file(source, **basis)
+    for text in prediction.notes:
+        note(text)
+    return with_names(prediction, Path(source))
+
+
+def with_names(prediction: Prediction, source: Path) -> Prediction:
+    """The prediction with the named constants of its files, their spins and states, where all have names; else as it is."""
+    from rotor.formats.read_write import read_spcat_top
+    from rotor.quantum.effects.of_top import effects_of
+
+    lines = prediction.lines
+    if lines.levels.of_named_constants:
+        return prediction
+    try:
+        top = read_spcat_top(source)
+        effects = effects_of(top, top.spin_constants is not None)
+    except ValueError:
+        return prediction
+    levels = replace(lines.levels, effects=effects)
+    return replace(prediction, lines=replace(lines, top=top, levels=levels))
+
+
+def request_of(prediction: Prediction, source: str, shape: dict[str, Any], **basis: bool) -> PredictedRequest:
+    """The request that the files of a prediction make; shape: profile, width and layer."""
+    asked, lines = prediction.request, prediction.lines
+    return PredictedRequest(
+        lines.top,
+        temperature_k=asked.temperature_k,
+        jmax=asked.fend,
+        min_lgint=asked.str0,
+        range_mhz=lines.range_mhz,
+        q=prediction.q,
+        prediction=prediction,
+        source=source,
+        basis=tuple(basis.items()),
+        **shape,
+    )
+
+
+def answer_of(request: PredictedRequest) -> SpectrumAnswer:
+    """The lines of the prediction."""
+    return SpectrumAnswer(request, request.prediction.lines)
+
+
+def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
+    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.spcat.text.cat import write_cat
+
+    prediction = _prediction(answer)
+    write_cat(prediction.catalogue, path)
+    record = record_of(prediction.lines, dict(report.provenance))
+    write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
+
+
+def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The levels as SPCAT lists them."""
+    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.spcat.text.egy import write_egy
+
+    levels = _levels_of(answer)
+    write_egy(levels, path)
+    record = record_of(_prediction(answer).lines, dict(report.provenance))
+    write_beside(path, record | {"levels": len(levels)})
+
+
+def _levels_of(answer: SpectrumAnswer) -> LevelList:
+    """The levels as SPCAT lists them."""
+    request = answer.request
+    assert isinstance(request, PredictedRequest)
+    from rotor.formats.spcat.predict import levels_of_file
+
+    listed = request.prediction.levels
+    found: LevelList = levels_of_file(request.source, **dict(request.basis)) if listed is None else listed
+    return found
+
+
+def _prediction(answer: SpectrumAnswer) -> Prediction:
+    assert isinstance(answer.request, PredictedRequest)
+    found: Prediction = answer.request.prediction
+    return found

@@ -1,0 +1,150 @@
+"""`levels`: the energy levels of a molecule, as a table and as a term diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
+from rotor.reports import top_facts
+from rotor.reports.line_tables import the_first
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.reports.spins import hyperfine_lines
+from rotor.requests.field import OBSERVABLES, OUTPUT, declared
+from rotor.requests.readers import Text, Whole, whole_range
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Shown, Verb
+
+COLUMNS = {"MHz": ("energy_mhz", "{:.4f}"), "cm-1": ("energy_cm", "{:.6f}"), "K": ("energy_k", "{:.6f}")}
+
+EXAMPLES = """\b
+Examples:
+  rotor levels water
+  rotor levels water --jmax 4 --unit K --csv water.csv --plot terms.png
+  rotor levels CH3CN --k 0:3 --jmax 20 --egy levels.egy
+  rotor levels formamide --hyperfine --jmax 3
+  rotor levels --constants "A=9.2 B=3 C=2.5 GHz" --j 2:5 --max-energy 10cm-1"""
+
+
+@dataclass(frozen=True)
+class LevelsShown(Shown):
+    """How levels are shown."""
+
+    unit: str = declared(
+        "cm-1",
+        Text(tuple(COLUMNS), "UNIT"),
+        "Of the table and the diagram: MHz, cm-1 or K",
+        option="--unit",
+        panel=OUTPUT,
+    )
+    top_levels: int = declared(60, Whole(0), "How many of the lowest levels are shown", option="--top", panel=OUTPUT)
+
+
+def _span(name: str) -> Any:
+    """What reads `2:5` as the least and the largest value of a quantum number."""
+
+    def read(text: str) -> Mapping[str, Any]:
+        first, last = whole_range(text)
+        return {f"observables.{name}min": first, f"observables.{name}max": last}
+
+    return read
+
+
+def draw(answer: LevelsAnswer, path: Path, report: Report) -> None:
+    """The term diagram as a file."""
+    from rotor.plots.levels import plot_levels
+
+    unit = report.shown.unit
+    plot_levels(answer.table, answer.request.top, path, unit=unit, view=report.view, provenance=dict(report.provenance))
+
+
+def show(answer: LevelsAnswer, report: Report) -> None:
+    """Print constants and the lowest levels."""
+    top = answer.request.top
+    print(top_facts.heading(top))
+    show_facts(_facts(answer, report.content))
+    if len(answer.table) and report.shown.top_levels:
+        print()
+        show_table(_table(answer, report.shown))
+    print()
+    sources = source_facts(top, ("constants", "spin weights"), report.sources)
+    show_facts([*sources, *top_facts.model_facts(report.content)])
+
+
+def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top, request = answer.request.top, answer.request
+    between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
+    limits = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
+    if request.kmin is not None or request.kmax is not None:
+        limits += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
+    if request.max_energy_mhz is not None:
+        limits += f", up to {request.max_energy_mhz:g} MHz"
+    ground = f"{round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
+    return [
+        ("constants", top_facts.constants_text(top)),
+        ("spin weights", top_facts.weights_text(content["spin_weights"])),
+        *top_facts.states_facts(top)[:1],
+        ("levels", f"{len(answer.table)}: {limits}"),
+        ("lowest", f"{ground}: energies count from there"),
+        *hyperfine_lines(content["hyperfine"]),
+    ]
+
+
+def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
+    """The lowest levels, in order of energy."""
+    import numpy as np
+
+    from rotor.quantum import quanta
+
+    table = answer.table
+    rows = np.argsort(table.energy_mhz, kind="stable")[: shown.top_levels]
+    name, form = COLUMNS[shown.unit]
+    energy, columns = getattr(table, name)[rows], table.columns
+    labels = table.levels.labels(table.rows[rows])
+    numbers = energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist()
+    cells = [(label, form.format(e), str(weight), str(g)) for label, e, weight, g in zip(labels, *numbers, strict=True)]
+    title = the_first(len(rows), "lowest level") if len(rows) < len(table) else "all levels"
+    head = (quanta.headings(table.levels.quanta_names), f"E ({shown.unit})", "spin weight", "g")
+    return Table(f"{title}, in order of energy", head, cells)
+
+
+VERB = Verb(
+    name="levels",
+    about="Energy levels of a molecule: quantum numbers, energies, degeneracies, term diagram.",
+    examples=EXAMPLES,
+    request=LevelsRequest,
+    answer=lambda request, work: answer_levels(request, work.executor),
+    table=lambda answer: answer.table,
+    rows="levels",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write all levels as CSV", example="levels.csv"),
+        Output("parquet", (".parquet",), "Write all levels as Parquet", example="levels.parquet"),
+        Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),
+        Output("plot", PICTURES, "Draw the term diagram (.png, .pdf, .svg)", draw, "levels.png"),
+    ),
+    subject=OneMolecule(("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles")),
+    shown=LevelsShown,
+    notes=lambda answer: answer.warnings,
+    nothing=lambda answer: "" if len(answer.table) else "there is no level in this range",
+    scaled=False,
+    extras=(
+        Extra(
+            "--j",
+            "A:B",
+            "First and last J, such as 2:5; or one J",
+            _span("j"),
+            ("observables.jmax",),
+            OBSERVABLES,
+            True,
+        ),
+        Extra(
+            "--k", "A:B", "First and last |K|, or Ka (Kc of a near-oblate top); or one K", _span("k"), (), OBSERVABLES
+        ),
+    ),
+    accuracy="of the energies",
+    start={"molecule": "water", "observables.jmax": 10, "outputs.csv": "levels.csv"},
+)

@@ -1,0 +1,308 @@
+"""`spectrum`: the rotational lines of a molecule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports import top_facts
+from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
+from rotor.reports.screen import show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.reports.spins import hyperfine_lines
+from rotor.requests.field import OBSERVABLES, OUTPUT, declared
+from rotor.requests.fill import Given, read_fields, read_instance
+from rotor.requests.readers import Custom, Flag, Quantity, Whole
+from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
+from rotor.verbs import int_files
+from rotor.verbs.molecule import has_unit, with_some_dipole
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.spectra.lines import Lines
+
+MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
+HITRAN_K = 296.0
+_FILE_ALONE = {"as_spcat": "--as-spcat", "full_basis": "--full-basis"}
+
+EXAMPLES = """\b
+Examples:
+  rotor spectrum water
+  rotor spectrum "SMILES:C=O" --temperature 100
+  rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png
+  rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20
+  rotor spectrum case.int --cat case.cat"""
+
+
+def _hitran_numbers(given: Any) -> tuple[int, int]:
+    words = str(given).split(":")
+    if len(words) > 2 or not all(word.isdecimal() and 0 < int(word) < 100 for word in words):
+        raise ValueError(f"{given!r}: expected HITRAN's number of the molecule, such as 5 or 5:1")
+    return int(words[0]), int(words[1]) if len(words) == 2 else 1
+
+
+@dataclass(frozen=True)
+class SpectrumShown(Shown):
+    """What is shown of the lines, and how files are written."""
+
+    resolution: float | None = declared(
+        None, Quantity("MHz", above=0, metavar="D"), "Show components of one rotational line that are closer (MHz) as one line",
+        option="--resolution", panel=OBSERVABLES,
+    )  # fmt: skip
+    as_spcat: bool = declared(
+        False, Flag(), "Of an .int file: SPCAT's own numbers also where the program errs (notes say where)", option="--as-spcat",
+        panel=OBSERVABLES,
+    )  # fmt: skip
+    full_basis: bool = declared(
+        False,
+        Flag(),
+        "Of an .int file: every K is in the basis, whatever KNMIN and KNMAX say",
+        option="--full-basis",
+        panel=OBSERVABLES,
+    )
+    top_lines: int = declared(20, Whole(0), "How many of the strongest lines are shown", option="--top", panel=OUTPUT)
+    tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
+    hitran_id: tuple[int, int] | None = declared(
+        None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1", option="--hitran-id",
+        panel=OUTPUT,
+    )  # fmt: skip
+
+
+class MoleculeOrFile(OneMolecule):
+    """A molecule with its dipole, or an .int file, which makes the request itself."""
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The top of the molecule, or the prediction of the file."""
+        shown, source = read_instance(SpectrumShown, given), given.values.get("molecule.source")
+        basis = {name: getattr(shown, name) for name in _FILE_ALONE}
+        if not int_files.is_int_file(source):
+            for name in (name for name, on in basis.items() if on):
+                raise ValueError(
+                    f"{_FILE_ALONE[name]}: expected with an .int file, which SPCAT reads with the .var beside it"
+                )
+            return super().read(given, place, verb)
+
+        def called(identity: str) -> str:
+            return verb.fields[identity].called(given.style)
+
+        path = str(Path(place.folder) / str(source)) if given.style == "key" else str(source)
+        prediction = int_files.predicted(path, given, called, place.note, **basis)
+        return Subject({"prediction": prediction, "source": path, **basis}, (), str(source), place.note)
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The inputs of the molecule; an .int file is refused."""
+        if not subject.molecules:
+            raise ValueError(
+                "--save-scene: an .int file and the constants beside it say all themselves; a scene holds none"
+            )
+        return super().saved(request, subject, folder)
+
+
+def build(verb: Verb, given: Given, subject: Subject) -> SpectrumRequest:
+    """The request: of the inputs, or of the files of SPCAT with a shape of the lines."""
+    values = read_fields(SpectrumRequest, given, subject)
+    if subject.molecules:
+        return SpectrumRequest(**subject.values, **values)
+    shape = {name: values.get(name) for name in ("profile", "fwhm_mhz", "layer")}
+    basis = {name: subject.values[name] for name in _FILE_ALONE}
+    return int_files.request_of(subject.values["prediction"], subject.values["source"], shape, **basis)
+
+
+def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], given: Given) -> SpectrumRequest:
+    """HITRAN's temperature where its records are asked for and none is given."""
+    if "hitran" in outputs and given.values.get("conditions.temperature") is None:
+        return replace(request, temperature_k=HITRAN_K)
+    return request
+
+
+def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumShown) -> None:
+    """ValueError for a profile without a file, a file without a profile, and what belongs to other files."""
+    if ("hitran" in outputs) != (shown.hitran_id is not None):
+        raise ValueError(
+            "--hitran and --hitran-id: give both; the second has HITRAN's number of the molecule, such as 5 or 5:1 of CO"
+        )
+    if "hitran" in outputs and request.temperature_k != HITRAN_K:
+        raise ValueError("--hitran: its intensities are those at 296 K; leave --temperature out, or give 296")
+    if "egy" in outputs and not isinstance(request, int_files.PredictedRequest):
+        raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
+    shaped = request.profile not in (None, "sticks") or request.fwhm_mhz is not None
+    if "profile_csv" in outputs and not (shaped or request.layer):
+        raise ValueError(
+            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
+        )
+    if shaped and not (request.layer or {"profile_csv", "plot"} & outputs.keys()):
+        what = request.profile or "gaussian"
+        raise ValueError(f"a {what} profile was asked for, but no file for it; add --plot or --profile-csv")
+
+
+def content(answer: SpectrumAnswer, shown: SpectrumShown) -> Mapping[str, Any]:
+    """Rows of the strongest lines, and patterns at a resolution."""
+    resolution = shown.resolution
+    patterns = None if resolution is None else pattern_records(answer.lines, resolution, shown.top_lines)
+    return {"strongest": answer.strongest(shown.top_lines), "patterns": patterns}
+
+
+def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The lines in the format of the suffix, with the numbers that it asks for."""
+    from rotor.formats import write
+
+    shown, numbers = report.shown, {}
+    if shown.hitran_id is not None:
+        numbers = dict(zip(("molecule", "isotopologue"), shown.hitran_id, strict=True))
+    write(answer.lines, path, settings={**report.provenance, "tag": tag_of(answer, shown), **numbers})
+
+
+def tag_of(answer: SpectrumAnswer, shown: SpectrumShown) -> int:
+    """The tag of the species: of the .int file, or as given."""
+    request = answer.request
+    return int(request.prediction.request.tag) if isinstance(request, int_files.PredictedRequest) else shown.tag
+
+
+def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The catalogue, as SPCAT lists it where its files were read."""
+    predicted = isinstance(answer.request, int_files.PredictedRequest)
+    (int_files.write_catalogue if predicted else write_table)(answer, path, report)
+
+
+def write_profile(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The profile on its grid."""
+    from rotor.formats import write
+
+    write(answer.spectrum, path, settings=report.command)
+
+
+def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.spectrum import plot_spectrum
+
+    thing = answer.lines if answer.request.shape == "sticks" else answer.spectrum
+    plot_spectrum(thing, path, provenance=report.command, **report.view)
+
+
+def show(answer: SpectrumAnswer, report: Report) -> None:
+    """Print constants, conditions and the strongest lines."""
+    lines, record = answer.lines, report.content
+    print(
+        top_facts.heading(lines.top)
+        if lines.levels.of_named_constants
+        else f"{lines.top.name}: levels of the file's own parameters"
+    )
+    show_facts(_facts(lines, record))
+    if len(lines) == 0:
+        print(f"\nno lines: {_why_none(answer, report.given)}")
+    elif record["patterns"] is not None:
+        from rotor.quantum.quanta import headings, of_rotation
+
+        print()
+        show_table(patterns_table(record["patterns"], headings(of_rotation(lines.levels.quanta))))
+    elif len(record["strongest"]):
+        print()
+        show_table(lines_table(lines, record["strongest"], record["optical_depth"]))
+    print()
+    sources = source_facts(lines.top, ("constants", "dipole", "spin weights"), report.sources)
+    show_facts([*sources, *top_facts.model_facts(record)])
+
+
+def _why_none(answer: SpectrumAnswer, given: Given) -> str:
+    reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
+    text = given.values.get("conditions.range")
+    if given.style != "option" or text is None or has_unit(text):
+        return reason
+    return f"{reason}; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
+
+
+def _facts(lines: Lines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top = lines.top
+    cut = "none: every allowed line" if record["min_lgint"] is None else f"lgint above {record['min_lgint']:g}"
+    spin_weights = record["spin_weights"]
+    named = lines.levels.of_named_constants
+    return [
+        ("constants", top_facts.constants_text(top) if named else "those of the file, which have no names here"),
+        ("dipole", top_facts.vector_text(top.dipole_abc_debye) if named else "the moments of the file"),
+        ("spin weights", "those of the file" if spin_weights is None else top_facts.weights_text(spin_weights)),
+        *top_facts.states_facts(top)[:MOST_FACTS_OF_STATES],
+        ("temperature", f"{lines.temperature_k:g} K"),
+        ("Q", top_facts.q_text(record["q"], classical=named)),
+        ("J max", f"{lines.jmax}: {record['jmax_source']}"),
+        ("cut", cut + _range_text(lines.range_mhz)),
+        *hyperfine_lines(record["hyperfine"]),
+        ("lines", _count_text(lines)),
+        *_layer_facts(record),
+    ]
+
+
+def _layer_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if record["column_per_cm2"] is None:
+        return []
+    width = "Doppler's width" if record["fwhm_mhz"] is None else f"FWHM {record['fwhm_mhz']:g} MHz"
+    layer = f"{record['pressure_bar']:g} bar, {record['path_cm']:g} cm: {record['column_per_cm2']:.6g} molecules/cm²"
+    return [("layer", f"{layer}; optical depths τ at line centres, {record['profile']} profile, {width}")]
+
+
+def _range_text(range_mhz: tuple[float, float]) -> str:
+    first, last = range_mhz
+    return "" if first <= 0 and math.isinf(last) else f", from {first:g} to {last:g} MHz"
+
+
+def _count_text(lines: Lines) -> str:
+    if not len(lines):
+        return "none"
+    return f"{len(lines)}, from {lines.frequency_mhz[0]:.4f} to {lines.frequency_mhz[-1]:.4f} MHz"
+
+
+def answer_of(request: SpectrumRequest, executor: Any) -> SpectrumAnswer:
+    """The lines of a request, or of the prediction that made it."""
+    return (
+        int_files.answer_of(request)
+        if isinstance(request, int_files.PredictedRequest)
+        else answer_spectrum(request, executor)
+    )
+
+
+VERB = Verb(
+    name="spectrum",
+    about="Rotational lines of a molecule: frequencies, intensities, and what they were made from.",
+    examples=EXAMPLES,
+    request=SpectrumRequest,
+    answer=lambda request, work: answer_of(request, work.executor),
+    table=lambda answer: answer.lines,
+    rows="lines",
+    show=show,
+    outputs=(
+        Output(
+            "cat", (".cat", ".cat.gz"), "Write a catalogue of 80 columns (.cat, .cat.gz)", write_catalogue, "lines.cat"
+        ),
+        Output(
+            "hitran", (".hitran",), "Write HITRAN records of 160 characters; with --hitran-id", write_table, scene=False
+        ),
+        Output(
+            "egy",
+            (".egy",),
+            "Of an .int file: write its levels as SPCAT's list (.egy)",
+            int_files.write_levels,
+            scene=False,
+        ),
+        Output("csv", (".csv",), "Write all lines as CSV", write_table, "lines.csv"),
+        Output("parquet", (".parquet",), "Write all lines as Parquet", write_table, "lines.parquet"),
+        Output("profile_csv", (".csv",), "Write the profile on its grid as CSV", write_profile, "profile.csv"),
+        Output("plot", PICTURES, "Draw the spectrum (.png, .pdf, .svg)", draw, "lines.png"),
+    ),
+    subject=MoleculeOrFile(
+        ("polarizability", "anisotropy"), lambda top, reading, given: with_some_dipole(top, reading)
+    ),
+    shown=SpectrumShown,
+    content=content,
+    notes=lambda answer: answer.lines.warnings,
+    nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
+    drawn="MHz",
+    spectral=True,
+    start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "spectrum.csv"},
+    build=build,
+    adapt=adapt,
+    check=check,
+    accuracy="of the frequencies",
+)

@@ -1,0 +1,135 @@
+"""One declaration of a quantity serves the option, the scene, the template, the schema, errors and Python; shown with a toy verb."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import fields
+
+import pytest
+import toy_verb
+
+from rotor.requests.field import all_fields
+from rotor.requests.fill import Given, read_fields, written_fields
+from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range, Text, Whole
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene_file import parse_scene, scene_text
+from rotor.scenes.template import template
+from rotor.verbs.verb import SCENE_VERBS, verb_of
+
+DECLARED = [kind for kind in SCENE_VERBS if kind in ("spectrum", "levels", "raman")]
+
+
+@pytest.fixture
+def ring(monkeypatch):
+    """The toy verb, entered as a module of the package: what a new file would be."""
+    import rotor.cli
+    import rotor.scenes.scene
+    import rotor.verbs.verb
+
+    monkeypatch.setitem(sys.modules, "rotor.verbs.ring", toy_verb)
+    for module in (rotor.verbs.verb, rotor.scenes.scene):
+        monkeypatch.setattr(module, "SCENE_VERBS", (*SCENE_VERBS, "ring"))
+    monkeypatch.setitem(rotor.cli.VERBS, "ring", "A particle on a ring.")
+
+
+def test_a_verb_is_two_files(ring, call, folder):
+    code, out, err = call(
+        "ring", "CO", "--radius", "100 pm", "--csv", "a.csv", "--save-scene", "s.toml", "--cut", "none"
+    )
+    assert (code, err) == (0, "")
+    assert out == "levels  4\n"
+    written = (folder / "a.csv").read_bytes()
+    assert 'cut = "none"' in (folder / "s.toml").read_text()
+    assert call("run", "s.toml")[0] == 0
+    assert (folder / "a.csv").read_bytes() == written
+    content = json.loads(call("ring", "CO", "--json", "-")[1])
+    assert [level["energy_mhz"] for level in content["levels"]] == [0.0, 505379.0]  # 4 B is above the cut of 1e6 MHz
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--radius", "-1 pm"), "error: --radius: -1 pm: expected a finite number above 0 Å\n"),
+        (("--radius", "5 K"), "error: --radius: '5 K': unit 'K' does not measure the same thing as 'Å'"),
+        (("--mmax", "51"), "error: --mmax: 51: expected a whole number from 0 to 50\n"),
+        (("--axis", "d"), "error: --axis: 'd': expected one of a, b, c\n"),
+        (("--field", "0:100V"), "error: --field: '0:100V': unit 'V' is not a known unit"),
+        (("--cut", "x"), "error: --cut: 'x' is not a number"),
+        (("--radius", "1", "--radius", "2"), "error: --radius: given more than once"),
+    ],
+)
+def test_errors_quote_what_was_typed_and_name_the_option(ring, call, folder, words, said):
+    code, out, err = call("ring", "CO", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith(said)
+    assert list(folder.iterdir()) == []
+
+
+def test_the_same_errors_name_keys_of_a_scene_and_fields_of_a_request(ring):
+    scene = parse_scene('schema = 1\nkind = "ring"\nmolecule = "CO"\n[conditions]\nradius = "-1 pm"\n')
+    with pytest.raises(ValueError, match=r"^conditions\.radius: -1 pm: expected a finite number above 0 Å$"):
+        run_scene(scene)
+    with pytest.raises(ValueError, match=r"^radius_angstrom: -1: expected a finite number above 0 Å$"):
+        toy_verb.RingRequest("CO", radius_angstrom=-1.0)
+
+
+def test_the_template_and_the_help_have_every_quantity(ring, call):
+    text, help_ = template("ring"), call("ring", "--help-all")[1]
+    for one in all_fields(toy_verb.RingRequest).values():
+        assert f"{one.last} = " in text
+        assert f"{one.flag} " in help_
+    assert 'radius = "2 Å"  # radius of the ring (Å)' in text
+    assert parse_scene(text).kind == "ring"
+    assert "--mmax" not in call("ring", "--help")[1]  # not common
+
+
+@pytest.mark.parametrize("kind", DECLARED)
+def test_defaults_of_a_request_and_of_its_scene_agree(kind):
+    """What a scene says of nothing is the default of the request, and an empty scene is saved as an empty scene."""
+    verb = verb_of(kind)
+    given = parse_scene(f'schema = 1\nkind = "{kind}"\nmolecule = "N2"\n')
+    assert scene_text(given).count("\n") == 3
+    values = read_fields(verb.request, Given({}, "key"), verb.read(Given({"molecule.source": "N2"}), _place())[1])
+    defaults = {one.name: one.default for one in fields(verb.request)}
+    assert all(value == defaults[name] for name, value in values.items())
+
+
+def _place():
+    from rotor.verbs.verb import Place
+
+    return Place()
+
+
+READERS = [
+    (Quantity("K", above=0), "300", 300.0),
+    (Quantity(), "50 %", 0.5),
+    (Quantity("g/cm3"), "997 kg/m3", 0.997),
+    (Quantity("km/s"), "8000 m/s", 8.0),
+    (Quantity("1/cm2"), "1e18 /m2", 1e14),
+    (Quantity("1/ps"), "0.5 /ps", 0.5),
+    (Quantity("deg"), "45", 45.0),
+    (Grid("kV/cm", points=3), "0:100V/cm", (0.0, 0.05, 0.1)),
+    (Grid("K"), [1, 2.5], (1.0, 2.5)),
+    (Range("MHz"), "2:18GHz", (2000.0, 18000.0)),
+    (Numbers("D", (3,)), "0,0,1.85", (0.0, 0.0, 1.85)),
+    (Pairs(int), "ee=1,oo=3", {"ee": 1, "oo": 3}),
+    (Names(), ["1=2H"], ("1=2H",)),
+    (Whole(0), "7", 7),
+    (Text(("a", "b")), "a", "a"),
+]
+
+
+@pytest.mark.parametrize(
+    ("reader", "given", "value"), READERS, ids=[f"{type(one[0]).__name__} {one[1]}" for one in READERS]
+)
+def test_a_value_is_read_and_written_back(reader, given, value):
+    read = reader.read(given)
+    exact = not isinstance(value, float) and not isinstance(reader, Grid)
+    assert read == (value if exact else pytest.approx(value, rel=1e-15))  # one rounding of a product
+    assert reader.read(reader.write(read)) == read
+
+
+def test_what_is_the_default_is_not_written():
+    assert written_fields(toy_verb.RingRequest("CO")) == {}
+    assert written_fields(toy_verb.RingRequest("CO", cut_mhz=None)) == {"observables.cut": "none"}
