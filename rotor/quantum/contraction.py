@@ -162,8 +162,8 @@ def _between_blocks(
 def spin_space(twice_i: int, name: str = "") -> Space:
     """A spin: one state, with the tensors "I" + name and, for I ≥ 1, "Q" + name = [I × I]² / 2I(2I-1) (see `spin_quadrupole`).
 
-    >>> float(spin_space(2).tensors["I"].blocks[0, 0][0, 0] ** 2)  # I(I+1)(2I+1)
-    6.000000000000001
+    >>> round(float(spin_space(2).tensors["I"].blocks[0, 0][0, 0] ** 2), 9)  # I(I+1)(2I+1)
+    6.0
     """
     i = twice_i / 2
     tensors = {"I" + name: Tensor(1, {(0, 0): np.full((1, 1), np.sqrt(i * (i + 1) * (2 * i + 1)))})}

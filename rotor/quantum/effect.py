@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
+    from rotor.quantum.levels import Levels
     from rotor.quantum.moments import Moment
     from rotor.quantum.spins.terms import Spin, SpinTerm
     from rotor.quantum.states import Coupling, State
@@ -112,6 +113,10 @@ class QuantumEffect(ABC):
     def other_moments(self, top: Top) -> tuple[Moment, ...]:
         """Moments that make lines besides plain dipoles, such as those of a spin."""
         return ()
+
+    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int) -> Levels | None:
+        """Levels of all effects together where this one needs functions of its own; None where the functions of the rotation serve."""
+        return None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:
         """(μa, μb, μc) in debye by pairs of states (v', v): of the effect's states, and between states."""

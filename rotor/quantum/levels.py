@@ -6,6 +6,7 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -21,6 +22,7 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.tensors import Tensors
 
 FEW_LEVELS = 64  # among which one is found by looking at all
 
@@ -35,6 +37,26 @@ class Block(Protocol):
     @property
     def start(self) -> int:
         """Row of the first state."""
+
+
+class MomentBlock(ABC):
+    """States solved together that know the elements of molecule-fixed tensors with other blocks of their kind."""
+
+    energies_mhz: Floats
+    start: int
+
+    @property
+    @abstractmethod
+    def twice_f(self) -> int:
+        """Twice the total angular momentum."""
+
+    @abstractmethod
+    def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
+        """Whether tensors, by pairs of states, have elements between the states of this block and another one."""
+
+    @abstractmethod
+    def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
+        """Reduced elements (n_up, n_low) up to phases, their squares the strengths."""
 
 
 @dataclass(frozen=True)
@@ -245,6 +267,8 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
 
 def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:
     quanta = levels.quanta
+    if "species" in quanta and weights.rule == "none":
+        return levels.weight
     if "irrep" in quanta:
         of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
         return np.array([of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)

@@ -3,6 +3,8 @@
 | name | what it is |
 |---|---|
 | `v` | number of the vibrational or tunnelling state |
+| `species` | of the permutations of a turning group: A, E |
+| `vt` | number of the torsional state of a species |
 | `n` | rotational angular momentum where spins are coupled to it (`j` where there are none) |
 | `j` | total angular momentum without nuclear spins; the rotational one where there is no spin |
 | `k`, `ka`, `kc` | projection on the axis of a symmetric top; on a and on c in the limits of an asymmetric one |
@@ -28,6 +30,8 @@ from rotor.arrays import Ints
 
 # in which tables and files list them
 ORDER = (
+    "species",
+    "vt",
     "v",
     "n",
     "j",
@@ -48,7 +52,16 @@ ORDER = (
     "f",
     "m",
 )
-_HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "i_sym": "Γ", "irrep": "irrep", "v": "v"}
+_HEADINGS = {
+    "ka": "Ka",
+    "kc": "Kc",
+    "i_tot": "I",
+    "i_sym": "Γ",
+    "irrep": "irrep",
+    "v": "v",
+    "vt": "v_t",
+    "species": "species",
+}
 
 # how a picture writes sums with spins, in TeX
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
@@ -176,7 +189,7 @@ def without_nuclei(quanta: Quanta) -> dict[str, NDArray[Any]]:
     return {name: column for name, column in quanta.items() if name in rotation or name.startswith("j")}
 
 
-_OF_ROTATION = ("v", "n", "k", "ka", "kc", "irrep", "m")
+_OF_ROTATION = ("species", "vt", "v", "n", "k", "ka", "kc", "irrep", "m")
 
 
 def merged_text(quanta: Quanta, rows: Ints, halves: Collection[str] = ()) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.coupled import CoupledBlock
-from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.levels import MomentBlock, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
 AnyBlock = Any  # SolvedBlock, CoupledBlock or SpinBlock
@@ -25,6 +25,8 @@ def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
         return wang_amplitudes(up, low, tensors[0, 0])
     if isinstance(up, CoupledBlock):
         return _of_coupled(up, low, tensors)
+    if isinstance(up, MomentBlock):
+        return up.amplitudes(low, tensors)
     from rotor.quantum.spins import lines
 
     return lines.amplitudes(up, low, tensors)
@@ -77,6 +79,8 @@ def twice_total(block: AnyBlock) -> int:
 
 
 def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
+    if isinstance(up, MomentBlock):
+        return up.connects(low, tensors)
     if not isinstance(up, CoupledBlock):
         from rotor.quantum.spins import lines
 

@@ -5,6 +5,7 @@
 | J^2p alone, any top; J^2p Jz^2q of a symmetric top; the cubic tensor of a spherical top | closed form |
 | orthorhombic ones, of an asymmetric or any other nonlinear top | Wang blocks: tridiagonal, else dense |
 | any other operator of J, several states | connected Wang blocks (`coupled`) |
+| internal rotation | torsion for each K, then blocks of torsion and rotation (`internal_rotation`) |
 | tensors coupled to spins | any of these for the rotation, then F blocks (`spins`) |
 
 Energies are eigenvalues of the truncated effective Hamiltonian; nothing is treated to first order, and no operator is dropped:
@@ -80,6 +81,9 @@ def solve_levels(
             raise ValueError(
                 f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.stark_map`"
             )
+    for effect in effects:
+        if (levels := effect.solve(top, effects, jmin, jmax)) is not None:
+            return levels
     if any(effect.spins(top) for effect in effects):
         from rotor.quantum.spins.levels import spin_levels
 
@@ -88,6 +92,10 @@ def solve_levels(
 
 
 def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
+    if top.internal_rotation is not None and tuple(effects) == SEMI_RIGID:
+        from rotor.quantum.effects.of_top import internal_rotation_effects
+
+        effects = (*effects, *internal_rotation_effects(top))
     if top.states is None:
         return top, tuple(effects)
     from rotor.quantum.effects.of_top import with_states

@@ -27,6 +27,7 @@ from rotor.tops.allowed import (
 from rotor.tops.components import Tensor, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
+from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.named_values import constants_of_names, fields_of_texts
@@ -65,6 +66,7 @@ class Top:
     then those with the states taken together, and each state may have its own. level_table: energies that count instead of those of
     the constants where it has them; both belong to these constants alone (`with_constants` leaves them out). symmetry_checked:
     False takes a dipole that spin weights forbid as it is, as SPCAT does. magnetic: what a magnetic field acts on.
+    internal_rotation: a methyl group that turns; constants, dipole and other tensors are then along the axes of its frame.
 
     Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
@@ -88,6 +90,7 @@ class Top:
     covariance: Covariance | None = None
     spin_constants: SpinConstants | None = None
     states: StateConstants | None = None
+    internal_rotation: InternalRotationConstants | None = None
 
     level_table: LevelTable | None = None
     symmetry_checked: bool = True
@@ -348,8 +351,9 @@ class Top:
     def with_constants(self, constants: Constants, source: str = "") -> Top:
         """The same top with other constants, and without the covariance, the level energies and the further states of its own."""
         return replace(
-            self, constants=constants, source=source or self.source, covariance=None, level_table=None, states=None
-        )
+            self, constants=constants, source=source or self.source, covariance=None, level_table=None, states=None,
+            internal_rotation=None,
+        )  # fmt: skip
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""

@@ -151,6 +151,15 @@ def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
     return (InteractingStates(found.values, found.weights, found.dipoles),)
 
 
+def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
+    """Internal rotation of a top that has constants of it; none for others."""
+    if top.internal_rotation is None:
+        return ()
+    from rotor.quantum.effects.internal_rotation import InternalRotation
+
+    return (InternalRotation(top.internal_rotation),)
+
+
 def with_states(
     top: Top, states: StateConstants, effects: Sequence[QuantumEffect]
 ) -> tuple[Top, tuple[QuantumEffect, ...]]:
@@ -191,14 +200,20 @@ def effects_of(
         Where spins are asked for and the top has no constants of any.
     """
     if not hyperfine:
-        return (*SEMI_RIGID, *state_effects(top))
+        return (*SEMI_RIGID, *state_effects(top), *internal_rotation_effects(top))
     found = spin_effects(top)
     if not found:
         raise ValueError(
             f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them as spin_constants "
             "(--spin-constants), such as chi_aa(14N)=-4.2 MHz"
         )
-    return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
+    return (
+        *SEMI_RIGID,
+        *state_effects(top),
+        *internal_rotation_effects(top),
+        *found,
+        *_method(top, found, method, tolerance_mhz),
+    )
 
 
 def _method(top: Top, found: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:

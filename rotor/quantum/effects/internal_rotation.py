@@ -1,0 +1,61 @@
+"""Internal rotation of one threefold group: levels of the species A and E in every torsional state.
+
+    H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ½V6 (1 - cos 6α) + further terms and distortion
+
+in the rho-axis frame, with A beside F (p - ρPa)². Constants: F, rho, V3, V6, Dab ... (`rotor.quantum.internal_rotation.terms` has the
+table with its sources), the rotational constants and distortion being those of the top. The torsion is solved for each K, its lowest
+n_v functions are the basis of the rotation (`rotor.quantum.internal_rotation.contracted`). Levels are named by species, v_t, J, Ka, Kc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Self
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.tops.internal_rotation import InternalRotationConstants
+
+if TYPE_CHECKING:
+    from rotor.quantum.levels import Levels
+    from rotor.tops.top import Top
+
+ROTATION = ("rigid rotor", "centrifugal distortion")  # effects whose constants are coefficients of the same blocks
+
+
+@dataclass(frozen=True, eq=False)
+class InternalRotation(QuantumEffect):
+    """A threefold group that turns against the rest of the molecule."""
+
+    name: ClassVar[str] = "internal rotation"
+    conserved: ClassVar[frozenset[str]] = frozenset({"j"})
+
+    constants: InternalRotationConstants
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The constants of the internal rotor in MHz, rho without a unit."""
+        return dict(self.constants.values)
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same effect with other values of some of its constants."""
+        return type(self)(replace(self.constants, values={**self.constants.values, **values}))
+
+    def size_mhz(self, top: Top, j: int) -> float:
+        """The largest difference of the torsional ground states of A and E for |K| ≤ J, from that at K = 0."""
+        from rotor.quantum.internal_rotation.levels import species_splitting
+
+        return species_splitting(self.constants, j)
+
+    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int) -> Levels:
+        """Levels of both species with v_t up to the highest of the constants.
+
+        Raises ValueError for effects that have no elements between torsional functions.
+        """
+        for effect in effects:
+            if effect.name not in (*ROTATION, self.name):
+                raise ValueError(
+                    f"{effect.name or type(effect).__name__} beside internal rotation: not computed together; leave one of them out"
+                )
+        from rotor.quantum.internal_rotation.levels import torsion_rotation_levels
+
+        return torsion_rotation_levels(top, self.constants, tuple(effects), jmin, jmax)

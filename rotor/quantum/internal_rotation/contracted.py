@@ -1,0 +1,136 @@
+"""Torsional functions for each K as the basis of the rotation: the two steps of a molecule with one internal rotor.
+
+In the rho-axis frame the kinetic coupling of a top with the rotation acts along z alone, so that the torsion
+
+    h(K, σ) = F (p - ρK)² + ½ V3 (1 - cos 3α) + ½ V6 (1 - cos 6α)
+
+is solved for each K first (E. Herbst, J. K. Messer, F. C. De Lucia and P. Helminger, J. Mol. Spectrosc. 108 (1984) 42, the two-step
+diagonalisation). Its lowest n_v functions |K t⟩ are kept, and a term R ⊗ o of the rotation and the torsion becomes
+
+    ⟨J K' t'|R o|J K t⟩ = ⟨J K'|R|J K⟩ Σ_m'm ⟨K' t'|m'⟩⟨m'|o|m⟩⟨m|K t⟩.
+
+Truncation is the only approximation: energies are upper bounds, and n_v is a setting of the accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.labelled import Basis
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.torsion import TorsionalPotential, torsional_states
+
+
+class Product(NamedTuple):
+    """An operator of the rotation times one of the torsion, which acts on the labels k of exp i(3k + σ)α; None is the unit operator."""
+
+    rotation: Operator
+    torsion: Operator | None = None
+
+
+Terms = Mapping[str, Sequence[Product]]  # each name multiplies a sum of products
+
+
+@dataclass(frozen=True, eq=False)
+class Torsion:
+    """The torsional part that is solved first: F and V in MHz, ρ, the fold of the top."""
+
+    f_mhz: float
+    rho: float
+    potential: TorsionalPotential
+    fold: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class ContractedTorsion:
+    """The lowest torsional functions of one species for each K.
+
+    sigma: the species. k_max: the largest |K|. k_waves: labels k of the free functions. energies (K, n_v) and vectors (K, k, n_v), K
+    from -k_max; of σ = 0 with ⟨-k|-K t⟩ = ⟨k|K t⟩. parity (n_v,): of the functions of K = 0 and σ = 0 under this reversal, else 0.
+    """
+
+    sigma: int
+    k_max: int
+    k_waves: Ints
+    energies: Floats
+    vectors: Floats
+    parity: Ints
+
+    @property
+    def count(self) -> int:
+        """n_v, the number of functions for each K."""
+        return int(self.energies.shape[1])
+
+    def tables(self, operator: Operator | None, change: int) -> Floats:
+        """⟨K + change, t'|o|K t⟩ as (K, t', t), zero where K + change is beyond k_max."""
+        tables = np.zeros((len(self.energies), self.count, self.count))
+        first, last = max(0, -change), len(tables) - max(0, change)
+        source = self.vectors[first:last]
+        if operator is not None:
+            source = self._matrix(operator) @ source
+        tables[first:last] = np.swapaxes(self.vectors[first + change : last + change], 1, 2) @ source
+        return tables
+
+    def _matrix(self, operator: Operator) -> Floats:
+        matrix = Basis({"k": self.k_waves}).elements([operator]).dense()
+        if np.iscomplexobj(matrix):
+            raise ValueError(
+                "an operator of the torsion is complex: give it with the factor i that its rotation takes away"
+            )
+        return matrix
+
+
+def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, waves: int = 10) -> ContractedTorsion:
+    """The lowest `count` torsional functions of one species for each K from -k_max to k_max.
+
+    Parameters
+    ----------
+    torsion : Torsion
+        What is solved first.
+    sigma : int
+        Species: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed).
+    k_max : int
+        The largest |K|.
+    count : int
+        n_v.
+    waves : int, optional
+        k from -waves to waves in exp i(3k + σ)α.
+
+    Returns
+    -------
+    ContractedTorsion
+    """
+    k = np.arange(-k_max, k_max + 1)
+    solved = torsional_states(
+        torsion.f_mhz, torsion.potential, shifts=torsion.rho * k, species=sigma, fold=torsion.fold, waves=waves
+    )
+    if count > len(solved.m):
+        raise ValueError(f"n_v = {count}: expected at most {len(solved.m)}, the number of free-rotor functions")
+    energies, vectors = solved.energies.copy(), solved.vectors.copy()
+    parity = np.zeros(energies.shape[1], dtype=np.int64)
+    if sigma == 0:
+        vectors[:k_max] = vectors[:k_max:-1, ::-1]
+        energies[k_max], vectors[k_max], parity = _states_of_parity(energies[k_max], vectors[k_max])
+    waves_k = np.arange(-waves, waves + 1)
+    return ContractedTorsion(sigma, k_max, waves_k, energies[:, :count], vectors[:, :, :count], parity[:count])
+
+
+def _states_of_parity(energies: Floats, vectors: Floats) -> tuple[Floats, Floats, Ints]:
+    """Energies, vectors (k, t) and parities under k → -k of the same Hamiltonian, each half solved by itself: some may coincide."""
+    size = len(vectors)
+    half = size // 2
+    matrix = (vectors * energies) @ vectors.T
+    pairs = np.eye(size)[:, half + 1 :] * np.sqrt(0.5)
+    even = np.column_stack([np.eye(size)[:, half], pairs + pairs[::-1]])
+    halves = []
+    for functions, sign in ((even, 1), (pairs - pairs[::-1], -1)):
+        found, states = np.linalg.eigh(functions.T @ matrix @ functions)
+        halves.append((found, functions @ states, np.full(len(found), sign)))
+    joined, states, parity = (np.concatenate(piece, axis=-1) for piece in zip(*halves, strict=True))
+    order = np.argsort(joined, kind="stable")
+    return joined[order], states[:, order], parity[order]

@@ -1,0 +1,181 @@
+"""Functions |J K⟩|K t⟩ of the rotation and the torsion, and a writer of elements between them.
+
+The species σ = 0 goes to itself under time reversal; its functions are
+
+    |J K t s) = i^J (|J K⟩|K t⟩ + s (-1)^K |J -K⟩|-K t⟩)/√2  (and i more for s = -1),   K > 0,       i^J |J 0⟩|0 t⟩,  s = parity of t,
+
+between which operators that are real in |J K⟩|K t⟩ (a plane of symmetry contains the rho axis) connect s with s' = s (-1)^(J+J'+k), k
+being the rank: elements of odd rank stand for i times themselves, as in `rotor.quantum.tensors`. Other species have |J K⟩|K t⟩.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.elements import ROUND_OFF, Elements
+from rotor.quantum.basis.labelled import Basis, rotation_labels
+from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product
+from rotor.quantum.operators.algebra import Operator
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionRotation:
+    """The functions of one species with J from `jmin` to `jmax`.
+
+    folded: whether functions of K and -K are combined: of σ = 0 where the Hamiltonian is real.
+    """
+
+    torsion: ContractedTorsion
+    jmin: int
+    jmax: int
+    folded: bool
+
+    @cached_property
+    def rotation(self) -> Basis:
+        """|J K⟩."""
+        return Basis(rotation_labels(self.jmax, self.jmin))
+
+    @cached_property
+    def labels(self) -> Mapping[str, Ints]:
+        """J, K, t, and the sign s (0 where functions are not combined)."""
+        j, k, t, s = (np.concatenate(column) for column in zip(*self._groups, strict=True))
+        return {"J": j, "K": k, "t": t, "s": s}
+
+    @cached_property
+    def _groups(self) -> list[tuple[Ints, Ints, Ints, Ints]]:
+        """J, K, t, s of the functions: all those with s ≥ 0 by J and K, then those with s = -1."""
+        j, k = self.rotation.labels["J"], self.rotation.labels["K"]
+        t = np.arange(self.torsion.count)
+        signs = (1, -1) if self.folded else (0,)
+        chosen = k >= 0 if self.folded else np.ones(len(k), dtype=bool)
+        groups = []
+        for sign in signs:
+            jj, tt = np.broadcast_arrays(j[chosen, None], t)
+            kk = np.broadcast_to(k[chosen, None], tt.shape)
+            exists = (kk > 0) | (self.torsion.parity[tt] == sign) if self.folded else np.ones(tt.shape, dtype=bool)
+            groups.append((jj[exists], kk[exists], tt[exists], np.full(int(exists.sum()), sign)))
+        return groups
+
+    @cached_property
+    def _rows(self) -> Ints:
+        """Row of the function (sign, |J K⟩, t), -1 where there is none."""
+        labels = self.labels
+        rows = np.full((2, len(self.rotation), self.torsion.count), -1)
+        place = self.rotation.rows({"J": labels["J"], "K": labels["K"]})
+        rows[(labels["s"] < 0).astype(int), place, labels["t"]] = np.arange(len(place))
+        return rows
+
+    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0) -> Elements:
+        """Elements of sums of products on their common pattern, reduced ones of tensors of a rank."""
+        plain = self.rotation.elements([factor.rotation for term in terms for factor in term])
+        if self.folded:
+            if np.iscomplexobj(plain.values):
+                raise ValueError("functions of K and -K are combined for real operators alone")
+            return self._gathered(len(terms), *self._folded(terms, plain, rank))
+        tables = _Tables(self.torsion)
+        change = self._k(plain.rows) - self._k(plain.columns)
+        values = self._values(terms, plain, np.arange(len(change)), change, tables)
+        rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
+        return self._gathered(len(terms), rows, columns, values)
+
+    def _k(self, rows: Ints) -> Ints:
+        return self.rotation.labels["K"][rows]
+
+    def _values(
+        self, terms: Sequence[Sequence[Product]], plain: Elements, chosen: Ints, change: Ints, tables: _Tables
+    ) -> NDArray[Any]:
+        """Values (terms, entries, t', t) of chosen entries of the rotation, whose K changes by `change`."""
+        size = self.torsion.count
+        values = np.zeros((len(terms), len(chosen), size, size), dtype=plain.values.dtype)
+        source = self._k(plain.columns[chosen]) + self.torsion.k_max
+        for step in np.unique(change).tolist():
+            here = np.flatnonzero(change == step)
+            number = 0
+            for i, term in enumerate(terms):
+                for factor in term:
+                    elements = plain.values[number, chosen[here]]
+                    number += 1
+                    if elements.any():
+                        values[i, here] += elements[:, None, None] * tables.of(factor.torsion, step)[source[here]]
+        return values
+
+    def _folded(
+        self, terms: Sequence[Sequence[Product]], plain: Elements, rank: int
+    ) -> tuple[Ints, Ints, NDArray[Any]]:
+        """Rows and columns (entries, t), and values, between combined functions.
+
+        ⟨J'|K'| t' s'|O|J K t s) = w' w Σ_±K' (s' (-1)^K')^[K' < 0] ⟨K' t'|O|K t⟩ over both signs of K', with K ≥ 0, w = √2 of K > 0 and
+        w' = 1/√2 of K' > 0, times i^(J - J') and the factors i of s and s'.
+        """
+        chosen = np.flatnonzero(self._k(plain.columns) >= 0)
+        rows, columns = plain.rows[chosen], plain.columns[chosen]
+        k_row, k_column = self._k(rows), self._k(columns)
+        j_row, j_column = self.rotation.labels["J"][rows], self.rotation.labels["J"][columns]
+        values = self._values(terms, plain, chosen, k_row - k_column, _Tables(self.torsion))
+        weight = np.where(k_column > 0, np.sqrt(2), 1.0) * np.where(k_row != 0, np.sqrt(0.5), 1.0)
+        target = self.rotation.rows({"J": j_row, "K": np.abs(k_row)})
+        odd = (j_row + j_column + rank) % 2  # whether the sign s changes
+        phase = (j_column - j_row) % 4
+        pairs, slots = np.unique(target * len(self.rotation) + columns, return_inverse=True)
+        first, second = pairs // len(self.rotation), pairs % len(self.rotation)
+        pieces = []
+        for column_sign in (1, -1):
+            row_sign = np.where(odd, -column_sign, column_sign)
+            reflected = np.where(k_row < 0, row_sign * np.where(k_row % 2, -1, 1), 1)
+            turns = (
+                phase + (column_sign < 0) - (row_sign < 0) - rank % 2
+            ) % 4  # powers of i; of odd rank one is left out
+            factor = weight * reflected * np.where(turns == 0, 1.0, -1.0)
+            if (turns % 2).any():
+                raise AssertionError("an element between combined functions is not of one phase")
+            summed = np.zeros((len(terms), len(pairs), *values.shape[2:]))
+            for sign in (True, False):  # each pair has at most one entry of either sign of K'
+                here = np.flatnonzero((k_row >= 0) == sign)
+                summed[:, slots[here]] += factor[here, None, None] * values[:, here]
+            sign_of_pair = np.empty(len(pairs), dtype=np.int64)
+            sign_of_pair[slots] = row_sign
+            row_index = self._rows[(sign_of_pair < 0).astype(int), first]
+            column_index = self._rows[int(column_sign < 0), second]
+            pieces.append((row_index, column_index, summed))
+        return (
+            np.concatenate([piece[0] for piece in pieces]),
+            np.concatenate([piece[1] for piece in pieces]),
+            np.concatenate([piece[2] for piece in pieces], axis=1),
+        )
+
+    def _gathered(self, count: int, rows: Ints, columns: Ints, values: NDArray[Any]) -> Elements:
+        """Elements of values (terms, entries, t', t) between functions by entry and t, without those that are zero or do not exist."""
+        flat = values.reshape(count, -1)
+        r = np.broadcast_to(rows[:, :, None], values.shape[1:]).ravel()
+        c = np.broadcast_to(columns[:, None, :], values.shape[1:]).ravel()
+        scale = ROUND_OFF * np.abs(flat).max(axis=1, keepdims=True, initial=0.0)
+        kept = np.flatnonzero((np.abs(flat) > scale).any(axis=0) & (r >= 0) & (c >= 0))
+        return Elements(len(self.labels["J"]), r[kept], c[kept], flat[:, kept])
+
+
+class _Tables:
+    """Torsional matrices by operator and change of K, each computed once."""
+
+    def __init__(self, torsion: ContractedTorsion) -> None:
+        self._torsion = torsion
+        self._known: dict[tuple[int, int], Floats] = {}
+
+    def of(self, operator: Operator | None, step: int) -> Floats:
+        """⟨K + step, t'|o|K t⟩ as (K, t', t)."""
+        key = id(operator), step
+        if key not in self._known:
+            unit = operator is None and step == 0
+            size = self._torsion.count
+            self._known[key] = (
+                np.broadcast_to(np.eye(size), (len(self._torsion.energies), size, size))
+                if unit
+                else self._torsion.tables(operator, step)
+            )
+        return self._known[key]

@@ -1,0 +1,96 @@
+"""Names of torsion-rotation levels: v_t, and K or Ka and Kc, one to one.
+
+Of the states of one block, v_t = 0 are those with the largest share of the torsional functions t = 0, as many as the block has of these
+functions; then v_t = 1 of the rest, and so on. Inside one v_t the state of rank n by energy is named after the function of rank n by
+zeroth-order energy, ⟨J K t|H|J K t⟩. Where these energies rise with K this is the rule of BELGI, K counted by energy inside v_t; where
+they do not (methanol, signed K of E levels) names follow the curves of the torsion instead of largest coefficients, which change at every
+avoided crossing.
+
+Levels of σ = 0 have Kc from their parity: C2 about the axis across the plane of symmetry is (-1)^Kc = s p (-1)^J, p being the parity of the
+torsional function at K = 0. E levels have signed K; of the pair ±K the lower one is called Kc = J - K + 1, the upper one Kc = J - K, as
+at a high barrier, where they are the levels of a rigid top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.one_to_one import one_to_one
+
+
+def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
+    """v_t (states,) of the states of one block, rising in energy, from vectors (functions, states) and t (functions,).
+
+    The block may have been solved for its lowest states alone.
+    """
+    shares = np.zeros((int(t.max()) + 1, vectors.shape[1]))
+    np.add.at(shares, t, np.abs(vectors) ** 2)
+    numbers = np.full(vectors.shape[1], -1)
+    for v, share in enumerate(shares):
+        free = np.flatnonzero(numbers < 0)
+        count = min(int(np.count_nonzero(t == v)), len(free))
+        numbers[free[np.argsort(-share[free], kind="stable")[:count]]] = v
+    return numbers
+
+
+def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
+    """The function (in its block) that names each state: equal ranks by energy inside v_t = t."""
+    names = np.full(len(numbers), -1)
+    for v in np.unique(numbers).tolist():
+        states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
+        by_energy = functions[np.argsort(zeroth_order[functions], kind="stable")]
+        names[states] = by_energy[: len(states)]
+    return names
+
+
+def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> Ints:
+    """The same by largest overlap, one to one inside v_t = t."""
+    names = np.full(len(numbers), -1)
+    for v in np.unique(numbers).tolist():
+        states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
+        overlaps = np.abs(vectors[np.ix_(functions, states)]) ** 2
+        if len(states) < len(functions):
+            overlaps = np.hstack([overlaps, np.zeros((len(functions), len(functions) - len(states)))])
+        names[states] = functions[one_to_one(overlaps)[: len(states)]]
+    return names
+
+
+def counted_k(j: Ints, v: Ints, energies: Floats) -> Ints:
+    """K of levels of σ = 0 as BELGI counts it: 0, 1, 1, 2, 2, ... by energy inside each v_t of each J."""
+    order = np.lexsort([energies, v, j])
+    first = np.concatenate([[True], (np.diff(j[order]) != 0) | (np.diff(v[order]) != 0)])
+    starts = np.flatnonzero(first)
+    rank = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
+    k = np.empty(len(order), dtype=np.int64)
+    k[order] = (rank + 1) // 2
+    return k
+
+
+def kc_of_parity(j: Ints, k: Ints, parity: Ints) -> Ints:
+    """Kc of levels of σ = 0 from K ≥ 0 and the parity s p: J - K or J - K + 1, whichever has (-1)^Kc = s p (-1)^J.
+
+    >>> kc_of_parity(np.array([2, 2, 2]), np.array([0, 1, 1]), np.array([1, 1, -1])).tolist()
+    [2, 2, 1]
+    """
+    lower = j - k
+    wrong = np.where((lower - j) % 2, -1, 1) != parity
+    return np.where(wrong, lower + 1, lower)
+
+
+def kc_of_pairs(keys: Mapping[str, Ints], k: Ints, energies: Floats) -> Ints:
+    """Kc of levels with signed K: of two levels ±K with equal keys (J, v_t) the lower one has J - |K| + 1."""
+    j = keys["J"]
+    size = np.abs(k)
+    kc = np.where(k == 0, j, j - size)
+    order = np.lexsort([energies, size, *keys.values()])
+    same = np.ones(len(order) - 1, dtype=bool)
+    for column in (*keys.values(), size):
+        same &= column[order][1:] == column[order][:-1]
+    first = np.flatnonzero(same)  # of each pair the lower one
+    lower = order[first]
+    kc[lower] = j[lower] - size[lower] + 1
+    return kc

@@ -1,0 +1,207 @@
+"""The table of levels of a molecule with an internal rotor, and the moments between its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.internal_rotation.contracted import Product, contracted_torsion
+from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.species import SpeciesLevels
+from rotor.quantum.levels import Levels, MomentBlock
+from rotor.quantum.operators.rotation import body_tensor
+from rotor.quantum.tensors import Tensors
+from rotor.tops.internal_rotation import InternalRotationConstants
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+SPECIES = {"A": 0, "E": 1}  # σ; that of E stands for both components ±1, which have equal energies at ∓K
+REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
+
+
+class Entries(NamedTuple):
+    """Elements of an operator between two blocks: places in both, and values."""
+
+    rows: Ints
+    columns: Ints
+    values: NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class SpeciesMoments:
+    """Reduced elements of molecule-fixed tensors between the blocks of one species, made when first used."""
+
+    levels: SpeciesLevels
+    _known: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
+
+    def between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
+        """Elements by pairs of blocks of the tensor of the molecule in its torsional states: overlaps of the torsion times the rotation."""
+        components = tuple(tensors[0, 0].components)
+        if components not in self._known:
+            self._known[components] = self._elements(components, tensors[0, 0].rank)
+        return self._known[components]
+
+    def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
+        linear = self.levels.solved.linear
+        elements = self.levels.functions.elements([[Product(body_tensor(_plain(components)))]], rank)
+        pair = linear.block[elements.rows] * (int(linear.block.max()) + 1) + linear.block[elements.columns]
+        order = np.argsort(pair, kind="stable")
+        starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
+        blocks = {}
+        for start, stop in zip(starts, np.append(starts[1:], len(order)), strict=True):
+            here = order[start:stop]
+            rows, columns = elements.rows[here], elements.columns[here]
+            key = int(linear.block[rows[0]]), int(linear.block[columns[0]])
+            blocks[key] = Entries(linear.rank[rows], linear.rank[columns], elements.values[0, here])
+        return blocks
+
+
+def _plain(components: tuple[complex, ...]) -> NDArray[Any]:
+    """Components T_q as real numbers where they are, complex ones otherwise."""
+    parts = np.array(components)
+    return parts.real if not parts.imag.any() else parts
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionBlock(MomentBlock):
+    """States of one J and one connected block of a species: energies (n,) in MHz, rising, and vectors (functions, n).
+
+    components: 2 of E, whose states σ = ±1 coincide.
+    """
+
+    j: int
+    number: int
+    energies_mhz: Floats
+    vectors: NDArray[Any]
+    start: int
+    moments: SpeciesMoments
+    components: int
+
+    @property
+    def twice_f(self) -> int:
+        """Twice the total angular momentum."""
+        return 2 * self.j
+
+    def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
+        """Whether a tensor has elements between this block and another one."""
+        return (
+            isinstance(low, TorsionBlock)
+            and low.moments is self.moments
+            and (self.number, low.number) in self.moments.between(tensors)
+        )
+
+    def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
+        """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
+        assert isinstance(low, TorsionBlock)
+        entries = self.moments.between(tensors)[self.number, low.number]
+        matrix = np.zeros((len(self.vectors), len(low.vectors)), dtype=entries.values.dtype)
+        matrix[entries.rows, entries.columns] = entries.values
+        reduced = self.vectors.conj().T @ (matrix @ low.vectors)
+        return np.asarray(np.sqrt(self.components) * np.abs(reduced))
+
+
+def torsion_rotation_levels(
+    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
+) -> Levels:
+    """Levels of both species with v_t ≤ vt_max and J from `jmin` to `jmax`.
+
+    Parameters
+    ----------
+    top : Top
+        Rotational constants and distortion in the rho-axis frame.
+    constants : InternalRotationConstants
+        Those of the internal rotor.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of; the levels remember it.
+    jmin, jmax : int
+        Range of J.
+
+    Returns
+    -------
+    Levels
+        By species, vt, j, ka, kc; energies in MHz above the foot of the torsional potential.
+
+    Raises
+    ------
+    ValueError
+        For a top that is not asymmetric in the representation Iʳ.
+    """
+    if top.kind != "asymmetric" or top.constants.representation != REPRESENTATION:
+        raise ValueError(
+            f"internal rotation of a top of kind {top.kind} in {top.constants.representation}: expected A, B, C of the rho-axis frame in "
+            "the representation Ir (z, x, y = a, b, c)"
+        )
+    model = ram_model(top, constants)
+    blocks: list[TorsionBlock] = []
+    quanta: dict[str, list[NDArray[Any]]] = {}
+    start = 0
+    for name, sigma in SPECIES.items():
+        species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve(
+            model.coefficients, constants.vt_max
+        )
+        made = _blocks(species, start, 1 if sigma == 0 else 2)
+        columns = {
+            "species": np.full(len(species.rows), name),
+            **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
+        }
+        for key, column in columns.items():
+            quanta.setdefault(key, []).append(column)
+        start += len(species.rows)
+        blocks += made
+    joined = {name: np.concatenate(columns) for name, columns in quanta.items()}
+    weight = np.where(joined["species"] == "A", *reduced_weights(constants))
+    return Levels(
+        kind=top.kind,
+        representation=REPRESENTATION,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=joined,
+        multiplicity=2 * joined["j"] + 1,
+        components=np.where(joined["species"] == "A", 1, 2),
+        weight=np.asarray(weight, dtype=np.int64),
+        effects=effects,
+        blocks=tuple(blocks),
+    )
+
+
+def ram_model(top: Top, constants: InternalRotationConstants) -> RamModel:
+    """The constants of the top and of the internal rotor together."""
+    return RamModel({**top.constants.values, **constants.values})
+
+
+def reduced_weights(constants: InternalRotationConstants) -> tuple[int, int]:
+    """Spin weights of A and E levels without their common divisor."""
+    weights = constants.weights
+    divisor = int(np.gcd(*weights))
+    return weights[0] // divisor, weights[1] // divisor
+
+
+def _blocks(species: SpeciesLevels, start: int, components: int) -> list[TorsionBlock]:
+    """The blocks of one species with the states that are levels, in the order of its rows."""
+    moments, made = SpeciesMoments(species), []
+    linear = species.solved.linear
+    chosen = linear.block[species.rows]
+    for number in species.blocks:
+        rows = species.rows[chosen == number]
+        members, vectors = species.solved.vectors(number)
+        if len(rows):
+            kept = vectors[:, linear.rank[rows]]
+            j = int(linear.labels["J"][members[0]])
+            made.append(TorsionBlock(j, number, species.solved.energies[rows], kept, start, moments, components))
+            start += len(rows)
+    return made
+
+
+def species_splitting(constants: InternalRotationConstants, j: int) -> float:
+    """The largest |E_E(K) - E_A(K) - E_E(0) + E_A(0)| of the torsional ground state for |K| ≤ J, MHz."""
+    torsion = RamModel({"A": 0.0, "B": 0.0, "C": 0.0, **constants.values}).torsion
+    ground = [contracted_torsion(torsion, sigma, j, 1).energies[:, 0] for sigma in SPECIES.values()]
+    difference = ground[1] - ground[0]
+    return float(np.abs(difference - difference[j]).max())

@@ -1,0 +1,116 @@
+"""Constants of a molecule with one internal rotor, and its blocks: what is linear in the Hamiltonian, and how F and ρ enter it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.internal_rotation.contracted import Terms, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.functions import TorsionRotation
+from rotor.quantum.internal_rotation.species import SpeciesBlocks, species_blocks
+from rotor.quantum.internal_rotation.terms import products_of, torsional_products
+from rotor.quantum.torsion import TorsionalPotential
+from rotor.tops.internal_rotation import BARRIERS
+
+COMPLEX = ("Dbc", "Dac")  # terms of a molecule without a plane of symmetry through the rho axis
+DEFAULT_COUNT = 9  # n_v: 1 Hz for v_t = 0 at J = 25 of methanols and methyl formate
+
+
+@dataclass(frozen=True)
+class RamModel:
+    """Constants in the rho-axis frame: MHz by name, rho without a unit. See `terms` for the names.
+
+    values: A, B, C, F, rho and any others. fold: of the top.
+    """
+
+    values: Mapping[str, float]
+    fold: int = field(default=3)
+
+    def __post_init__(self) -> None:
+        missing = [name for name in ("A", "B", "C", "F", "rho") if name not in self.values]
+        if missing:
+            raise ValueError(
+                f"internal rotation: {', '.join(missing)} missing; expected A, B, C, F, rho and a barrier V3"
+            )
+        if not self.values["F"] > 0:
+            raise ValueError(f"F = {self.values['F']:g} MHz: expected a number above 0")
+        object.__setattr__(
+            self, "values", MappingProxyType({name: float(value) for name, value in self.values.items()})
+        )
+
+    @property
+    def torsion(self) -> Torsion:
+        """The part that is solved first for each K."""
+        barriers = {int(name[1:]): value for name, value in self.values.items() if name in BARRIERS}
+        return Torsion(self.values["F"], self.values["rho"], TorsionalPotential(barriers), self.fold)
+
+    @property
+    def linear_names(self) -> tuple[str, ...]:
+        """The constants that are coefficients of the Hamiltonian themselves."""
+        return tuple(name for name in self.values if name not in ("F", "rho"))
+
+    def terms(self, sigma: int) -> Terms:
+        """Sums of products by coefficient: the linear constants, then F, -2Fρ and Fρ²."""
+        return {name: products_of(name, sigma) for name in self.linear_names} | torsional_products(sigma)
+
+    @property
+    def coefficients(self) -> Floats:
+        """The values of the coefficients, MHz."""
+        f, rho = self.values["F"], self.values["rho"]
+        return np.array([*(self.values[name] for name in self.linear_names), f, f * rho, f * rho**2])
+
+    @property
+    def jacobian(self) -> Floats:
+        """∂(coefficients)/∂(constants), constants in the order of `values`."""
+        f, rho, count = self.values["F"], self.values["rho"], len(self.linear_names)
+        names = list(self.values)
+        matrix = np.zeros((count + 3, len(names)))
+        for row, name in enumerate(self.linear_names):
+            matrix[row, names.index(name)] = 1.0
+        matrix[count:, names.index("F")] = [1.0, rho, rho**2]
+        matrix[count:, names.index("rho")] = [0.0, f, 2 * f * rho]
+        return matrix
+
+    @property
+    def has_plane(self) -> bool:
+        """Whether every term is real in |J K⟩|K t⟩: a plane of symmetry contains the rho axis."""
+        return not any(self.values.get(name) for name in COMPLEX)
+
+    def blocks(
+        self,
+        sigma: int,
+        jmax: int,
+        *,
+        jmin: int = 0,
+        count: int = DEFAULT_COUNT,
+        waves: int = 10,
+        wanted: Ints | None = None,
+    ) -> SpeciesBlocks:
+        """The blocks of one species.
+
+        Parameters
+        ----------
+        sigma : int
+            0 for A, 1 for E.
+        jmax, jmin : int
+            Range of J.
+        count : int, optional
+            n_v, torsional functions kept for each K.
+        waves : int, optional
+            k from -waves to waves of the free functions.
+        wanted : array of int, optional
+            The J that are needed; by default all.
+
+        Returns
+        -------
+        SpeciesBlocks
+        """
+        torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
+        functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
+        chosen: NDArray[np.bool_] | None = None if wanted is None else np.isin(functions.labels["J"], wanted)
+        return species_blocks(functions, self.terms(sigma), chosen)

@@ -1,0 +1,103 @@
+"""Constants of an internal rotor, in the frame that they belong to.
+
+In the rho-axis frame (RAM) z is along ρ and the rotational constants of the top are those of this frame,
+
+    H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ...,
+
+A beside F (p - ρPa)². The names of further terms are in `rotor.quantum.internal_rotation.terms`. Constants without a stated frame are
+refused: those of the principal-axis frame have other values.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from rotor.units import parse_quantity
+
+BARRIERS = ("V3", "V6", "V9")
+NAMED = (
+    "Dab", "Dbc", "Dac", "Fm", "rhom", "V3J", "V3K", "V3bc", "V3ab", "D3ac", "D3bc", "FJ", "FK", "Fbc", "Fab", "rhoJ", "rhoK", "rhobc",
+    "rhoab", "DabJ", "DabK",
+)  # fmt: skip
+SPELLED = re.compile(
+    r"(?:J(?P<j>\d+))?(?:Jz(?P<z>\d*))?(?:J(?P<kind>pm|mi)(?P<n>\d+))?(?:p(?P<p>\d*))?(?:(?P<wave>cos|sin)(?P<multiple>\d+))?"
+)
+FRAMES = ("RAM",)
+
+
+def is_torsional(name: str) -> bool:
+    """Whether a constant belongs to an internal rotor by its name: F, rho, a barrier, a named term, or one spelled with p, cos or sin.
+
+    >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
+    [True, True, False, False]
+    """
+    if name in ("F", "rho", *BARRIERS, *NAMED):
+        return True
+    match = SPELLED.fullmatch(name)
+    return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class InternalRotationConstants:
+    """Constants of one threefold top: MHz by name, rho without a unit.
+
+    values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM". vt_max: the
+    highest torsional state of the levels. functions: n_v, the torsional functions kept for each K. spin_states: 2I + 1 of each nucleus
+    that turns, 2 of hydrogen. uncertainties: in MHz (of rho without a unit). source: where the values are from.
+
+    >>> constants = InternalRotationConstants({"F": "7.6 cm-1", "rho": 0.33, "V3": "408 cm-1"}, "RAM")
+    >>> round(constants.values["V3"]), constants.weights
+    (12231532, (4, 4))
+    """
+
+    values: Mapping[str, float]
+    frame: str
+    vt_max: int = 1
+    functions: int = 9
+    spin_states: int = 2
+    uncertainties: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.frame not in FRAMES:
+            raise ValueError(
+                f"internal rotation in the frame {self.frame or 'that is not stated'!r}: expected RAM (z along rho); constants of the "
+                "principal-axis frame are converted by rotor.quantum.internal_rotation.frames"
+            )
+        for name in self.values:
+            if not is_torsional(name):
+                known = ", ".join(("F", "rho", *BARRIERS, *NAMED))
+                raise ValueError(
+                    f"{name!r} is no constant of an internal rotor: known are {known}, and terms such as J2p2"
+                )
+        if missing := [name for name in ("F", "rho", "V3") if name not in self.values]:
+            raise ValueError(f"internal rotation: {', '.join(missing)} missing; expected F, rho and V3 at least")
+        numbers = {
+            name: float(value) if name == "rho" else parse_quantity(value, "MHz") for name, value in self.values.items()
+        }
+        if not numbers["F"] > 0:
+            raise ValueError(f"F = {numbers['F']:g} MHz: expected a number above 0")
+        if not 0 <= self.vt_max <= self.functions - 2 <= 18:
+            raise ValueError(
+                f"torsional states up to v_t = {self.vt_max} from n_v = {self.functions} functions: expected n_v of at least v_t + 2 "
+                "and at most 20"
+            )
+        object.__setattr__(self, "values", MappingProxyType(numbers))
+        object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        others = (self.vt_max, self.functions, self.spin_states, dict(self.uncertainties), self.source)
+        return type(self), (dict(self.values), self.frame, *others)
+
+    @property
+    def weights(self) -> tuple[int, int]:
+        """Spin weights of A, and of E with both components, of three equal nuclei with n = 2I + 1 states each.
+
+        A has (n³ + 2n)/3 of the n³ spin functions, each component of E (n³ - n)/3: 4 and 4 of CH3, 11 and 16 of CD3.
+        """
+        n = self.spin_states
+        return (n**3 + 2 * n) // 3, 2 * (n**3 - n) // 3
