@@ -48,9 +48,76 @@ def test_a_receding_source_is_seen_lower(call):
     content = json.loads(call(*THIN, "--velocity", "100", "--json", "-")[1])
     line = content["lines"][0]
     assert line["observed_mhz"] == pytest.approx(line["frequency_mhz"] * (1 - 100 / 299792.458), rel=1e-14)  # round-off
-    assert content["peak_mhz"] == pytest.approx(
-        line["observed_mhz"], abs=0.2
-    )  # spacing of the grid: an eighth of 0.77 MHz
+    assert content["peak_mhz"] == line["observed_mhz"]
+    assert content["peak_k"] == pytest.approx(line["brightness_k"], rel=1e-12)  # a single line
+
+
+def test_each_molecule_has_its_own_temperature_width_and_velocity(call):
+    code, out, err = call(
+        "emission", "CO", "CO", "--range", "115.2:115.3GHz", "--column", "1e15,2e15", "--excitation", "10,40",
+        "--width", "1,5", "--velocity", "0,20", "--json", "-",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    cold, warm = content["molecules"]
+    assert (cold["excitation_k"], warm["excitation_k"]) == (10.0, 40.0)
+    assert (cold["fwhm_km_s"], warm["fwhm_km_s"], warm["velocity_km_s"]) == (1.0, 5.0, 20.0)
+    for gas, name in ((cold, "carbon monoxide"), (warm, "carbon monoxide (2)")):
+        options = [("--column", "column_per_cm2"), ("--excitation", "excitation_k"), ("--width", "fwhm_km_s")]
+        by_itself = call(
+            "emission", "CO", "--range", "115.2:115.3GHz", "--velocity", str(gas["velocity_km_s"]), "--json", "-",
+            *(text for option, key in options for text in (option, str(gas[key]))),
+        )[1]  # fmt: skip
+        (alone,) = json.loads(by_itself)["lines"]
+        (line,) = (line for line in content["lines"] if line["molecule"] == name)
+        assert alone | {"molecule": name} == line
+
+
+def test_the_redshift_and_the_convention_of_velocities_are_said(call):
+    _, out, _ = call("emission", "CO", "--range", "34:36GHz", "--column", "1e21", "--redshift", "2.3", "--width", "300")
+    assert "redshift 2.3" in out
+    assert "radio convention, v = c (1 - ν/ν_rest)" in out
+    assert "34930.6673" in out  # 115271.2021/3.3
+
+
+def test_a_catalogue_is_a_source_like_the_molecule_it_was_made_from(call, tmp_path):
+    call("spectrum", "HC3N", "--jmax", "120", "--min-lgint", "none", "--no-hyperfine", "--cat", "hc3n.cat")
+    same = ("--range", "84:116GHz", "--column", "1e15", "--excitation", "30", "--width", "2", "--json", "-")
+    computed = json.loads(call("emission", "HC3N", "--no-hyperfine", *same)[1])
+    code, out, err = call("emission", "hc3n.cat", *same)
+    assert code == 0
+    assert "Q summed over the 121 levels of the catalogue's lines" in err
+    listed = json.loads(out)
+    assert listed["molecules"][0]["q"] == pytest.approx(computed["molecules"][0]["q"], rel=3e-6)  # ELO has 4 decimals
+    assert len(listed["lines"]) == len(computed["lines"]) == 3
+    for mine, theirs in zip(listed["lines"], computed["lines"], strict=True):
+        for key, rel in (
+            ("frequency_mhz", 1e-9),
+            ("optical_depth", 3e-4),
+            ("brightness_k", 3e-4),
+            ("einstein_a_per_s", 3e-4),
+        ):
+            assert mine[key] == pytest.approx(theirs[key], rel=rel)  # LGINT has 4 decimals
+        assert (mine["upper"], mine["g_upper"]) == (theirs["upper"], theirs["g_upper"])
+    given = json.loads(call("emission", "hc3n.cat", "--partition", "300=1374.1,30=137.7", *same)[1])
+    assert given["molecules"][0]["q"] == pytest.approx(137.7, rel=1e-12)
+    (tmp_path / "catdir.cat").write_text("     0 HC3N 1 3.1380 3.0130 2.8368 2.5360 2.2353 1.9349 1.6350 1\n")
+    code, out, err = call("emission", "hc3n.cat", "--partition", "catdir.cat", *same)
+    assert (code, err) == (0, "")
+    assert json.loads(out)["molecules"][0]["q_source"] == "JPL catdir"
+
+
+def test_a_scene_holds_each_molecule_with_what_is_its_own(call, tmp_path):
+    call("spectrum", "CO", "--jmax", "40", "--cat", "co.cat")
+    order = ("emission", "co.cat", "CO", "--range", "114:116GHz", "--column", "1e15,1e14", "--width", "2,3",
+             "--partition", "300=108.9,20=7.57,10=3.97", "--excitation", "20,10", "--redshift", "0.001")  # fmt: skip
+    code, _out, err = call(*order, "--csv", "verb.csv", "--save-scene", "s.toml")
+    assert (code, err) == (0, "")
+    (tmp_path / "again").mkdir()
+    assert call("run", "s.toml", "--out", "again")[0] == 0
+    scene = (tmp_path / "again" / "verb.csv").read_text(encoding="utf-8")
+    assert scene == (tmp_path / "verb.csv").read_text(encoding="utf-8")
+    assert scene.count("\n") == 3
 
 
 def test_several_molecules_add_their_depths(call, tmp_path):
@@ -77,9 +144,16 @@ def test_several_molecules_add_their_depths(call, tmp_path):
     assert "together" in text
     assert "excitation 50 K" in text
     content = json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
-    assert {line["molecule"] for line in content["lines"]} == {0, 1}
+    assert {line["molecule"] for line in content["lines"]} == {"hydrogen cyanide", "cyanoacetylene"}
+    assert {row.split(",")[0] for row in (tmp_path / "l.csv").read_text(encoding="utf-8").splitlines()[1:]} == {
+        "hydrogen cyanide", "cyanoacetylene",
+    }  # fmt: skip
     rows = np.genfromtxt("p.csv", delimiter=",", names=True)
-    assert rows["brightness_k"].max() == pytest.approx(content["peak_k"], rel=1e-12)  # text of 17 digits
+    assert (
+        0.98 < rows["brightness_k"].max() / content["peak_k"] <= 1
+    )  # a grid of eight points to a width misses a centre
+    assert content["peak_mhz"] in [line["observed_mhz"] for line in content["lines"]]
+    assert f"{content['peak_k']:.4g} K at {content['peak_mhz']:.4f} MHz, {content['peak_molecule']}" in out
     assert rows["frequency_mhz"][0] == pytest.approx(84e3)
     assert len(np.genfromtxt("l.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")) == content["line_count"]
 
@@ -90,6 +164,10 @@ def test_several_molecules_add_their_depths(call, tmp_path):
         (("CO",), "--range or --band: expected one of them"),
         (("CO", "--band", "ALMA99"), "--band: band 'ALMA99': known are ALMA1"),
         (("CO", "--band", "ALMA3", "--column", "1,2"), "--column: 2 given for 1 molecules"),
+        (("CO", "HCN", "--band", "ALMA3", "--excitation", "1,2,3"), "--excitation: 3 given for 2 molecules"),
+        (("CO", "--band", "ALMA3", "--redshift", "-2"), "--redshift = -2.0"),
+        (("CO", "--band", "ALMA3", "--partition", "300=100"), "--partition: is Q(T) of .cat files"),
+        (("none.cat", "--band", "ALMA3"), "none.cat: no such file"),
         (("CO", "--band", "ALMA3", "--column", "-1"), "--column"),
         (("CO", "--band", "ALMA3", "--width", "0"), "--width"),
         (("CO", "--band", "ALMA3", "--filling", "2"), "--filling = 2.0"),

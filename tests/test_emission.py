@@ -80,6 +80,48 @@ def test_absorption_against_a_hot_background_is_negative():
     assert seen.brightness_k[0] < 0
 
 
+@pytest.mark.parametrize(("redshift", "velocity"), [(0.0, 1e5), (2.3, 0.0), (6.0, -3000.0)])
+def test_a_redshifted_layer_is_the_layer_at_rest_with_photons_stretched(redshift, velocity):
+    """I_ν/ν³ is invariant: transfer in the frame of the gas, before a background of T_bg (1+z), then T_B divided by 1+z."""
+    source = Source(1e18, 20.0, 30.0, velocity, redshift=redshift)
+    stretch = (1 + redshift) / (1 - velocity / 299792.458)
+    rest = REST + np.linspace(-15, 15, 41)
+    seen = emission(lines_at(20.0), source, rest / stretch)
+    there = emission(lines_at(20.0), Source(1e18, 20.0, 30.0, background_k=BACKGROUND_K * stretch), rest)
+    assert seen.optical_depth == pytest.approx(there.optical_depth, rel=1e-9)  # offsets from a line lose digits
+    assert seen.brightness_k == pytest.approx(there.brightness_k / stretch, rel=1e-9, abs=1e-15)
+    assert 0.5 < seen.optical_depth.max() < 5  # neither thin nor thick
+    assert seen.brightness_k.max() < 20.0 / stretch  # 17 K were seen of 10 K at 1e5 km/s
+
+
+def test_gas_as_cold_as_the_background_of_its_time_is_not_seen():
+    source = Source(1e18, BACKGROUND_K * 3.3, 30.0, redshift=2.3)
+    assert emission(lines_at(source.excitation_k), source, [REST / 3.3]).brightness_k[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_molecules_of_two_temperatures_mix_in_a_layer():
+    """T_B of a layer cut into 20,000 slices, each with the emission of both molecules."""
+    other = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.2, 0, 0))
+    sources = (Source(2e16, 8.0, 1.0), Source(3e16, 40.0, 2.0, velocity_km_s=0.3))
+    lists = [lines_at(8.0), line_list(other, temperature_k=40.0, jmax=12)]
+    seen = emission(lists, sources, [REST])
+    a, b = (float(emission(one, source, [REST]).optical_depth[0]) for one, source in zip(lists, sources, strict=True))
+    brightness, slices = float(planck_k(REST, BACKGROUND_K)), 20000
+    for _ in range(slices):
+        gain = (a * float(planck_k(REST, 8.0)) + b * float(planck_k(REST, 40.0 * (1 - 0.3 / 299792.458)))) / slices
+        brightness += gain - brightness * (a + b) / slices
+    assert seen.optical_depth[0] == pytest.approx(a + b, rel=1e-12)
+    assert seen.brightness_k[0] == pytest.approx(brightness - float(planck_k(REST, BACKGROUND_K)), rel=2e-4)  # 1/slices
+    assert min(a, b) > 0.3
+
+
+def test_sources_of_one_layer_share_what_lies_behind_it():
+    with pytest.raises(ValueError, match="redshift"):
+        emission([lines_at(10.0)] * 2, [Source(1e14, 10.0, 1.0), Source(1e14, 10.0, 1.0, redshift=1.0)], [REST])
+    with pytest.raises(ValueError, match="1 given for 2"):
+        emission([lines_at(10.0)] * 2, [Source(1e14, 10.0, 1.0)], [REST])
+
+
 def test_planck_limits():
     assert planck_k(1.0, 300.0) == pytest.approx(300.0, rel=1e-6)  # Rayleigh-Jeans
     assert planck_k(1e5, 0.0) == 0.0
@@ -96,7 +138,7 @@ def test_bands_by_name():
     "change",
     [
         {"column_per_cm2": 0.0}, {"excitation_k": -1.0}, {"fwhm_km_s": math.nan}, {"filling": 1.5}, {"background_k": -1.0},
-        {"velocity_km_s": 3e5},
+        {"velocity_km_s": 3e5}, {"redshift": -1.0}, {"redshift": math.inf},
     ],
 )  # fmt: skip
 def test_impossible_sources_are_refused(change):

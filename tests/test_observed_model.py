@@ -95,6 +95,15 @@ def test_the_same_as_the_emission_of_a_line_list() -> None:
     )  # beyond 3 widths 1e-11 of the peak
 
 
+def test_redshift_and_velocity_are_those_of_the_emission_verb() -> None:
+    lines = line_list(CO, temperature_k=20.0, jmax=10)
+    species = species_of_lines(lines, partition=PartitionTable([20.0], [lines.q]))
+    source = Source(1e17, 20.0, 40.0, velocity_km_s=9000.0, redshift=1.5)
+    grid = REST * source.frequency_ratio * (1 + np.linspace(-2e-4, 2e-4, 101))
+    mine = model([Component(species, 1e17, 20.0, 9000.0, 40.0)], grid, Sight(redshift=1.5))
+    assert np.allclose(mine.brightness_k, emission(lines, source, grid).brightness_k, rtol=1e-8)  # round-off of offsets
+
+
 def test_beam_dilution_and_redshift() -> None:
     full = at_centre(Component(rigid(), 1e22, 50.0))
     sized = Component(rigid(), 1e22, 50.0, size_arcsec=1.0)

@@ -38,7 +38,7 @@ def things() -> dict[str, object]:
         "equipartition": gas.test,
         "gas answer": gas,
         "emission answer": rotor.answer_emission(
-            EmissionRequest((rotor.read("CO"),), (1e16,), Source(1e16, 20.0, 5.0), (110e3, 120e3))
+            EmissionRequest((rotor.read("CO"),), (Source(1e16, 20.0, 5.0),), (110e3, 120e3))
         ),
         "stark answer": rotor.answer_stark(rotor.StarkRequest(rotor.read("OCS"), (0.0, 10.0, 20.0))),
         "zeeman answer": rotor.answer_zeeman(

@@ -26,25 +26,30 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.process import one_thread_of_blas
-from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
+from rotor.cli.shared.save_scene import beside, molecule_of, save_made, save_scene_option
 from rotor.reports.line_tables import the_first
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
+    from rotor.scenes.sections import MoleculeSection
     from rotor.spectra.emission import Source
     from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest
+    from rotor.spectra.emitters import CatalogueLines
+    from rotor.tops.top import Top
 
 EXAMPLES = """\b
 Examples:
   rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2
   rotor emission CH3CN HC3N SO2 --band ALMA6 --column 1e15,3e14,1e15 --excitation 100 --width 5 --plot core.png
   rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10
-  rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv"""
+  rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv
+  rotor emission CO HCN --band ALMA3 --column 1e18,1e15 --excitation 40,10 --width 300 --redshift 2.3
+  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16"""
 
 NAMES = {
     "columns_per_cm2": "--column", "column_per_cm2": "--column", "excitation_k": "--excitation", "background_k": "--background",
     "filling": "--filling", "velocity_km_s": "--velocity", "fwhm_km_s": "--width", "range_mhz": "--range",
-    "least_depth": "--least-depth",
+    "least_depth": "--least-depth", "redshift": "--redshift",
 }  # fmt: skip  # field of the request -> option
 _OF_ONE = {
     "isotope": "--isotope", "spin_constants": "--spin-constants", "spins": "--spins", **inputs.STATES,
@@ -55,7 +60,9 @@ _OF_ONE = {
 class Options:
     """The molecules, the source, and what of it is looked at."""
 
-    sources: list[str] | None = argument(None, metavar="SOURCE", help="Molecules: names, files, SMILES:...")
+    sources: list[str] | None = argument(
+        None, metavar="SOURCE", help="Molecules: names, files, SMILES:..., .cat files of JPL and CDMS."
+    )
     isotope: list[str] | None = option(
         None, metavar="1=2H", help="Another isotope, by atom number or element, of a single molecule; repeatable."
     )
@@ -79,11 +86,21 @@ class Options:
     )
     state_names: str | None = option(None, metavar="LIST", help="Names of all its states, from 0 on: 0+,0-.")
     column: str = option("1e14", metavar="N", help="Column density, one for all or one each: 1e14,3e13 (1/cm²).")
-    excitation: str = option("100", metavar="T", help="Excitation temperature of rotation (K).")
-    background: str = option("2.725", metavar="T", help="Temperature behind the source (K).")
+    excitation: str = option(
+        "100", metavar="T", help="Excitation temperature of rotation, one for all or one each (K)."
+    )
+    background: str = option("2.725", metavar="T", help="Temperature behind the source, as observed (K).")
     filling: float = option(1.0, metavar="F", help="Part of the beam that the source fills.")
-    velocity: float = option(0.0, metavar="V", help="Of the source, receding positive, radio convention (km/s).")
-    width: float = option(1.0, metavar="W", help="Full width of the lines at half maximum (km/s).")
+    velocity: str = option(
+        "0", metavar="V", help="Velocity, one for all or one each; receding positive, radio convention (km/s)."
+    )
+    redshift: float = option(0.0, metavar="Z", help="Redshift of the source; velocities count from there.")
+    width: str = option(
+        "1", metavar="W", help="Full width of the lines at half maximum, one for all or one each (km/s)."
+    )
+    partition: str | None = option(
+        None, metavar="FILE", help="Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46."
+    )
     band: str | None = option(None, metavar="NAME", help="A receiver's band instead of --range: ALMA1 to ALMA10.")
     range_: str | None = option(None, "--range", metavar="A:B", help="First and last frequency observed (MHz).")
     least_depth: float = option(1e-6, metavar="X", help="Leave out lines of less optical depth.")
@@ -130,17 +147,39 @@ def command(
 
 def _request(options: Options, spins: HyperfineOptions) -> EmissionRequest:
     from rotor.spectra.emission_request import EmissionRequest
+    from rotor.tops.top import Top
 
-    source, range_mhz = _source(options), _range(options)
+    range_mhz, names = _range(options), _sources(options)
     for name, text in _OF_ONE.items():
-        if getattr(options, name) and len(_sources(options)) > 1:
-            raise ValueError(f"{text}: expected with a single molecule; which of several is meant is not said")
-    tops = tuple(inputs.with_some_dipole(inputs.read_top(one)) for one in _inputs(options))
-    columns = _columns(options.column)
-    if len(columns) == 1:
-        columns *= len(tops)
-    effects = effects_of_each(tops, spins, options.spin_constants)
-    return EmissionRequest(tops, columns, source, range_mhz, options.least_depth, effects)
+        if getattr(options, name) and (len(names) > 1 or _is_catalogue(names[0])):
+            raise ValueError(f"{text}: expected with a single molecule that is no catalogue")
+    if options.partition is not None and not any(map(_is_catalogue, names)):
+        raise ValueError("--partition: is Q(T) of .cat files, and none is among the molecules")
+    sources = _layer(options, len(names))
+    molecules = tuple(_molecule(each, options) for each in _inputs(options))
+    tops = [molecule for molecule in molecules if isinstance(molecule, Top)]
+    hamiltonians = iter(effects_of_each(tops, spins, options.spin_constants))
+    effects = tuple(next(hamiltonians) if isinstance(each, Top) else () for each in molecules)
+    return EmissionRequest(molecules, sources, range_mhz, options.least_depth, effects)
+
+
+def _is_catalogue(source: str) -> bool:
+    return source.lower().endswith((".cat", ".cat.gz"))
+
+
+def _molecule(given: Input, options: Options) -> Top | CatalogueLines:
+    """A top with a dipole, or the lines of a catalogue with Q(T)."""
+    if not _is_catalogue(given.source or ""):
+        return inputs.with_some_dipole(inputs.read_top(given))
+    from rotor.formats.catalogue.cat_species import read_cat_with
+
+    path = Path(given.source or "")
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file")
+    species = read_cat_with(path, options.partition)
+    if "note" in species.identity:
+        note(f"{path}: {species.identity['note']}; --partition states another")
+    return species
 
 
 def _inputs(options: Options) -> list[Input]:
@@ -153,24 +192,49 @@ def _scene(request: EmissionRequest, options: Options, folder: Path) -> Emission
     """The scene that a file in a folder holds."""
     from rotor.scenes.kinds.emission import saved_molecules
 
-    return saved_molecules(request, [molecule_of(one, request, folder) for one in _inputs(options)])
+    sections = [_saved_molecule(one, request, options, folder) for one in _inputs(options)]
+    return saved_molecules(request, sections)
+
+
+def _saved_molecule(given: Input, request: EmissionRequest, options: Options, folder: Path) -> MoleculeSection:
+    """The molecule of the options, with Q(T) where it is a catalogue."""
+    section = molecule_of(given, request, folder)
+    if options.partition is None or not _is_catalogue(given.source or ""):
+        return section
+    from rotor.scenes.sections import EmittingMolecule
+
+    fields = {name: getattr(section, name) for name in section.__struct_fields__}
+    return EmittingMolecule(**fields, partition=beside(options.partition, folder))
 
 
 def _sources(options: Options) -> list[str]:
     return options.sources or []
 
 
-def _source(options: Options) -> Source:
+def _layer(options: Options, count: int) -> tuple[Source, ...]:
+    """The source of each molecule; a single number counts for all."""
     from rotor.spectra.emission import Source
 
-    return Source(
-        column_per_cm2=_columns(options.column)[0],
-        excitation_k=inputs.positive("--excitation", options.excitation, "K"),
-        fwhm_km_s=options.width,
-        velocity_km_s=options.velocity,
-        background_k=inputs.quantity("--background", options.background, "K"),
-        filling=options.filling,
+    columns, background = _columns(options.column), inputs.quantity("--background", options.background, "K")
+    listed = {
+        "--column": columns,
+        "--excitation": _numbers("--excitation", options.excitation, "K"),
+        "--width": _numbers("--width", options.width, ""),
+        "--velocity": _numbers("--velocity", options.velocity, ""),
+    }
+    for name, values in listed.items():
+        if len(values) not in (1, count):
+            raise ValueError(f"{name}: {len(values)} given for {count} molecules; expected one for all or one for each")
+    each = zip(*(values * count if len(values) == 1 else values for values in listed.values()), strict=True)
+    return tuple(
+        Source(column, excitation, width, velocity, background, options.filling, options.redshift)
+        for column, excitation, width, velocity in each
     )
+
+
+def _numbers(name: str, text: str, unit: str) -> tuple[float, ...]:
+    """A comma list of numbers."""
+    return tuple(inputs.quantity(name, item, unit) for item in text.split(","))
 
 
 def _columns(text: str) -> tuple[float, ...]:
@@ -222,30 +286,29 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
     from rotor.quantum.quanta import headings
     from rotor.reports.sources import short_source
 
-    request, source = answer.request, answer.request.source
+    request, layer = answer.request, answer.request.sources[0]
     print(
         f"{', '.join(request.names)}: brightness temperature, from {request.range_mhz[0]:.10g} to {request.range_mhz[1]:.10g} MHz"
     )
-    behind = f"background {source.background_k:g} K, filling {source.filling:g}"
+    behind = f"background {layer.background_k:g} K as observed, filling {layer.filling:g}"
     facts = [
-        ("excitation", f"{source.excitation_k:g} K; {behind}"),
-        (
-            "lines",
-            f"{len(answer.lines)}, {source.fwhm_km_s:g} km/s wide, source at {source.velocity_km_s:g} km/s (radio convention)",
-        ),
+        ("source", behind + (f", redshift {layer.redshift:g}" if layer.redshift else "")),
+        ("lines", f"{len(answer.lines)}; velocities in the radio convention, v = c (1 - ν/ν_rest)"),
     ]
-    each = zip(request.names, request.columns_per_cm2, answer.partition_functions, answer.quanta, strict=True)
-    for name, column, q, quanta in each:
-        facts.append((name, f"N = {column:.4g} /cm², Q = {q:.6g}; upper, lower: {headings(quanta)}"))
-    for name, used in zip(request.names, answer.hyperfine, strict=True):
+    for name, source, lines in zip(request.names, request.sources, answer.emitted, strict=True):
+        gas = f"N = {source.column_per_cm2:.4g} /cm², T_ex = {source.excitation_k:g} K"
+        motion = f"width {source.fwhm_km_s:g} km/s at {source.velocity_km_s:g} km/s"
+        quanta = f"; upper, lower: {headings(lines.quanta)}" if lines.quanta else ""
+        facts.append((name, f"{gas}, {motion}, Q = {lines.q:.6g}{quanta}"))
+    for name, lines in zip(request.names, answer.emitted, strict=True):
         of_which = f"{name}: " if len(request.names) > 1 else ""
-        facts += [(title, of_which + text) for title, text in hyperfine_lines(used)]
-    if len(answer.lines):
-        at, peak = answer.spectrum.brightness_k.argmax(), answer.spectrum
+        facts += [(title, of_which + text) for title, text in hyperfine_lines(lines.hyperfine)]
+    if (peak := answer.peak) is not None:
+        line = f"{request.names[int(answer.lines.molecule[peak.row])]} {answer.lines.upper[peak.row]} – {answer.lines.lower[peak.row]}"
         facts.append(
             (
-                "brightest",
-                f"{peak.brightness_k[at]:.4g} K at {peak.frequency_mhz[at]:.4f} MHz, τ = {peak.optical_depth[at]:.3g}",
+                "brightest" if peak.brightness_k >= 0 else "deepest",
+                f"{peak.brightness_k:.4g} K at {peak.observed_mhz:.4f} MHz, {line}, τ = {peak.optical_depth:.3g}",
             )
         )
     show_facts(facts)
@@ -256,7 +319,8 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
         show_table(_table(answer, shown))
     print()
     cited = "; ".join(
-        f"{name}: {short_source(top.source)}" for name, top in zip(request.names, request.tops, strict=True)
+        f"{name}: {short_source(molecule.source)}" + ("" if lines.quanta else f", Q {lines.q_source}")
+        for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
     )
     show_facts([("sources", cited), *_limits(answer)])
 
@@ -265,11 +329,14 @@ def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
     """What is left out: of the source, and the largest of each molecule."""
     from rotor.quantum.estimates.limits import model_limits, populated_j
     from rotor.reports.top_facts import with_option
+    from rotor.tops.top import Top
 
     request = answer.request
     facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]
-    for name, top, effects in zip(request.names, request.tops, answer.effects, strict=True):
-        limits = model_limits(top, populated_j(top, request.source.excitation_k), effects)
+    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
+        if not isinstance(top, Top):
+            continue
+        limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects)
         facts += [("", f"{name}: {with_option(limit.sentence, 'rotor emission')}") for limit in limits[:1]]
     return facts
 

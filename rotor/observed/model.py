@@ -2,8 +2,8 @@
 
 Components k (a species in a region of the source) have column density N, excitation temperature T, velocity v and width Δv:
 
-    τ_k(ν) = N_k Σ_i I_i(T_k) φ_i(ν)        φ_i a Gaussian at ν_i (1 - v/c), full width at half maximum ν_i (1 - v/c) Δv/c
-    T_B(ν) = Σ_layers f [Σ_k τ_k c_k] g(τ),  g(τ) = (1 - e^-τ)/τ,   τ = Σ_k τ_k,   c_k = J_ν(T_k) - J_ν(T_bg)
+    τ_k(ν) = N_k Σ_i I_i(T_k) φ_i(ν/(1 - v/c))        φ_i a Gaussian at ν_i, full width at half maximum ν_i Δv/c
+    T_B(ν) = Σ_layers f [Σ_k τ_k c_k] g(τ),  g(τ) = (1 - e^-τ)/τ,   τ = Σ_k τ_k,   c_k = J_ν(T_k (1 - v/c)) - J_ν(T_bg)
 
 The equation of radiative transfer through a uniform layer (J. G. Mangum and Y. L. Shirley, Publ. Astron. Soc. Pac. 127 (2015) 266)
 with the mixed source function S = Σ τ_k J_k/Σ τ_k: components of a layer lie in one another, layers lie side by side in
@@ -58,6 +58,16 @@ class Component:
                 raise ValueError(f"{self.species.name}: {name} = {value}: expected a finite number above 0")
         if not abs(self.velocity_km_s) < KM_PER_S:
             raise ValueError(f"{self.species.name}: velocity_km_s = {self.velocity_km_s}: beyond the speed of light")
+
+    @property
+    def shift(self) -> float:
+        """ν/ν_rest = 1 - v/c."""
+        return 1 - self.velocity_km_s / KM_PER_S
+
+    @property
+    def seen_k(self) -> float:
+        """T_ex (1 - v/c), the temperature of the black body that a moving one of T_ex looks like (`rotor.spectra.emission`)."""
+        return self.excitation_k * self.shift
 
 
 @dataclass(frozen=True)
@@ -212,7 +222,7 @@ def _layer(
 ) -> tuple[Floats, Floats]:
     """Brightness and optical depth of one layer; its derivatives are entered into `derivative`."""
     behind = planck_k(grid, sight.background_k * (1 + sight.redshift))
-    contrast = [planck_k(grid, components[k].excitation_k) - behind for k in members]
+    contrast = [planck_k(grid, components[k].seen_k) - behind for k in members]
     τ = np.sum([depths[k][0] for k in members], axis=0)
     emitted = np.sum([depths[k][0] * c for k, c in zip(members, contrast, strict=True)], axis=0)
     mixed, continuum = τ, np.zeros(1)
@@ -227,7 +237,9 @@ def _layer(
         common = emitted * g_slope
         for k, c in zip(members, contrast, strict=True):
             derivative[k, :4] = f * (c * g + common) * depths[k][1:]
-            derivative[k, 1] += f * depths[k][0] * g * planck_slope(grid, components[k].excitation_k)
+            warmer = f * depths[k][0] * g * planck_slope(grid, components[k].seen_k)
+            derivative[k, 1] += warmer * components[k].shift
+            derivative[k, 2] -= warmer * components[k].excitation_k / KM_PER_S
             if (size := components[k].size_arcsec) is not None:
                 derivative[k, 4] = 2 * f * (1 - f) / size * bare
     return f * bare, τ
@@ -253,7 +265,7 @@ def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False
 
     With u = (ν - ν_c)/w:  ∂τ/∂N = τ/N;  ∂I/∂T from the exponents and Q;  ∂φ/∂ν_c and ∂φ/∂w of a Gaussian, both ν_c and w moving with v.
     """
-    shift = 1 - component.velocity_km_s / KM_PER_S
+    shift = component.shift
     margin = 1 + REACH * component.fwhm_km_s / KM_PER_S
     lines = component.species.between(grid_mhz[0] / shift / margin, grid_mhz[-1] / shift * margin)
     centre = lines.frequency_mhz * shift
@@ -262,7 +274,7 @@ def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False
     t = component.excitation_k
     area = component.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz(t)
     u = (grid_mhz[channel] - centre[line]) / width[line]
-    peak = area * math.sqrt(_LN16 / math.pi) / width
+    peak = area * math.sqrt(_LN16 / math.pi) / (width / shift)  # absorption is integrated in the frame of the gas
     depth = peak[line] * np.exp(-_LN16 * u * u)
 
     def collected(values: Floats) -> Floats:
@@ -273,8 +285,8 @@ def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False
         return τ[None]
     square = 2 * _LN16 * u * u
     by_temperature = collected(depth * _log_slope(lines, t)[line])
-    # d/dv: dν_c = -ν_i/c dv, dw/w = dν_c/ν_c; ∂lnφ/∂ν_c = 2·4ln2 u/w, ∂lnφ/∂lnw = 2·4ln2 u² - 1
-    moved = -(2 * _LN16 * u / width[line] * centre[line] + square - 1) / (shift * KM_PER_S)
+    # d/dv: dν_c = -ν_i/c dv, dw/w = dν_c/ν_c; ∂lnφ/∂ν_c = 2·4ln2 u/w, ∂lnφ/∂lnw = 2·4ln2 u², the area in the frame of the gas
+    moved = -(2 * _LN16 * u / width[line] * centre[line] + square) / (shift * KM_PER_S)
     widened = (square - 1) / component.fwhm_km_s
     return np.array(
         [τ, τ / component.column_per_cm2, by_temperature, collected(depth * moved), collected(depth * widened)]

@@ -14,6 +14,7 @@ from rotor.plots.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.emission_request import EmissionAnswer
+from rotor.tops.top import Top
 
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
 
@@ -80,8 +81,8 @@ def emission_figure(
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz
     names = [
-        name_of_top(top) if top.name else name
-        for top, name in zip(answer.request.tops, answer.request.names, strict=True)
+        name_of_top(molecule) if isinstance(molecule, Top) and molecule.name else name
+        for molecule, name in zip(answer.request.molecules, answer.request.names, strict=True)
     ]
     with styled():
         figure = new_figure()
@@ -112,7 +113,7 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
     """Quantum numbers of the brightest lines, in the colour of their molecule where there are several."""
     lines, spectrum = answer.lines, answer.spectrum
     heights = np.interp(lines.observed_mhz, spectrum.frequency_mhz, spectrum.brightness_k)
-    several = len(answer.request.tops) > 1
+    several = len(answer.request.molecules) > 1
     peaks = [
         Peak(
             float(lines.observed_mhz[row]) / mhz,
@@ -129,13 +130,23 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
 def _line_name(answer: EmissionAnswer, row: int) -> str:
     """A line as other pictures name it: sums with spins after both rotational levels, with their names."""
     lines = answer.lines
-    names, values = answer.quanta[int(lines.molecule[row])], (lines.upper[row].split(), lines.lower[row].split())
+    names, values = (
+        answer.emitted[int(lines.molecule[row])].quanta,
+        (lines.upper[row].split(), lines.lower[row].split()),
+    )
     if any(len(each) != len(names) for each in values):
         return f"{lines.upper[row]} – {lines.lower[row]}"
     return line_text({name: np.array(pair) for name, *pair in zip(names, *values, strict=True)}, 0, 1)
 
 
 def _title(answer: EmissionAnswer) -> str:
-    source = answer.request.source
-    text = f"excitation {source.excitation_k:g} K, width {source.fwhm_km_s:g} km/s"
-    return text + (f", velocity {source.velocity_km_s:g} km/s" if source.velocity_km_s else "")
+    """Excitation, width and velocity, each once where the molecules share it."""
+    sources = answer.request.sources
+
+    def values(name: str) -> str:
+        return ", ".join(f"{value:g}" for value in dict.fromkeys(getattr(source, name) for source in sources))
+
+    text = f"excitation {values('excitation_k')} K, width {values('fwhm_km_s')} km/s"
+    moving = any(source.velocity_km_s for source in sources)
+    text += f", velocity {values('velocity_km_s')} km/s" if moving else ""
+    return text + (f", z = {sources[0].redshift:g}" if sources[0].redshift else "")

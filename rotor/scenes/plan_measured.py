@@ -71,13 +71,16 @@ def _levels_text(request: FitRequest) -> str:
 def plan_of_emission(request: Any) -> Plan:
     """The plan of a source; the whole request is timed, which takes seconds at the most."""
     from rotor.spectra.emission_request import answer_emission
+    from rotor.tops.top import Top
 
     found: list[Any] = []
     seconds = timed(lambda: found.append(answer_emission(request)))
-    answer, source = found[-1], request.source
+    answer = found[-1]
     effects, absent = [], [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
-    for name, top, taken in zip(request.names, request.tops, answer.effects, strict=True):
-        j = populated_j(top, source.excitation_k)
+    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
+        if not isinstance(top, Top):
+            continue
+        j, taken = populated_j(top, source.excitation_k), lines.effects
         effects += [f"{name}: {text}" for text in effect_texts(top, j, taken)]
         largest = [one for one in left_out.of_levels(top, j, taken) if one.size is not None][:1]
         absent += [replace(one, name=f"{name}: {one.name}") for one in largest]
@@ -86,10 +89,10 @@ def plan_of_emission(request: Any) -> Plan:
         effects=tuple(effects),
         good=(),
         parts=(
-            ("method", "optical depths of all lines added, one excitation temperature, one background"),
+            ("method", "optical depths of all lines added, one excitation temperature a molecule, one background"),
             ("grid", "eight points to a width of the lines"),
         ),
-        counts={"molecules": len(request.tops), "lines": len(answer.lines), "points": len(answer.spectrum)},
+        counts={"molecules": len(request.molecules), "lines": len(answer.lines), "points": len(answer.spectrum)},
         seconds=seconds,
         memory_mb=peak_mb(lambda: answer_emission(request)),
         left_out=tuple(sorted(absent, key=lambda one: (one.size is None, -(one.size or 0.0)))),

@@ -344,15 +344,22 @@ class EmittingMolecule(MoleculeSection, frozen=True):
     """A molecule of the source; either `source` or `constants`."""
 
     column: Annotated[float, said("molecules in the line of sight (1/cm²)")] = 1e14
+    excitation: Annotated[Quantity | None, said("instead of that of the conditions (K)", "50 K")] = None
+    velocity: Annotated[float | None, said("likewise (km/s)", 5.6)] = None
+    width: Annotated[float | None, said("likewise (km/s)", 2.0)] = None
+    partition: Annotated[str | None, said("Q(T) of a .cat file: a catdir.cat or T=Q pairs", "300=108.87,75=27.46")] = (
+        None
+    )
 
 
 class EmissionConditions(Section, frozen=True):
     """The source, and what of it is observed; range or band."""
 
     excitation: Annotated[Quantity, said("excitation temperature of rotation (K)")] = "100 K"
-    background: Annotated[Quantity, said("temperature behind the source (K)")] = "2.725 K"
+    background: Annotated[Quantity, said("temperature behind the source, as observed (K)")] = "2.725 K"
     filling: Annotated[float, said("part of the beam that the source fills")] = 1.0
     velocity: Annotated[float, said("receding positive, radio convention (km/s)")] = 0.0
+    redshift: Annotated[float, said("of the source; velocities count from there")] = 0.0
     width: Annotated[float, said("full width of the lines at half maximum (km/s)")] = 1.0
     range: Annotated[str | None, said("first and last frequency observed (MHz)", "86:116GHz")] = None
     band: Annotated[str | None, said("a receiver's band instead: ALMA1 to ALMA10", "ALMA6")] = None

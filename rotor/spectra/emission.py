@@ -1,12 +1,16 @@
-"""Lines as a radio telescope sees them: brightness temperature of a layer of gas in local thermodynamic equilibrium.
+"""Lines as a radio telescope sees them: brightness temperature of a layer of gas, each molecule at an excitation temperature.
 
-    T_B(ν) = f [J_ν(T_ex) - J_ν(T_bg)] (1 - e^-τ(ν)),        J_ν(T) = (hν/k) / (e^(hν/kT) - 1)
-    τ(ν)   = N Σ_i I_i(T_ex) φ_i(ν)                            I_i with stimulated emission (`spectra.intensity`), ∫φ dν = 1
-    φ_i    a Gaussian at ν_i (1 - v/c), of full width ν_i Δv/c at half maximum
+    T_B(ν) = f Σ_m [J_ν(T_m/(1+z_m)) - J_ν(T_bg)] τ_m (1 - e^-τ)/τ       τ = Σ_m τ_m,  J_ν(T) = (hν/k) / (e^(hν/kT) - 1)
+    τ_m(ν) = N_m Σ_i I_i(T_m) φ_i(ν (1+z_m))                             I_i with stimulated emission (`spectra.intensity`), ∫φ dν = 1
+    φ_i      a Gaussian at the rest frequency ν_i, of full width ν_i Δv/c at half maximum
+    1+z_m  = (1+z) / (1 - v_m/c)                                         ν is the observed frequency, ν_i/(1+z_m) at a line
 
-from the equation of radiative transfer through a uniform layer, the background subtracted, as J. G. Mangum and Y. L. Shirley,
-Publ. Astron. Soc. Pac. 127 (2015) 266 (arXiv:1501.01703) set it out. N: molecules in the line of sight, all levels and spin
-species together, Q with the same spin weights as the lines. Velocities follow the radio convention v = c (1 - ν/ν_rest).
+The first is the equation of radiative transfer through a uniform layer, the background subtracted, as J. G. Mangum and Y. L. Shirley,
+Publ. Astron. Soc. Pac. 127 (2015) 266 (arXiv:1501.01703) set it out; with the molecules mixed evenly its source function is
+Σ τ_m J(T_m)/Σ τ_m. A redshift leaves I_ν/ν³ as it is, so a black body of T is seen as one of T/(1+z): the gas appears at
+T_m/(1+z_m), and T_bg is the temperature as observed (2.725 K for the cosmic background, at every z).
+N: molecules in the line of sight, all levels and spin species together, Q with the same spin weights as the lines. Velocities
+follow the radio convention v = c (1 - ν/ν_rest), counted in the frame of the redshift z. Widths are those in the source.
 Neglected: departures from one excitation temperature, scattering, and structure of the source within the beam but for f.
 """
 
@@ -15,20 +19,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.spectra.lines import Lines
 from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
 from rotor.table import Table
 
 BACKGROUND_K = 2.725
-_KM_PER_S = units.SPEED_OF_LIGHT_M_PER_S / 1e3
+KM_PER_S = units.SPEED_OF_LIGHT_M_PER_S / 1e3
 _REACH = 4.0  # full widths at half maximum on either side: a Gaussian has fallen to 5e-20 of its peak
 
 # GHz; bands 3 to 9: ESO, ALMA System Specifications (eso.info/sci/facilities/alma/observing/specifications); bands 1, 2 and 10:
@@ -39,13 +42,30 @@ BANDS_GHZ: dict[str, tuple[float, float]] = {
 }  # fmt: skip
 
 
+class LinesAtRest(Protocol):
+    """Rest frequencies and integrated absorption (n,) at one temperature: `Lines`, or lines of a catalogue."""
+
+    @property
+    def temperature_k(self) -> float:
+        """Of the levels."""
+
+    @property
+    def frequency_mhz(self) -> Floats:
+        """At rest."""
+
+    @property
+    def intensity_nm2_mhz(self) -> Floats:
+        """I(T), integrated absorption of a molecule."""
+
+
 @dataclass(frozen=True)
 class Source:
     """A uniform layer of gas in front of a uniform background.
 
-    column_per_cm2: molecules in the line of sight. excitation_k: of rotation. background_k: behind the layer. filling: fraction of the
-    beam that the layer covers. velocity_km_s: radio convention, receding positive. fwhm_km_s: full width of the lines
-    at half maximum. ValueError for what is not above 0, a filling above 1 and a velocity beyond that of light.
+    column_per_cm2: molecules in the line of sight. excitation_k: of rotation. fwhm_km_s: full width of the lines at half maximum.
+    velocity_km_s: radio convention, receding positive, in the frame of the redshift. background_k: behind the layer, as observed.
+    filling: fraction of the beam that the layer covers. redshift: z. ValueError for what is not above 0, a filling above 1, a velocity
+    beyond that of light and a redshift of -1 or less.
     """
 
     column_per_cm2: float
@@ -54,6 +74,7 @@ class Source:
     velocity_km_s: float = 0.0
     background_k: float = BACKGROUND_K
     filling: float = 1.0
+    redshift: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("column_per_cm2", "excitation_k", "fwhm_km_s"):
@@ -63,25 +84,32 @@ class Source:
             raise ValueError(f"background_k = {self.background_k}: expected a finite temperature of 0 K or more")
         if not 0 < self.filling <= 1:
             raise ValueError(f"filling = {self.filling}: expected a fraction above 0 and up to 1")
-        if not abs(self.velocity_km_s) < _KM_PER_S:
+        if not abs(self.velocity_km_s) < KM_PER_S:
             raise ValueError(
-                f"velocity_km_s = {self.velocity_km_s}: expected less than the speed of light, {_KM_PER_S:.3f}"
+                f"velocity_km_s = {self.velocity_km_s}: expected less than the speed of light, {KM_PER_S:.3f}; give a redshift"
             )
+        if not (math.isfinite(self.redshift) and self.redshift > -1):
+            raise ValueError(f"redshift = {self.redshift}: expected a finite number above -1")
+
+    @property
+    def frequency_ratio(self) -> float:
+        """ν_observed/ν_rest = (1 - v/c)/(1+z)."""
+        return (1 - self.velocity_km_s / KM_PER_S) / (1 + self.redshift)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Emission(Table):
-    """Optical depth and brightness temperature (n,) on a grid of frequencies (n,), and the source they belong to."""
+    """Optical depth and brightness temperature (n,) on a grid of observed frequencies (n,), and the sources in the layer."""
 
     frequency_mhz: Floats
     optical_depth: Floats
     brightness_k: Floats
-    source: Source
+    sources: tuple[Source, ...]
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The source, by the names of its fields."""
-        return {**asdict(self.source), "rows": len(self)}
+        """The sources, each by the names of its fields."""
+        return {"sources": [asdict(source) for source in self.sources], "rows": len(self)}
 
     @property
     def columns(self) -> Mapping[str, NDArray[Any]]:
@@ -89,7 +117,7 @@ class Emission(Table):
         return {name: getattr(self, name) for name in ("frequency_mhz", "optical_depth", "brightness_k")}
 
     def velocity_km_s(self, rest_mhz: float) -> Floats:
-        """The grid as velocities (n,) of a line at rest frequency `rest_mhz`, radio convention."""
+        """The grid as velocities (n,) of a line at rest frequency `rest_mhz`, radio convention, redshift included."""
         return radio_velocity_km_s(self.frequency_mhz, rest_mhz)
 
 
@@ -111,7 +139,7 @@ def radio_velocity_km_s(frequency_mhz: ArrayLike, rest_mhz: float) -> Floats:
     >>> round(float(radio_velocity_km_s(115271.202 * (1 - 1e-4), 115271.202)), 6)
     29.979246
     """
-    return np.asarray(_KM_PER_S * (1 - np.asarray(frequency_mhz, dtype=np.float64) / rest_mhz))
+    return np.asarray(KM_PER_S * (1 - np.asarray(frequency_mhz, dtype=np.float64) / rest_mhz))
 
 
 def band_mhz(name: str) -> tuple[float, float]:
@@ -127,14 +155,17 @@ def band_mhz(name: str) -> tuple[float, float]:
     return low * 1e3, high * 1e3
 
 
-def emission(lines: Lines | Sequence[Lines], source: Source, grid_mhz: ArrayLike) -> Emission:
-    """Optical depth and brightness temperature of a source on a grid of frequencies.
+def emission(
+    lines: LinesAtRest | Sequence[LinesAtRest], source: Source | Sequence[Source], grid_mhz: ArrayLike
+) -> Emission:
+    """Optical depth and brightness temperature of a layer on a grid of frequencies.
 
     Parameters
     ----------
     lines : Lines or several
-        Of one molecule, or of several that share the source's column; at its excitation temperature.
-    source : Source
+        Of one molecule or of several in the same layer, each at the excitation temperature of its source.
+    source : Source or several
+        One for each list of lines, alike in background, filling and redshift; a single one counts for every list.
     grid_mhz : (n,) array
         Rising frequencies as they are observed.
 
@@ -145,7 +176,7 @@ def emission(lines: Lines | Sequence[Lines], source: Source, grid_mhz: ArrayLike
     Raises
     ------
     ValueError
-        For lines at another temperature than the source's, and for a grid that does not rise.
+        For lines at another temperature than the source's, sources that do not form a layer, and a grid that does not rise.
 
     Examples
     --------
@@ -160,15 +191,52 @@ def emission(lines: Lines | Sequence[Lines], source: Source, grid_mhz: ArrayLike
     grid = np.asarray(grid_mhz, dtype=np.float64)
     if grid.ndim != 1 or not np.isfinite(grid).all() or (np.diff(grid) <= 0).any() or not len(grid) or grid[0] <= 0:
         raise ValueError(f"a grid of shape {grid.shape}: expected rising, finite frequencies (n,) above 0")
-    depth = np.zeros_like(grid)
-    for one in [lines] if isinstance(lines, Lines) else lines:
-        _refuse_other_temperature(one, source)
-        _add_depth(depth, grid, one, source)
-    contrast = planck_k(grid, source.excitation_k) - planck_k(grid, source.background_k)
-    return Emission(grid, depth, source.filling * contrast * -np.expm1(-depth), source)
+    lists = list(lines) if isinstance(lines, Sequence) else [lines]
+    sources = (source,) * len(lists) if isinstance(source, Source) else tuple(source)
+    require_layer(sources, len(lists))
+    return together([_of_molecule(each, one, grid) for each, one in zip(lists, sources, strict=True)])
 
 
-def _refuse_other_temperature(lines: Lines, source: Source) -> None:
+def _of_molecule(lines: LinesAtRest, source: Source, grid: Floats) -> Emission:
+    _refuse_other_temperature(lines, source)
+    depth = _optical_depth(grid, lines, source)
+    brightness = source.filling * contrast_k(grid, source) * -np.expm1(-depth)
+    return Emission(grid, depth, brightness, (source,))
+
+
+def together(parts: Sequence[Emission]) -> Emission:
+    """The layer of several molecules from those of each, on one grid: T_B = f Σ c_m τ_m (1 - e^-τ)/τ."""
+    if len(parts) == 1:
+        return parts[0]
+    sources = tuple(source for part in parts for source in part.sources)
+    grid, depth = parts[0].frequency_mhz, np.sum([part.optical_depth for part in parts], axis=0)
+    emitted = np.sum([part.optical_depth * contrast_k(grid, part.sources[0]) for part in parts], axis=0)
+    escaping = np.divide(-np.expm1(-depth), depth, out=np.ones_like(depth), where=depth > 0)
+    return Emission(grid, depth, sources[0].filling * emitted * escaping, sources)
+
+
+def contrast_k(frequency_mhz: ArrayLike, source: Source) -> Floats:
+    """J_ν(T_ex/(1+z)) - J_ν(T_bg) at observed frequencies, in K: the brightness of an opaque layer that fills the beam.
+
+    >>> round(float(contrast_k(115271.2, Source(1e14, 10.0, 1.0))), 3)
+    6.61
+    """
+    seen_k = source.excitation_k * source.frequency_ratio
+    return planck_k(frequency_mhz, seen_k) - planck_k(frequency_mhz, source.background_k)
+
+
+def require_layer(sources: Sequence[Source], count: int) -> None:
+    """ValueError for sources that do not form one layer of `count` molecules."""
+    if not count or len(sources) != count:
+        raise ValueError(f"sources: {len(sources)} given for {count} molecules; expected one for each")
+    for name in ("background_k", "filling", "redshift"):
+        if len({getattr(source, name) for source in sources}) > 1:
+            raise ValueError(
+                f"{name}: {[getattr(source, name) for source in sources]}; molecules of one layer share it"
+            )
+
+
+def _refuse_other_temperature(lines: LinesAtRest, source: Source) -> None:
     if not math.isclose(lines.temperature_k, source.excitation_k, rel_tol=1e-12):
         raise ValueError(
             f"lines at {lines.temperature_k:g} K for an excitation temperature of {source.excitation_k:g} K: make the list at "
@@ -176,16 +244,26 @@ def _refuse_other_temperature(lines: Lines, source: Source) -> None:
         )
 
 
-def _add_depth(depth: Floats, grid: Floats, lines: Lines, source: Source) -> None:
-    """N I φ of every line, added in place within `_REACH` widths of its centre."""
-    centre = lines.frequency_mhz * (1 - source.velocity_km_s / _KM_PER_S)
-    width = centre * source.fwhm_km_s / _KM_PER_S
+def _optical_depth(grid: Floats, lines: LinesAtRest, source: Source) -> Floats:
+    """N Σ I φ (n,), every line within `_REACH` widths of its centre."""
+    depth = np.zeros_like(grid)
+    rest = grid / source.frequency_ratio
+    centre = lines.frequency_mhz
+    width = centre * source.fwhm_km_s / KM_PER_S
     area = source.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz
-    first = np.searchsorted(grid, centre - _REACH * width)
-    last = np.searchsorted(grid, centre + _REACH * width)
+    first = np.searchsorted(rest, centre - _REACH * width)
+    last = np.searchsorted(rest, centre + _REACH * width)
     for i in np.flatnonzero((last > first) & (area > 0)):
         here = slice(first[i], last[i])
-        depth[here] += area[i] * gaussian(grid[here] - centre[i], width[i])
+        depth[here] += area[i] * gaussian(rest[here] - centre[i], width[i])
+    return depth
+
+
+def peak_depth(lines: LinesAtRest, source: Source) -> Floats:
+    """Optical depth (n,) at the centre of every line as if it stood by itself, N I 2 √(ln 2/π)/Δν."""
+    width = lines.frequency_mhz * source.fwhm_km_s / KM_PER_S
+    area = source.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz
+    return np.asarray(area * gaussian(np.zeros_like(width), width))
 
 
 def source_grid(first_mhz: float, last_mhz: float, source: Source, points_per_width: int = 8) -> Floats:
@@ -217,6 +295,6 @@ def source_grid(first_mhz: float, last_mhz: float, source: Source, points_per_wi
     """
     if not 0 < first_mhz < last_mhz:
         raise ValueError(f"range from {first_mhz} to {last_mhz} MHz: expected two rising frequencies above 0")
-    step = source.fwhm_km_s / _KM_PER_S / points_per_width
+    step = source.fwhm_km_s / KM_PER_S / points_per_width
     count = math.ceil(math.log(last_mhz / first_mhz) / step) + 1
     return np.asarray(np.geomspace(first_mhz, last_mhz, count))

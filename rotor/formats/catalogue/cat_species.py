@@ -1,8 +1,7 @@
 """Catalogues of JPL and CDMS, .cat, as species whose lines can be computed at any temperature.
 
-LGINT is for 300 K; with Q(300 K) and Q(T) of a catdir.cat it gives the intensity at another temperature. Without that table
-Q(T)/Q(300 K) = (T/300 K)^(DR/2) with the catalogue's degrees of freedom DR (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60,
-883 (1998)); column densities need the ratio alone, Einstein coefficients then have an unknown factor. A note says so.
+LGINT is for 300 K; with Q(300 K) and Q(T) of a catdir.cat it gives the intensity at another temperature (H. M. Pickett et al., J. Quant.
+Spectrosc. Radiat. Transf. 60, 883 (1998)). Without that table Q is summed over the levels of the lines. A note says so.
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.formats.catalogue.catdir import CatdirEntry, catdir_beside
+from rotor.formats.catalogue.catdir import CatdirEntry, catdir_beside, read_catdir
+from rotor.formats.catalogue.level_sum import partition_from_lines
 from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
@@ -23,12 +23,14 @@ from rotor.formats.spcat.text.fields import BLANK
 from rotor.observed.partition import PartitionTable
 from rotor.observed.species import CATALOGUE_K, SpeciesLines, species_lines, strength_from_lgint
 
-RATIO_NOTE = "Q(T) from the degrees of freedom of the catalogue: there is no catdir.cat with this tag; Einstein coefficients are not known"
-_SCALED_K = (2.725, 9.375, 37.5, 150.0, 300.0, 1000.0)
+NO_CATDIR = "there is no catdir.cat with this tag"
 
 
 def read_cat_species(
-    path: str | os.PathLike[str], entries: Mapping[int, CatdirEntry] | None = None, name: str | None = None
+    path: str | os.PathLike[str],
+    entries: Mapping[int, CatdirEntry] | None = None,
+    name: str | None = None,
+    partition: PartitionTable | None = None,
 ) -> SpeciesLines:
     """The lines of a .cat file as a species.
 
@@ -39,6 +41,8 @@ def read_cat_species(
         Species by tag, of `read_catdir`; by default those of files catdir*.cat in the same folder and the one above.
     name : str, optional
         Instead of the one in the table of species.
+    partition : PartitionTable, optional
+        Q(T) instead of the one in that table.
 
     Returns
     -------
@@ -51,12 +55,16 @@ def read_cat_species(
     """
     file = Path(path)
     return species_of_catalogue(
-        read_cat(file), entries if entries is not None else catdir_beside(file), name, str(file)
+        read_cat(file), entries if entries is not None else catdir_beside(file), name, str(file), partition
     )
 
 
 def species_of_catalogue(
-    catalogue: Catalogue, entries: Mapping[int, CatdirEntry], name: str | None = None, source: str = ""
+    catalogue: Catalogue,
+    entries: Mapping[int, CatdirEntry],
+    name: str | None = None,
+    source: str = "",
+    partition: PartitionTable | None = None,
 ) -> SpeciesLines:
     """A catalogue that was read as a species; see `read_cat_species`."""
     tags = np.unique(np.abs(catalogue.tag))
@@ -64,18 +72,22 @@ def species_of_catalogue(
         raise ValueError(f"{source}: {len(tags)} tags; expected the lines of one species")
     tag = int(tags[0])
     entry = entries.get(tag)
-    known = entry.partition if entry is not None else None
-    partition = known or partition_by_degrees(int(catalogue.dr[0]))
+    known = partition or (entry.partition if entry is not None else None)
+    table = known or partition_from_lines(catalogue)
     frequency, error = in_mhz(catalogue)
     lower_k = catalogue.energy_lower_cm * units.MHZ_PER_CM / units.MHZ_PER_K
-    identity = {"tag": tag} | ({"database": entry.database} if entry else {}) | ({} if known else {"note": RATIO_NOTE})
+    identity = (
+        {"tag": tag}
+        | ({"database": entry.database} if entry else {})
+        | ({} if known else {"note": f"{NO_CATDIR}: Q {table.source}"})
+    )
     return species_lines(
         name or (entry.name if entry else Path(source).stem or f"tag {tag}"),
         frequency,
-        strength_from_lgint(catalogue.lgint, frequency, lower_k, partition.at(CATALOGUE_K)),
+        strength_from_lgint(catalogue.lgint, frequency, lower_k, table.at(CATALOGUE_K)),
         lower_k,
         catalogue.g_upper,
-        partition,
+        table,
         error_mhz=error,
         upper=quanta_texts(catalogue.quanta_upper),
         lower=quanta_texts(catalogue.quanta_lower),
@@ -84,10 +96,33 @@ def species_of_catalogue(
     )
 
 
-def partition_by_degrees(dr: int) -> PartitionTable:
-    """(T/300 K)^(DR/2), whose value at 300 K is 1 whatever that of Q is."""
-    kelvin = np.array(_SCALED_K)
-    return PartitionTable(kelvin, (kelvin / CATALOGUE_K) ** (dr / 2), RATIO_NOTE)
+def read_cat_with(path: str | os.PathLike[str], partition: str | None) -> SpeciesLines:
+    """The lines of a .cat file with Q(T) from a text, `300=108.87,75=27.46`, from a catdir.cat, or as by `read_cat_species`.
+
+    Raises ValueError for a text that is no list of temperatures and Q, and for a table without the tag of the catalogue.
+    """
+    if partition is None:
+        return read_cat_species(path)
+    if Path(partition).is_file():
+        species = read_cat_species(path, read_catdir(partition))
+        if "note" in species.identity:
+            raise ValueError(f"{partition}: has no Q for tag {species.identity['tag']} of {os.fspath(path)}")
+        return species
+    return read_cat_species(path, {}, Path(path).stem, partition_of_text(partition))
+
+
+def partition_of_text(text: str) -> PartitionTable:
+    """Q(T) from `T=Q` pairs in K, separated by commas.
+
+    >>> partition_of_text("75=27.46, 300=108.87").at(300.0)
+    108.87
+    """
+    pairs = [pair.split("=") for pair in text.split(",") if pair.strip()]
+    try:
+        kelvin, q = np.array(sorted((float(t), float(value)) for t, value in pairs)).T
+    except ValueError:
+        raise ValueError(f"{text!r}: expected a catdir.cat file or T=Q pairs such as 300=108.87,75=27.46") from None
+    return PartitionTable(kelvin, q, "the T=Q pairs given")
 
 
 def quanta_texts(quanta: NDArray[np.int16]) -> NDArray[np.str_]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import named, top_of, with_dipole
-from rotor.scenes.scene import EmissionScene
+from rotor.scenes.scene import EmissionScene, within
 from rotor.scenes.sections import (
     EmissionConditions,
     EmissionObservables,
@@ -22,15 +22,17 @@ from rotor.scenes.sections import (
 )
 from rotor.spectra.emission import Source, band_mhz
 from rotor.spectra.emission_request import EmissionAnswer, EmissionLines, EmissionRequest, answer_emission
+from rotor.spectra.emitters import CatalogueLines
+from rotor.tops.top import Top
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.tops.top import Top
 
 _NAMES = {
     "columns_per_cm2": "molecules.column", "column_per_cm2": "molecules.column", "excitation_k": "conditions.excitation",
     "background_k": "conditions.background", "filling": "conditions.filling", "velocity_km_s": "conditions.velocity",
-    "fwhm_km_s": "conditions.width", "range_mhz": "conditions.range", "least_depth": "observables.least_depth",
+    "fwhm_km_s": "conditions.width", "redshift": "conditions.redshift", "range_mhz": "conditions.range",
+    "least_depth": "observables.least_depth",
 }  # fmt: skip
 
 
@@ -38,38 +40,63 @@ def request(scene: EmissionScene, folder: Where = ".") -> EmissionRequest:
     """The request of a scene."""
     if not scene.molecules:
         raise ValueError("molecules: expected one molecule or more")
-    tops = tuple(
-        named(f"molecules[{number}]", lambda one=one: with_dipole(top_of(one, folder)))  # type: ignore[misc]
+    molecules = tuple(
+        named(f"molecules[{number}]", lambda one=one: _molecule(one, folder))  # type: ignore[misc]
         for number, one in enumerate(scene.molecules)
     )
-    seen = scene.conditions
     with kind.fields(**_NAMES):
         return EmissionRequest(
-            tops,
-            tuple(one.column for one in scene.molecules),
-            Source(
-                column_per_cm2=scene.molecules[0].column,
-                excitation_k=kind.quantity("conditions.excitation", seen.excitation, "K"),
-                fwhm_km_s=seen.width,
-                velocity_km_s=seen.velocity,
-                background_k=kind.quantity("conditions.background", seen.background, "K"),
-                filling=seen.filling,
-            ),
-            _range(seen),
+            molecules,
+            tuple(_source(one, scene.conditions) for one in scene.molecules),
+            _range(scene.conditions),
             scene.observables.least_depth,
-            _effects(scene, tops),
+            _effects(scene, molecules),
         )
 
 
-def _effects(scene: EmissionScene, tops: Sequence[Top]) -> tuple[tuple[QuantumEffect, ...], ...]:
-    """The Hamiltonian of each molecule; with hyperfine those are split whose constants of spins are known, of which there is one."""
-    asked = scene.effects
-    known = [top.spin_constants is not None for top in tops]
+def _molecule(section: EmittingMolecule, folder: Where) -> Top | CatalogueLines:
+    """A top with a dipole, or the lines of a .cat file."""
+    if section.source is None or not section.source.lower().endswith((".cat", ".cat.gz")):
+        if section.partition is not None:
+            raise ValueError("partition: is Q(T) of a .cat file, and the source is none")
+        return with_dipole(top_of(section, folder))
+    from rotor.formats.catalogue.cat_species import read_cat_with
+
+    table = section.partition
+    if table is not None and "=" not in table:
+        table = str(within(folder, table))
+    return read_cat_with(within(folder, section.source), table)
+
+
+def _source(section: EmittingMolecule, layer: EmissionConditions) -> Source:
+    """The source of a molecule; what it leaves open is that of the conditions."""
+
+    def value(name: str) -> Any:
+        return getattr(layer if getattr(section, name) is None else section, name)
+
+    return Source(
+        column_per_cm2=section.column,
+        excitation_k=kind.quantity("conditions.excitation", value("excitation"), "K"),
+        fwhm_km_s=value("width"),
+        velocity_km_s=value("velocity"),
+        background_k=kind.quantity("conditions.background", layer.background, "K"),
+        filling=layer.filling,
+        redshift=layer.redshift,
+    )
+
+
+def _effects(scene: EmissionScene, molecules: Sequence[Top | CatalogueLines]) -> tuple[tuple[QuantumEffect, ...], ...]:
+    """The Hamiltonian of each molecule; with hyperfine those are split whose constants of spins are known, if there are such."""
+    wanted = scene.effects
+    known = [isinstance(top, Top) and top.spin_constants is not None for top in molecules]
     each = [
-        msgspec.structs.replace(asked, hyperfine=False, hyperfine_method="exact") if any(known) and not has else asked
+        msgspec.structs.replace(wanted, hyperfine=False, hyperfine_method="exact") if any(known) and not has else wanted
         for has in known
     ]
-    return tuple(kind.effects_of(top, own, one) for top, own, one in zip(tops, each, scene.molecules, strict=True))
+    return tuple(
+        kind.effects_of(top, own, one) if isinstance(top, Top) else ()
+        for top, own, one in zip(molecules, each, scene.molecules, strict=True)
+    )
 
 
 def _range(seen: EmissionConditions) -> tuple[float, float]:
@@ -131,27 +158,44 @@ def saved(asked: EmissionRequest, molecule: MoleculeSection | None) -> EmissionS
 
 def saved_molecules(asked: EmissionRequest, molecules: Sequence[MoleculeSection]) -> EmissionScene:
     """The scene of a request, its molecules given."""
-    source, (first, last) = asked.source, asked.range_mhz
+    layer, (first, last) = asked.sources[0], asked.range_mhz
     given = [
-        EmittingMolecule(**{name: getattr(one, name) for name in one.__struct_fields__}, column=column)
-        for one, column in zip(molecules, asked.columns_per_cm2, strict=True)
+        EmittingMolecule(
+            **{name: getattr(one, name) for name in one.__struct_fields__ if name in MoleculeSection.__struct_fields__},
+            column=source.column_per_cm2,
+            partition=getattr(one, "partition", None),
+            **_departures(source, layer),
+        )
+        for one, source in zip(molecules, asked.sources, strict=True)
     ]
-    saved_each = [kind.saved_effects(own, top) for own, top in zip(asked.effects, asked.tops, strict=False)]
+    tops = [(own, top) for own, top in zip(asked.effects, asked.molecules, strict=False) if isinstance(top, Top)]
+    saved_each = [kind.saved_effects(own, top) for own, top in tops]
     effects = next((one for one in saved_each if one.hyperfine is not None), QuantumEffects())
 
     return EmissionScene(
         molecules=given,
         effects=effects,
         conditions=EmissionConditions(
-            excitation=f"{source.excitation_k!r} K",
-            background=f"{source.background_k!r} K",
-            filling=source.filling,
-            velocity=source.velocity_km_s,
-            width=source.fwhm_km_s,
+            excitation=f"{layer.excitation_k!r} K",
+            background=f"{layer.background_k!r} K",
+            filling=layer.filling,
+            velocity=layer.velocity_km_s,
+            redshift=layer.redshift,
+            width=layer.fwhm_km_s,
             range=f"{first!r}:{last!r} MHz",
         ),
         observables=EmissionObservables(least_depth=asked.least_depth),
     )
+
+
+def _departures(source: Source, layer: Source) -> dict[str, Any]:
+    """What a molecule has otherwise than the first, by the keys of its section."""
+    said = {
+        "excitation": (f"{source.excitation_k!r} K", source.excitation_k != layer.excitation_k),
+        "velocity": (source.velocity_km_s, source.velocity_km_s != layer.velocity_km_s),
+        "width": (source.fwhm_km_s, source.fwhm_km_s != layer.fwhm_km_s),
+    }
+    return {name: value for name, (value, differs) in said.items() if differs}
 
 
 KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

@@ -1,0 +1,205 @@
+"""Lines that a molecule of a source emits, at its excitation temperature: computed from a top, or those of a catalogue.
+
+    I(T) = (8π³/3hc) ν g_I S μ² [exp(-E″/kT) - exp(-E′/kT)] / Q(T)          integrated absorption (`rotor.spectra.intensity`)
+
+A top is solved at the temperature; a catalogue has the lines, and Q(T) beside them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.method import hyperfine_facts
+from rotor.spectra.emission import KM_PER_S, Source, peak_depth
+from rotor.spectra.lines import line_list
+from rotor.spectra.opacity import NM2_IN_CM2
+from rotor.spectra.profiles import gaussian
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+class Partition(Protocol):
+    """Q(T) with the spin weights of the lines."""
+
+    @property
+    def source(self) -> str:
+        """Where Q is from."""
+
+    def at(self, temperature_k: float) -> float:
+        """Q at a temperature."""
+
+
+@runtime_checkable
+class CatalogueLines(Protocol):
+    """Lines of a catalogue with Q(T), (n,) each, rising in frequency (`rotor.observed.species.SpeciesLines`)."""
+
+    @property
+    def name(self) -> str:
+        """Of the molecule."""
+
+    @property
+    def source(self) -> str:
+        """Where the lines are from."""
+
+    @property
+    def partition(self) -> Partition:
+        """Q(T)."""
+
+    @property
+    def frequency_mhz(self) -> Floats:
+        """At rest."""
+
+    @property
+    def energy_upper_k(self) -> Floats:
+        """E′/k."""
+
+    @property
+    def g_upper(self) -> Floats:
+        """Degeneracy of the upper level."""
+
+    @property
+    def einstein_a_per_s(self) -> Floats:
+        """Einstein coefficient of spontaneous emission."""
+
+    @property
+    def upper(self) -> NDArray[np.str_]:
+        """Quantum numbers of the upper level."""
+
+    @property
+    def lower(self) -> NDArray[np.str_]:
+        """And of the lower."""
+
+    def intensity_nm2_mhz(self, temperature_k: float) -> Floats:
+        """I(T), integrated absorption of a molecule."""
+
+    def between(self, first_mhz: float, last_mhz: float) -> CatalogueLines:
+        """The lines of a range of frequencies."""
+
+
+@dataclass(frozen=True, eq=False)
+class EmittedLines:
+    """Lines of a molecule, (n,) each, at one temperature, and what they were made from.
+
+    energy_upper_k: E′/k. q: partition function, with its source. quanta: names of the quantum numbers in upper and lower; empty for a
+    catalogue, whose numbers are as printed. effects, hyperfine: of the Hamiltonian of a top; hyperfine is None without spins.
+    """
+
+    temperature_k: float
+    frequency_mhz: Floats
+    intensity_nm2_mhz: Floats
+    energy_upper_k: Floats
+    g_upper: Floats
+    einstein_a_per_s: Floats
+    upper: tuple[str, ...]
+    lower: tuple[str, ...]
+    q: float
+    q_source: str
+    quanta: tuple[str, ...] = ()
+    effects: tuple[QuantumEffect, ...] = ()
+    hyperfine: dict[str, Any] | None = None
+    notes: tuple[str, ...] = ()
+
+    def where(self, rows: Ints) -> EmittedLines:
+        """The lines of these rows."""
+        columns = ("frequency_mhz", "intensity_nm2_mhz", "energy_upper_k", "g_upper", "einstein_a_per_s")
+        taken: dict[str, Any] = {name: getattr(self, name)[rows] for name in columns}
+        taken |= {name: tuple(getattr(self, name)[row] for row in rows.tolist()) for name in ("upper", "lower")}
+        return replace(self, **taken)
+
+
+def emitted_lines(
+    molecule: Top | CatalogueLines,
+    source: Source,
+    range_mhz: tuple[float, float],
+    least_depth: float,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> EmittedLines:
+    """Lines of a molecule whose centre is observed in a range and whose optical depth there is large enough.
+
+    Parameters
+    ----------
+    molecule : Top or CatalogueLines
+    source : Source
+        Column density, excitation temperature, width, velocity and redshift of the molecule.
+    range_mhz : (float, float)
+        As observed.
+    least_depth : float
+        Optical depth at the centre of the weakest line.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian of a top.
+
+    Returns
+    -------
+    EmittedLines
+
+    Raises
+    ------
+    ValueError
+        For a catalogue whose Q(T) does not reach to the temperature.
+    """
+    first, last = (ν / source.frequency_ratio for ν in range_mhz)
+    if isinstance(molecule, CatalogueLines):
+        return _of_catalogue(molecule, source, (first, last), least_depth)
+    return _of_top(molecule, source, (first, last), least_depth, tuple(effects))
+
+
+def _of_top(
+    top: Top, source: Source, rest_mhz: tuple[float, float], least_depth: float, effects: tuple[QuantumEffect, ...]
+) -> EmittedLines:
+    """The optical depth of a Gaussian at its centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the first frequency, gives the cut."""
+    width = rest_mhz[0] * source.fwhm_km_s / KM_PER_S
+    depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
+    least = math.log10(least_depth / depth_per_area)
+    lines = line_list(
+        top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=rest_mhz, effects=effects or SEMI_RIGID
+    )
+    labels = [
+        tuple(" ".join(text.split()) for text in lines.levels.labels(states)) for states in (lines.upper, lines.lower)
+    ]
+    upper_cm = lines.energy_lower_cm + lines.frequency_mhz / units.MHZ_PER_CM
+    return EmittedLines(
+        temperature_k=source.excitation_k,
+        frequency_mhz=lines.frequency_mhz,
+        intensity_nm2_mhz=lines.intensity_nm2_mhz,
+        energy_upper_k=upper_cm * units.MHZ_PER_CM / units.MHZ_PER_K,
+        g_upper=np.asarray(lines.g_upper),
+        einstein_a_per_s=lines.einstein_a_per_s,
+        upper=labels[0],
+        lower=labels[1],
+        q=float(lines.q),
+        q_source=lines.partition.source,
+        quanta=tuple(lines.quanta_names),
+        effects=tuple(lines.levels.effects),
+        hyperfine=hyperfine_facts(top, lines.levels),
+        notes=tuple(lines.warnings),
+    )
+
+
+def _of_catalogue(
+    catalogue: CatalogueLines, source: Source, rest_mhz: tuple[float, float], least_depth: float
+) -> EmittedLines:
+    lines, temperature = catalogue.between(*rest_mhz), source.excitation_k
+    every = EmittedLines(
+        temperature_k=temperature,
+        frequency_mhz=lines.frequency_mhz,
+        intensity_nm2_mhz=lines.intensity_nm2_mhz(temperature),
+        energy_upper_k=lines.energy_upper_k,
+        g_upper=lines.g_upper,
+        einstein_a_per_s=lines.einstein_a_per_s,
+        upper=tuple(lines.upper.tolist()),
+        lower=tuple(lines.lower.tolist()),
+        q=catalogue.partition.at(temperature),
+        q_source=catalogue.partition.source,
+    )
+    return every.where(np.flatnonzero(peak_depth(every, source) >= least_depth))
