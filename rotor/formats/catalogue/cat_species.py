@@ -66,7 +66,25 @@ def species_of_catalogue(
     source: str = "",
     partition: PartitionTable | None = None,
 ) -> SpeciesLines:
-    """A catalogue that was read as a species; see `read_cat_species`."""
+    """A catalogue that was read as a species.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    entries, name, partition :
+        As in `read_cat_species`.
+    source : str, optional
+        File of the catalogue.
+
+    Returns
+    -------
+    SpeciesLines
+
+    Raises
+    ------
+    ValueError
+        For a catalogue with several tags.
+    """
     tags = np.unique(np.abs(catalogue.tag))
     if len(tags) != 1:
         raise ValueError(f"{source}: {len(tags)} tags; expected the lines of one species")
