@@ -489,3 +489,125 @@ def test_measured_families_have_no_false_alarm():
     file = read_family(Path(__file__).resolve().parents[1] / "examples" / "maleic_anhydride.toml")
     assert len(moments_across_planes(file.family)) >= 9
     assert not doubts(file.family)
+
+
+# Symmetry in substitution structures
+
+METHANAL = Molecule(
+    ("O", "C", "H", "H"),
+    [
+        [0, 0, 1.2072],
+        [0, 0, 0],
+        *([0, sign * 1.1039 * np.sin(np.radians(121.77)), 1.1039 * np.cos(np.radians(121.77))] for sign in (1, -1)),
+    ],
+)
+PYRAMID = Molecule(
+    ("N", "H", "H", "H"),
+    [[0, 0, 0.1], *([0.94 * np.cos(t), 0.94 * np.sin(t), -0.27] for t in np.radians([0, 120, 240]))],
+)
+METHANE = Molecule(
+    ("C", "H", "H", "H", "H"),
+    [[0, 0, 0], *(0.63 * np.array(p) for p in ([1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]))],
+)
+
+
+def shaken_family(molecule, substitutions, part=1e-4, seed=5):
+    """Rigid moments, each constant changed by about `part` of itself, as vibration does."""
+    rigid, rng = rigid_family(molecule, substitutions), np.random.default_rng(seed)
+    measured = []
+    for one, isotopes in zip(rigid.species, substitutions, strict=True):
+        shaken = {name: value * (1 + part * rng.normal()) for name, value in one.constants_mhz.items()}
+        if len(set(np.round(list(one.constants_mhz.values()), 3))) < 3:  # equal constants stay equal
+            factor = 1 + part * rng.normal()
+            shaken = {name: value * factor for name, value in one.constants_mhz.items()}
+        measured.append((one.name, isotopes, shaken, {}))
+    return family(molecule, measured)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_atoms_on_an_axis_stay_there(seed):
+    """H2CO: O and C have b = 0 without an error, angles add up to 360 degrees, r(CH) has the 0.0020 Å of Costain's rule."""
+    found = substitution_structure(shaken_family(METHANAL, ["", "1=18O", "2=13C", "3=2H"], seed=seed))
+    values = {one.name: one for one in found.values}
+    assert np.array_equal(found.positions_angstrom[:2, 1:], np.zeros((2, 2)))
+    assert np.array_equal(found.errors_angstrom[:2, 1:], np.zeros((2, 2)))
+    angles = 2 * values["a(O1-C2-H3)"].value + values["a(H3-C2-H4)"].value
+    assert angles == pytest.approx(360, abs=1e-10)  # round-off
+    assert 2 * values["a(O1-C2-H3)"].error == pytest.approx(values["a(H3-C2-H4)"].error, rel=1e-9)  # one move of both H
+    assert values["r(C2-H3)"].error == pytest.approx(0.0020, abs=1e-4)  # 0.0015 Å²/|r| of a_C, a_H and b_H
+    assert abs(values["r(C2-H3)"].value - 1.1039) < 0.0020
+    assert abs(values["a(O1-C2-H3)"].value - 121.77) < values["a(O1-C2-H3)"].error
+    assert not [note for note in found.notes if "b²" in note or "|b|" in note]
+
+
+def test_the_centre_of_a_linear_molecule_has_no_error():
+    dioxide = Molecule(("O", "C", "O"), [[0, 0, 1.16], [0, 0, 0], [0, 0, -1.16]])
+    found = substitution_structure(shaken_family(dioxide, ["", "2=13C", "1=18O"]))
+    (bond,) = found.values
+    assert not found.positions_angstrom[1].any()
+    assert not found.errors_angstrom[1].any()
+    assert bond.error == pytest.approx(0.0015 / 1.16, rel=0.01)  # Costain's rule of O alone; vibration moves r by 1e-4
+    assert abs(bond.value - 1.16) < bond.error
+    assert not found.notes
+
+
+def test_errors_across_the_axis_of_a_symmetric_top_lie_along_the_distance():
+    """NH3: δρ = K/ρ in the direction of H, not K/|b| and K/|c| of its two components, one of which may be 0."""
+    exact = substitution_structure(rigid_family(PYRAMID, ["", "1=15N", "2=2H"]))
+    found = {one.atom: one for one in exact.atoms}[2]
+    assert np.linalg.norm(found.errors_angstrom[:2]) == pytest.approx(0.0015 / 0.94, rel=1e-3)  # ρ from rigid moments
+    bond = next(one for one in exact.values if len(one.atoms) == 2)
+    assert bond.value == pytest.approx(np.hypot(0.94, 0.37), abs=1e-6)  # round-off over gaps
+    n, h = (np.abs(one.coordinates_angstrom[2]) for one in exact.atoms)
+    along = 0.37 / bond.value * np.hypot(0.0015 / n, 0.0015 / h)
+    assert bond.error == pytest.approx(np.hypot(along, 0.94 / bond.value * 0.0015 / 0.94), rel=1e-3)
+    assert not exact.atoms[0].errors_angstrom[:2].any()  # N is on the axis
+
+
+@pytest.mark.parametrize("constants", [None, ("B",)])
+def test_a_spherical_parent(constants):
+    """CH4: the distance from the centre from the moments across it, C in the centre; tetrahedral angles have no error."""
+    methane = rigid_family(METHANE, ["", "2=2H", "1=13C"])
+    if constants:
+        keep = [constants, "BC", "BC"]
+        rows = [
+            (one.name, isotopes, {name: one.constants_mhz[name] for name in names}, {})
+            for one, isotopes, names in zip(methane.species, ("", "2=2H", "1=13C"), keep, strict=True)
+        ]
+        methane = family(METHANE, rows)
+    found = substitution_structure(methane)
+    bond, angle = found.values
+    assert bond.value == pytest.approx(0.63 * np.sqrt(3), rel=1e-9)  # round-off
+    assert bond.error == pytest.approx(0.0015 / bond.value, rel=1e-9)
+    assert angle.value == pytest.approx(np.degrees(np.arccos(-1 / 3)), abs=1e-9)
+    assert angle.error < 1e-9
+    assert np.isfinite(found.errors_angstrom).all()
+    with pytest.raises(ValueError, match="shape 'spherical' need"):  # of a lighter one I_a and I_b are across
+        kraitchman([10.0] * 3, [np.nan, np.nan, 10.0], mass_u=18.0, change_u=-1.0, shape="spherical")
+    lighter = rigid_family(METHANE.with_isotopes("2=2H,3=2H,4=2H,5=2H"), ["", "2=1H"])
+    assert substitution_structure(lighter).atoms[0].kraitchman.coordinates_angstrom[0] == pytest.approx(
+        bond.value, rel=1e-9
+    )
+
+
+def test_imaginary_coordinates_have_digits():
+    found = substitution_structure(shaken_family(OCS, ["", "C=13C"], part=0.0))
+    assert not found.notes
+    small = Molecule(("O", "C", "S"), [[0, 0, 1.16], [0, 0, 0], [0, 0, -1.1601]])
+    near = family(small, [("parent", "", {"B": 9000.0}, {}), ("13C", "C=13C", {"B": 9000.001}, {})])
+    (note,) = substitution_structure(near).notes
+    assert "imaginary coordinate, a² = -6.3e-06 Å²" in note
+
+
+def test_the_command_prints_symmetric_families(call, folder):
+    """A spherical parent ended in "cannot convert float NaN to integer"."""
+    atoms = [[s, *p] for s, p in zip(METHANE.symbols, METHANE.positions_angstrom.tolist(), strict=True)]
+    (folder / "ch4.toml").write_text(
+        f'name = "CH4"\n[geometry]\natoms = {atoms}\n[[isotopologue]]\nconstants = "A=157000 B=157000 C=157000 MHz"\n'
+        '[[isotopologue]]\nisotopes = "2=2H"\nconstants = "A=157000 B=117500 C=117500 MHz"\n'
+    )
+    code, out, err = call("structure", "ch4.toml", "--method", "rs,r0")
+    assert code == 0, err
+    assert "nan" not in (out + err).lower()
+    assert "109.471 (by symmetry)" in out
+    assert out.count("spherical") == 2

@@ -41,6 +41,7 @@ Examples:
   rotor structure h2co.toml --method rs,r0 --leave-out c --plot h2co.png
   rotor structure water.toml --method re --xyz water_re.xyz"""
 
+ROUND_OFF = 1e-9  # of a value: an error below it means that symmetry fixes the value
 METHODS = ("rs", "r0", "rm1", "rm2", "re")
 
 
@@ -178,9 +179,9 @@ def _substitution_record(found: SubstitutionStructure | None) -> dict[str, Any] 
                 "atom": one.atom,
                 "isotopologue": one.species,
                 "coordinates_angstrom": one.coordinates_angstrom,
-                "squares_angstrom2": one.found.squares_angstrom2,
-                "costain_angstrom": one.found.costain_angstrom,
-                "measured_angstrom": one.found.measured_angstrom,
+                "squares_angstrom2": one.squares_angstrom2,
+                "costain_angstrom": one.costain_angstrom,
+                "measured_angstrom": one.measured_angstrom,
             }
             for one in found.atoms
         ],
@@ -294,30 +295,29 @@ def _without_table(method: str, found: Sequence[Without]) -> Table:
 def _coordinates_table(found: SubstitutionStructure) -> Table:
     rows = []
     for one in found.atoms:
-        cells = [
-            f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{round(value, 5) + 0.0:.5f}({round(error * 1e5)})"
-            for value, square, error in zip(
-                one.coordinates_angstrom.tolist(),
-                one.found.squares_angstrom2.tolist(),
-                one.found.errors_angstrom.tolist(),
-                strict=True,
-            )
-        ]
-        rows.append([str(one.atom), one.species, *cells, one.found.shape])
+        columns = (one.coordinates_angstrom, one.squares_angstrom2, one.errors_angstrom, one.zero_by_symmetry)
+        cells = [_coordinate_text(*numbers) for numbers in zip(*(list(column) for column in columns), strict=True)]
+        rows.append([str(one.atom), one.species, *cells, one.kraitchman.shape])
     return Table(
         "rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"})
     )
 
 
+def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry: bool) -> str:
+    """A coordinate with its error in the last digits; imaginary ones as i·|r|, 0 where symmetry makes it so."""
+    if zero_by_symmetry:
+        return "0"
+    return f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{value:.5f}({round(error * 1e5)})"
+
+
 def _values_table(method: str, values: Sequence[Value]) -> Table:
+    rows = [[one.name, _value_text(one.value, one.error), one.unit] for one in values]
+    return Table(method, ["coordinate", "value", "unit"], rows, frozenset({"coordinate", "unit"}))
+
+
+def _value_text(value: float, error: float) -> str:
     from rotor.fitting.publication import value_text
 
-    rows = [
-        [
-            one.name,
-            value_text(one.value, one.error) if math.isfinite(one.error) else f"{one.value:.6g} (no error)",
-            one.unit,
-        ]
-        for one in values
-    ]
-    return Table(method, ["coordinate", "value", "unit"], rows, frozenset({"coordinate", "unit"}))
+    if not math.isfinite(error):
+        return f"{value:.6g} (no error)"
+    return value_text(value, error) if error > ROUND_OFF * abs(value) else f"{value:.6g} (by symmetry)"

@@ -6,9 +6,9 @@ P = Σ m r rᵀ the matrix μ r rᵀ, μ = M Δm / (M + Δm). The eigenvalues P�
     r_i² = Π_k (P′_k - P_i) / [μ Π_{k≠i} (P_k - P_i)]
 
 which is J. Kraitchman, Am. J. Phys. 21, 17 (1953), eqs. 16 to 20, written with planar moments: three axes for an asymmetric
-top, two for an atom in the plane of a planar molecule, one on the axis of a linear one, and two (along and across) where two
-moments of the parent are equal. A square below zero, from vibration or from errors, is an imaginary coordinate: the square
-is reported and the coordinate taken as 0. Signs are not in the moments.
+top, two for an atom in the plane of a planar molecule, one on the axis of a linear one, two (along and across) where two
+moments of the parent are equal, and one, the distance from the centre, where all three are. A square below zero, from vibration or
+from errors, is an imaginary coordinate: the square is reported and the coordinate taken as 0. Signs are not in the moments.
 
 Errors: Costain's rule δr = K/|r| for what vibration does, with K = 0.0015 Å² (C. C. Costain, Trans. Am. Cryst. Assoc. 2, 157
 (1966); value of B. P. van Eijck, J. Mol. Spectrosc. 91, 348 (1982); both as quoted in the literature, not read here), and the
@@ -26,7 +26,7 @@ from rotor.arrays import Floats
 
 COSTAIN_ANGSTROM2 = 0.0015
 PAIRS = ("ab", "ac", "bc")
-SHAPES = {"asymmetric": (0, 1, 2), "planar": (0, 1), "linear": (0,), "symmetric": (0, 1)}
+SHAPES = {"asymmetric": (0, 1, 2), "planar": (0, 1), "linear": (0,), "symmetric": (0, 1), "spherical": (0,)}
 _STEP = 1e-6  # of a moment, for derivatives by central differences
 
 
@@ -35,7 +35,8 @@ class Substituted:
     """Where an atom lies in the principal axes of the parent, without signs.
 
     squares_angstrom2 : (3,) a², b², c², below zero where imaginary; 0 along an axis that the shape leaves out. For the shape
-        "symmetric" the first is along the figure axis, the second the square of the distance from it, the third 0
+        "symmetric" the first is along the figure axis, the second the square of the distance from it, the third 0; for "spherical"
+        the first is the square of the distance from the centre
     errors_of_squares : (3,) from the errors of the moments. shape : the variant that was used
     """
 
@@ -111,9 +112,11 @@ def kraitchman(
         Mass of the parent.
     change_u : float
         What the substitution adds, below zero for a lighter isotope.
-    shape : "asymmetric", "planar", "linear" or "symmetric"
-        Which axes the atom can lie off, see above. "symmetric" takes the two equal moments of the parent, which may be the
-        smaller (oblate) or the larger (prolate); a symmetric isotopologue (an atom on the axis) may have I_a = nan.
+    shape : "asymmetric", "planar", "linear", "symmetric" or "spherical"
+        Which axes the atom can lie off, see above. "spherical" takes the two moments of the isotopologue across the line from the
+        centre to the atom: the larger two of a heavier isotopologue, the smaller two of a lighter one. "symmetric" takes the two
+        equal moments of the parent, which may be the smaller (oblate) or the larger (prolate); a symmetric isotopologue (an atom on
+        the axis) may have I_a = nan.
     pair : "ab", "ac" or "bc"
         Which two moments serve for "planar"; they differ by what vibration does to the inertial defect.
     parent_errors, substituted_errors : (3,) arrays, u Å²
@@ -145,7 +148,7 @@ def kraitchman(
     mu = mass_u * change_u / (mass_u + change_u)
     both = np.array([parent, substituted], dtype=float)
     errors = np.array([parent_errors, substituted_errors], dtype=float)
-    used = _used_moments(both, shape, pair)
+    used = _used_moments(both, shape, pair, change_u)
     if not np.isfinite(both[used]).all():
         needed = ", ".join(
             axis for axis, counts in zip("ABC", np.atleast_1d(used.any(axis=0)).tolist(), strict=True) if counts
@@ -177,7 +180,7 @@ def _refuse(shape: str, pair: str, mass_u: float, change_u: float) -> None:
         )
 
 
-def _used_moments(both: Floats, shape: str, pair: str) -> NDArray[np.bool_]:
+def _used_moments(both: Floats, shape: str, pair: str, change_u: float) -> NDArray[np.bool_]:
     """Which moments (2, 3) count; a missing one of two equal moments does not."""
     if shape == "planar":
         return np.array([[axis in pair for axis in "abc"]] * 2)
@@ -185,6 +188,11 @@ def _used_moments(both: Floats, shape: str, pair: str) -> NDArray[np.bool_]:
         return np.asarray(np.isfinite(both) & np.array([[False, True, True]] * 2))
     if shape == "symmetric":
         return np.asarray(np.isfinite(both))
+    if shape == "spherical":
+        used = np.isfinite(both)
+        used[1, 0 if change_u > 0 else 2] = False
+        used |= ~used.any(axis=1, keepdims=True)  # so that a missing one is refused
+        return np.asarray(used)
     return np.ones((2, 3), dtype=bool)
 
 
@@ -197,6 +205,9 @@ def _squares(both: Floats, mu: float, shape: str, pair: str) -> Floats:
         return np.concatenate([_interlaced(p, changed, mu), [0.0]])
     if shape == "symmetric":
         return _of_symmetric(both, mu)
+    if shape == "spherical":  # I′ = I + μ r² across the line to the atom
+        across = both[1, 1:] if mu > 0 else both[1, :2]
+        return np.array([(np.nanmean(across) - np.nanmean(both[0])) / mu, 0.0, 0.0])
     p, changed = planar_moments(both)
     return _interlaced(p, changed, mu)
 

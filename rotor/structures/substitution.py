@@ -1,14 +1,16 @@
 """r_s: the substitution structure of a family, atom by atom, and the bonds and angles between the atoms it has.
 
 Every isotopologue with one atom replaced gives that atom's coordinates (`kraitchman`); atoms that symmetry makes equal are
-copied from it. Signs come from the start geometry. Bonds and angles carry the errors of the coordinates, Costain's and
-those of the constants, taken as independent from atom to atom.
+copied from it, and coordinates that the symmetry of an atom's site makes 0 are 0 without an error. Signs come from the start
+geometry, and of symmetric and spherical parents the direction across the axis or from the centre. Bonds and angles carry the errors
+of the coordinates, Costain's and those of the constants, taken as independent between atoms that are not copies of each other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,24 +19,58 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.structures.coordinates import Named, bonds_and_angles
 from rotor.structures.family import PLANAR_WITHIN_ANGSTROM, Family, Species
-from rotor.structures.kraitchman import PAIRS, Substituted, kraitchman
+from rotor.structures.kraitchman import PAIRS, SHAPES, Substituted, kraitchman
 
+ROUND_OFF = 1e-9  # of a unit vector: a component along an axis
 ON_AXIS_ANGSTROM = 1e-3  # of the figure axis of a symmetric top: an atom so near is on it
 
 
 @dataclass(frozen=True)
 class SubstitutedAtom:
-    """An atom, from 1, the isotopologue it is from, what Kraitchman's equations say, and signs (3,) from the geometry."""
+    """An atom, from 1, the isotopologue it is from, what Kraitchman's equations say, and the directions of their coordinates.
+
+    directions : (3, 3) rows, one for each coordinate of `kraitchman`, with the signs of the start geometry, in the axes of the parent.
+        Unit vectors, but 0 where the shape or the symmetry of the atom's site makes the coordinate 0.
+    """
 
     atom: int
     species: str
-    found: Substituted
-    signs: Floats
+    kraitchman: Substituted
+    directions: Floats
 
     @property
     def coordinates_angstrom(self) -> Floats:
         """a, b, c (3,) with signs."""
-        return np.asarray(self.signs * self.found.coordinates_angstrom)
+        return np.asarray(self.kraitchman.coordinates_angstrom @ self.directions) + 0.0
+
+    @property
+    def squares_angstrom2(self) -> Floats:
+        """a², b², c² (3,), below zero where imaginary."""
+        return np.asarray(self.kraitchman.squares_angstrom2 @ self.directions**2)
+
+    @property
+    def costain_angstrom(self) -> Floats:
+        """What vibration may do to a, b, c (3,)."""
+        return self._along_axes(self.kraitchman.costain_angstrom)
+
+    @property
+    def measured_angstrom(self) -> Floats:
+        """Errors of a, b, c (3,) that those of the moments make."""
+        return self._along_axes(self.kraitchman.measured_angstrom)
+
+    @property
+    def errors_angstrom(self) -> Floats:
+        """Both together (3,)."""
+        return self._along_axes(self.kraitchman.errors_angstrom)
+
+    @property
+    def zero_by_symmetry(self) -> tuple[bool, bool, bool]:
+        """Which of a, b, c vanish because no direction has a part along the axis."""
+        a, b, c = (~np.any(self.directions, axis=0)).tolist()
+        return a, b, c
+
+    def _along_axes(self, errors: Floats) -> Floats:
+        return np.asarray(np.sqrt(errors**2 @ self.directions**2))
 
 
 @dataclass(frozen=True)
@@ -88,10 +124,10 @@ def substitution_structure(
     if not atoms:
         raise ValueError(f"{family.name}: r_s needs isotopologues with one atom replaced, and there is none")
 
-    positions, errors = _with_equal_atoms(family, atoms, ours)
+    placed = _with_equal_atoms(family, atoms, ours)
     asked = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
-    values = tuple(_value(one, positions, errors) for one in asked if _known(one, positions))
-    return SubstitutionStructure(tuple(atoms), positions, errors, values, tuple(notes))
+    values = tuple(_value(one, placed) for one in asked if _known(one, placed.positions))
+    return SubstitutionStructure(tuple(atoms), placed.positions, placed.errors, values, tuple(notes))
 
 
 def replaced_atom(parent: Molecule, other: Molecule) -> int | None:
@@ -113,9 +149,11 @@ def _substituted(family: Family, species: Species, atom: int, ours: Floats, pair
         parent_errors=parent.moment_errors,
         substituted_errors=other.moment_errors,
     )
-    if shape == "symmetric":
-        found = _split_across(found, family, ours[atom])
-    return SubstitutedAtom(atom + 1, species.name, found, np.where(ours[atom] < 0, -1.0, 1.0))
+    directions = _directions(family.top.kind, ours[atom])
+    allowed = np.linalg.norm(directions @ _site_projector(family, ours, atom), axis=1) > 0.5  # 1 or 0 but for round-off
+    allowed &= np.isin(np.arange(3), SHAPES[shape])
+    directions = np.where(allowed[:, None], directions, 0.0)
+    return SubstitutedAtom(atom + 1, species.name, found, directions)
 
 
 def _shape(family: Family, place: Floats) -> str:
@@ -123,50 +161,85 @@ def _shape(family: Family, place: Floats) -> str:
         return "linear"
     if family.top.kind in ("prolate", "oblate"):
         return "symmetric"
+    if family.top.kind == "spherical":
+        return "spherical"
     return "planar" if family.planar and abs(place[2]) < PLANAR_WITHIN_ANGSTROM else "asymmetric"
 
 
-def _split_across(found: Substituted, family: Family, place: Floats) -> Substituted:
-    """z² and ρ² put onto a, b, c: across the axis in the direction that the atom has in the start geometry."""
-    along = 0 if family.top.kind == "prolate" else 2
-    across = [i for i in range(3) if i != along]
-    rho2 = float((place[across] ** 2).sum())
-    share = np.zeros(3)
-    share[across] = place[across] ** 2 / rho2 if rho2 > ON_AXIS_ANGSTROM**2 else 0.0
-    squares, errors = found.squares_angstrom2[1] * share, found.errors_of_squares[1] * share
-    squares[along], errors[along] = found.squares_angstrom2[0], found.errors_of_squares[0]
-    return Substituted(squares, errors, "asymmetric")
+def _directions(kind: str, place: Floats) -> Floats:
+    """Rows (3, 3): where each coordinate of Kraitchman's equations points from the centre, at the place in the start geometry.
+
+    a, b, c; of a symmetric top along the axis and across it, of a spherical one from the centre to the atom.
+    """
+    signs = np.diag(np.where(place < 0, -1.0, 1.0))
+    if kind not in ("prolate", "oblate", "spherical"):
+        return signs
+    out = np.zeros((3, 3))
+    across = place.copy()
+    if kind != "spherical":
+        along = 0 if kind == "prolate" else 2
+        out[0] = signs[along]
+        across[along] = 0.0
+    distance = np.linalg.norm(across)
+    if distance > ON_AXIS_ANGSTROM:
+        out[0 if kind == "spherical" else 1] = across / distance
+    return np.where(np.abs(out) < ROUND_OFF, 0.0, out)
+
+
+def _site_projector(family: Family, ours: Floats, atom: int) -> Floats:
+    """The projector (3, 3) on displacements that the operations which leave an atom in its place preserve.
+
+    Where the geometry says that an atom lies on an axis or in a plane, its coordinate across is 0 without an error.
+    """
+    symmetry = symmetry_of(_in_frame(family.molecule, ours))
+    if family.linear:  # the half turn of a centrosymmetric molecule is the last rotation
+        turned = symmetry.rotations[-1].permutation
+        return np.eye(3) * float(len(symmetry.rotations) == 1 or turned[atom] != atom)
+    staying = [one.matrix for one in (*symmetry.rotations, *symmetry.improper) if one.permutation[atom] == atom]
+    return np.asarray(np.mean(staying, axis=0))
 
 
 def _doubts(one: SubstitutedAtom) -> list[str]:
-    letters = [axis for axis, bad in zip("abc", one.found.imaginary, strict=True) if bad]
-    small = [
-        axis
-        for axis, size, bad in zip("abc", one.found.coordinates_angstrom, one.found.imaginary, strict=True)
-        if 0 < size < 0.15 and not bad
-    ]
     out = []
-    if letters:
-        squares = ", ".join(f"{axis}² = {one.found.squares_angstrom2['abc'.index(axis)]:.5f}" for axis in letters)
-        out.append(f"atom {one.atom} ({one.species}): imaginary coordinate, {squares} Å²; taken as 0")
+    sizes, squares = one.coordinates_angstrom, one.squares_angstrom2
+    imaginary = [axis for axis, square in zip("abc", squares.tolist(), strict=True) if square < 0]
+    small = [axis for axis, size in zip("abc", np.abs(sizes).tolist(), strict=True) if 0 < size < 0.15]
+    if imaginary:
+        texts = ", ".join(f"{axis}² = {squares['abc'.index(axis)]:.2g}" for axis in imaginary)
+        out.append(f"atom {one.atom} ({one.species}): imaginary coordinate, {texts} Å²; taken as 0")
     if small:
         out.append(f"atom {one.atom} ({one.species}): |{'|, |'.join(small)}| below 0.15 Å is not trustworthy")
     return out
 
 
-def _with_equal_atoms(family: Family, atoms: list[SubstitutedAtom], ours: Floats) -> tuple[Floats, Floats]:
-    """Positions and errors (n, 3), atoms that symmetry makes equal to a substituted one copied from it."""
-    positions, errors = np.full(ours.shape, np.nan), np.full(ours.shape, np.nan)
-    for one in atoms:
-        positions[one.atom - 1], errors[one.atom - 1] = one.coordinates_angstrom, one.found.errors_angstrom
+class _Placed(NamedTuple):
+    """Positions (n, 3), nan where unknown; how each coordinate of Kraitchman's equations moves them (c, n, 3), and its error (c,)."""
+
+    positions: Floats
+    moves: Floats
+    sigmas: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """Errors (n, 3) along the axes, nan where the position is unknown."""
+        spread = np.sqrt(np.tensordot(self.sigmas**2, self.moves**2, axes=1))
+        return np.where(np.isnan(self.positions), np.nan, spread)
+
+
+def _with_equal_atoms(family: Family, atoms: list[SubstitutedAtom], ours: Floats) -> _Placed:
+    """The substituted atoms and those that symmetry makes equal to one, which move with it."""
+    positions, moves = np.full(ours.shape, np.nan), np.zeros((3 * len(atoms), *ours.shape))
+    for place, one in enumerate(atoms):
+        positions[one.atom - 1] = one.coordinates_angstrom
+        moves[3 * place : 3 * place + 3, one.atom - 1] = one.directions
     symmetry = symmetry_of(_in_frame(family.molecule, ours))
     for operation in (*symmetry.rotations, *symmetry.improper):
-        for one in atoms:
+        for place, one in enumerate(atoms):
             image = int(operation.permutation[one.atom - 1])
             if np.isnan(positions[image, 0]):
                 positions[image] = operation.matrix @ positions[one.atom - 1]
-                errors[image] = np.sqrt(operation.matrix**2 @ errors[one.atom - 1] ** 2)
-    return positions, errors
+                moves[3 * place : 3 * place + 3, image] = one.directions @ operation.matrix.T
+    return _Placed(positions, moves, np.concatenate([one.kraitchman.errors_angstrom for one in atoms]))
 
 
 def _in_frame(molecule: Molecule, positions: Floats) -> Molecule:
@@ -177,10 +250,11 @@ def _known(one: Named, positions: Floats) -> bool:
     return bool(np.isfinite(positions[[atom - 1 for atom in one.atoms]]).all())
 
 
-def _value(one: Named, positions: Floats, errors: Floats) -> Value:
-    """A coordinate between substituted atoms, with the errors of its own atoms."""
+def _value(one: Named, placed: _Placed) -> Value:
+    """A coordinate between known atoms; atoms that symmetry makes equal have one error, not several."""
+    positions = placed.positions
     alone = Named(one.name, one.atoms, (one.atoms,))
     filled = np.where(np.isnan(positions), np.arange(positions.size).reshape(positions.shape) + 100.0, positions)
-    gradient = alone.gradient(filled).reshape(positions.shape)
-    spread = np.sqrt(np.sum((gradient * np.nan_to_num(errors)) ** 2))
-    return Value(one.name, one.atoms, alone.value(filled), float(spread) * one.factor, one.unit)
+    slopes = np.tensordot(placed.moves, alone.gradient(filled).reshape(positions.shape), axes=2)
+    spread = float(np.linalg.norm(slopes * placed.sigmas))
+    return Value(one.name, one.atoms, alone.value(filled), spread * one.factor, one.unit)
