@@ -187,3 +187,26 @@ def test_overlapping_levels_of_spins_have_one_label(limits, expected):
     figure = levels_figure(table, top, unit="MHz", view=View(vertical=limits))
     texts = {text.get_text() for text in figure.axes[0].texts if "$1_{0,1}" in text.get_text()}
     assert texts == {one if isinstance(one, str) else f"$1_{{0,1}}, F{{=}}{one}$" for one in expected}
+
+
+def test_ammonia_counts_from_the_lowest_level_that_exists_and_says_which(call):
+    """Of J = K = 0 the upper inversion level alone exists (three protons are fermions): v = 1, 0.793 cm⁻¹ above the other."""
+    code, out, err = call("levels", "NH3", "--jmax", "2")
+    assert (code, err) == (0, "")
+    head, table = out.split("all levels, in order of energy")
+    assert "v J K = 1 0 0, 23785.6961 MHz above the Hamiltonian's zero: energies count from this level" in head
+    assert "12: J from 0 to 2; 3 of spin weight 0 do not exist and are not shown" in head
+    rows = [line.split() for line in table.splitlines() if line[:3].strip().isdigit()]
+    assert len(rows) == 9
+    assert rows[0][:4] == ["1", "0", "0", "0.000000"]
+    assert all(float(row[3]) >= 0 for row in rows)
+    assert all(int(row[4]) > 0 for row in rows)
+    weights = [line.split(": ") for line in head.splitlines() if "0even" in line]
+    assert [text.split("  ")[0] for *_, text in weights] == [
+        "0even 0, 0odd 4, 1 1, 2 1 (each of K and -K)",
+        "0even 4, 0odd 0, 1 1, 2 1",
+    ]
+    assert "0 2, 1 1" not in head  # weights of both states together contradict the table
+    by_label = {tuple(row[:3]): int(row[4]) for row in rows}
+    assert by_label[("1", "0", "0")] == 4  # 0even of 0-
+    assert by_label[("0", "1", "1")] == 2  # K and -K

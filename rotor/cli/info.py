@@ -124,11 +124,10 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         heading = "reduction" if top.constants.reduction else "representation"
         facts.append((heading, report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
-    weights = report.weights_text(content["spin_weights"])
     facts += [
         ("dipole", dipole),
         ("polarizability", report.tensor_text(top)),
-        ("spin weights", weights),
+        *report.weights_facts(top, content["spin_weights"]),
         *report.states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),

@@ -179,7 +179,6 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     from rotor.reports import top_facts as report
 
     top = functions.top
-    weights = report.weights_text(content["spin_weights"])
     corrections = content["classical_corrections"]
     series = " ".join(
         f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
@@ -188,7 +187,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     )
     return [
         ("constants", report.constants_text(top)),
-        ("spin weights", weights),
+        *report.weights_facts(top, content["spin_weights"]),
         *(one for one in report.states_facts(top) if not one[1].startswith("dipole")),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),

@@ -69,14 +69,12 @@ def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def states_facts(top: Top) -> list[tuple[str, str]]:
-    """Names, spin weights and dipoles of several states, and where they are from."""
+    """Names and dipoles of several states."""
     states = top.states
     if states is None:
         return []
     names = [f"{v} ({states.name_of(v)})" if states.names else str(v) for v in range(states.count)]
     facts = [("states", f"v = {', '.join(names)}")]
-    for v, one in sorted(states.weights.items()):
-        facts.append(("", f"spin weights of {states.name_of(v)}: {weights_text(one.to_mapping())}"))
     for (up, low), moment in states.dipoles.items():
         where = f"in {states.name_of(up)}" if up == low else f"between {states.name_of(low)} and {states.name_of(up)}"
         facts.append(("", f"dipole {where}: {vector_text(moment)}"))
@@ -126,6 +124,22 @@ def tensor_text(top: Top) -> str:
     names = (("aa", 0, 0), ("bb", 1, 1), ("cc", 2, 2), ("ab", 0, 1), ("ac", 0, 2), ("bc", 1, 2))
     shown = [f"{name} {tensor[i][k]:.6g}" for name, i, k in names if i == k or tensor[i][k]]
     return ", ".join(shown) + " Å³"
+
+
+_COMPONENTS = {
+    "prolate": "each of K and -K", "oblate": "each of K and -K", "spherical": "each of the components of a level",
+}  # fmt: skip
+
+
+def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]:
+    """Spin weights of the levels: those of every state where states have their own, else those of the top."""
+    states = top.states
+    if states is None or not states.weights:
+        components = f" ({_COMPONENTS[top.kind]})" if mapping and top.kind in _COMPONENTS else ""
+        return [("spin weights", weights_text(mapping) + components)]
+    texts = [f"{states.name_of(v)}: {weights_text(one.to_mapping())}" for v, one in sorted(states.weights.items())]
+    texts[0] += f" ({_COMPONENTS[top.kind]})" if top.kind in _COMPONENTS else ""
+    return [("" if i else "spin weights", text) for i, text in enumerate(texts)]
 
 
 def weights_text(mapping: Mapping[str, int]) -> str:

@@ -75,6 +75,10 @@ def show(answer: LevelsAnswer, report: Report) -> None:
 
 
 def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    import numpy as np
+
+    from rotor.quantum.quanta import headings
+
     top, request = answer.request.top, answer.request
     between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
     limits = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
@@ -82,31 +86,39 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
         limits += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
     if request.max_energy_mhz is not None:
         limits += f", up to {request.max_energy_mhz:g} MHz"
-    ground = f"{round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
+    levels = answer.table.levels
+    lowest = levels.energy_mhz == content["ground_mhz"]
+    name = ", ".join(" ".join(label.split()) for label in levels.labels(np.flatnonzero(lowest & (levels.weight > 0))))
+    ground = f"{headings(levels.quanta_names)} = {name}, {round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
+    absent = int((levels.weight[answer.table.rows] == 0).sum())
+    if absent:
+        limits += f"; {absent} of spin weight 0 do not exist and are not shown"
     return [
         ("constants", top_facts.constants_text(top)),
-        ("spin weights", top_facts.weights_text(content["spin_weights"])),
+        *top_facts.weights_facts(top, content["spin_weights"]),
         *top_facts.states_facts(top)[:1],
         ("levels", f"{len(answer.table)}: {limits}"),
-        ("lowest", f"{ground}: energies count from there"),
+        ("lowest", f"{ground}: energies count from this level, the lowest that exists"),
         *hyperfine_lines(content["hyperfine"]),
     ]
 
 
 def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
-    """The lowest levels, in order of energy."""
+    """The lowest levels that exist, in order of energy."""
     import numpy as np
 
     from rotor.quantum import quanta
 
     table = answer.table
-    rows = np.argsort(table.energy_mhz, kind="stable")[: shown.top_levels]
+    order = np.argsort(table.energy_mhz, kind="stable")
+    existing = order[table.levels.weight[table.rows[order]] > 0]
+    rows = existing[: shown.top_levels]
     name, form = COLUMNS[shown.unit]
     energy, columns = getattr(table, name)[rows], table.columns
     labels = table.levels.labels(table.rows[rows])
     numbers = energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist()
     cells = [(label, form.format(e), str(weight), str(g)) for label, e, weight, g in zip(labels, *numbers, strict=True)]
-    title = the_first(len(rows), "lowest level") if len(rows) < len(table) else "all levels"
+    title = the_first(len(rows), "lowest level") if len(rows) < len(existing) else "all levels"
     head = (quanta.headings(table.levels.quanta_names), f"E ({shown.unit})", "spin weight", "g")
     return Table(f"{title}, in order of energy", head, cells)
 

@@ -71,7 +71,7 @@ def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]
         ("constants", top_facts.constants_text(top)),
         ("polarizability", top_facts.tensor_text(top)),
         ("anisotropy", f"{record['anisotropy_angstrom3']:.6g} Å³"),
-        ("spin weights", top_facts.weights_text(record["spin_weights"])),
+        *top_facts.weights_facts(top, record["spin_weights"]),
         *top_facts.states_facts(top)[:1],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("laser", f"{lines.laser_nm:g} nm in vacuum"),

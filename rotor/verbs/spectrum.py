@@ -223,7 +223,11 @@ def _facts(lines: Lines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("constants", top_facts.constants_text(top) if named else "those of the file, which have no names here"),
         ("dipole", top_facts.vector_text(top.dipole_abc_debye) if named else "the moments of the file"),
-        ("spin weights", "those of the file" if spin_weights is None else top_facts.weights_text(spin_weights)),
+        *(
+            [("spin weights", "those of the file")]
+            if spin_weights is None
+            else top_facts.weights_facts(top, spin_weights)[:MOST_FACTS_OF_STATES]
+        ),
         *top_facts.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("Q", top_facts.q_text(record["q"], classical=named)),
