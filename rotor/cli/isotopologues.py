@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -70,6 +70,7 @@ def _family(
     parent: Top, min_abundance: float | None, each: Sequence[str], site: Sequence[str]
 ) -> tuple[Isotopologue, ...]:
     """Those above the least abundance, those of --each, that of --site; none of them twice."""
+    from rotor.formats.molecules.fitted_isotopologue import with_fitted_isotopologue
     from rotor.tops.isotopes.isotopologues import isotopologue, isotopologues, single_substitutions
 
     family: list[Isotopologue] = []
@@ -81,7 +82,7 @@ def _family(
         family += inputs.parsed("--each", text, lambda value: single_substitutions(parent, *_substitution(value)))
     if site:
         family.append(inputs.parsed("--site", ",".join(site), lambda text: isotopologue(parent, text)))
-    return tuple({one.label: one for one in family}.values())
+    return tuple({one.label: replace(one, top=with_fitted_isotopologue(one.top)) for one in family}.values())
 
 
 def _tell(parent: Top, family: Sequence[Isotopologue]) -> None:

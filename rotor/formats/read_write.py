@@ -188,9 +188,10 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
 def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
     if not isotopes:
         return top
+    from rotor.formats.molecules.fitted_isotopologue import with_fitted_isotopologue
     from rotor.tops.isotopes.isotopologues import isotopologue
 
-    return isotopologue(top, isotopes).top
+    return with_fitted_isotopologue(isotopologue(top, isotopes).top)
 
 
 def read_top_file(path: Path) -> Top:
