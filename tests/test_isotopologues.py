@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 import rotor
 from rotor.cli import run
+from rotor.formats.molecules import fitted_isotopologue
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import data_folder, isotope, natural_isotopes
 from rotor.molecules.readers.read import g2_molecule
@@ -207,6 +208,11 @@ def test_other_molecules_are_not_pointed_out(call):
     for changes in ("O=18O", "2=3H"):
         assert not [note for note in rotor.read("water", isotopes=changes).notes if "the library has" in note]
     assert not [note for note in rotor.read("water", isotopes="H=1H").notes if "the library has" in note]
+    places = [rotor.read("N2O").molecule.with_isotopes(f"{n}=15N") for n in (1, 2)]
+    assert not fitted_isotopologue._same(*places)
+    assert fitted_isotopologue._same(
+        places[0], replace(places[0], positions_angstrom=places[0].positions_angstrom * 1.01)
+    )
     code, _, err = call("isotopologues", "water", "--site", "2=2H", "--site", "3=2H")
     assert code == 0
     assert "the library has constants of this isotopologue itself, 'D2O'" in err

@@ -23,7 +23,10 @@ from rotor.tops.top import Top
 
 # Scaled distortion constants beside fitted ones (test_isotopologues.py measures them anew).
 _OFF_HEAVY = "by up to 1.1 % (quartic) and 10 % (sextic) where heavy atoms were replaced (OCS, HC3N)"
-_OFF_HYDROGEN = "by 4 % (DC3N), 3 to 13 % (H2O to D2O) and 15 to 27 % (NH3 to ND3), sextic ones by up to 107 %, so that even their sign may be wrong"
+_OFF_HYDROGEN = (
+    "by 4 % (DC3N), 3 to 13 % (H2O to D2O) and 15 to 27 % (NH3 to ND3) where hydrogen was replaced, sextic ones by up to 107 %, so "
+    "that even their sign may be wrong"
+)
 TURNED_TOO_FAR_DEGREES = 5.0  # beyond it distortion constants are not carried over
 
 
