@@ -129,8 +129,8 @@ phases that its diagonalization leaves, component by component of one line. Stre
 
 16 of the later inputs were then spelled in 144 other ways (tabs, carriage returns, D exponents, missing errors and labels, long
 titles, blank lines, other counts, commas, comments, text at the end): 129 were read as the program reads them; the others had an empty
-title or a QROT below 1 (read here), a parameter without a value (where the program ends its list without a word) or of a state that
-does not exist: both are refused.
+title or a QROT below 1 (read here), a parameter without a value (where the program ends its list without a word; refused here) or of a
+state that does not exist (left out, with a note).
 
 Moments of every TYP and SYM were compared in some 300 runs (some of one input again) of one and two states in both bases, alone and
 beside dipoles, with and without spins. All are equal but TYP 7 with n = 0 and a ρ of the other sign, TYP 1, 2 and 5 beside a dipole of

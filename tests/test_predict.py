@@ -115,7 +115,6 @@ def test_what_the_program_does_in_silence_is_said():
     [
         ({"fbgn": 5, "fend": 2}, "F runs from FBGN to FEND"),
         ({"fend": 360}, "from 0 to 359"),
-        ({"more": b" 11 100000 0\n"}, "state 1 does not exist"),
     ],
 )
 def test_what_cannot_be_predicted_is_refused(change, words):

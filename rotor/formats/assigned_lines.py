@@ -36,6 +36,8 @@ from rotor.formats.spcat.text.lin import (
     note_of_remarks,
     read_lin,
     with_defaults,
+    without_v,
+    without_zeros_behind,
     write_lin,
 )
 from rotor.quantum.quanta import value_text
@@ -111,12 +113,13 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
         return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _table_of(path)[0])
     if not text.endswith(".lin"):
         return False
-    lines = read_lin(path, count)
+    lines = without_v(without_zeros_behind(read_lin(path, count), count), count)
     return len(lines) > 0 and len(lines.measured(0).quanta) // 2 > count
 
 
 def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    lines = with_defaults(read_lin(path, len(names)), names)
+    read = read_lin(path, len(names))
+    lines = with_defaults(read if {"v", "f"} & set(names) else without_v(read, len(names)), names)
     blends = lines.blends()
     used = blends >= 0
     notes = [note_of_defaults(lines)] if lines.defaulted else []

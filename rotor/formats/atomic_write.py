@@ -20,6 +20,10 @@ PREFIX = ".rotor-"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the disk, a quota, the largest file allowed, the device
 
 
+class DoesNotFitError(ValueError):
+    """A result that the format of one file cannot hold; files of other formats are written all the same."""
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A path to write to, in a folder of its own beside; moved to `path` when the block ends, removed when it fails.

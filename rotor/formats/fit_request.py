@@ -215,7 +215,7 @@ def constants_for(lines: str, top: Top, free: Sequence[str]) -> ConstantSet:
     if hyperfine and top.spin_constants is None:
         raise ValueError(
             f"{lines}: lines or free constants of spins, and the constants to start from have none; give them there, such as "
-            "[spins.14N] with chi_aa = -4.2"
+            "[spins.14N] with chi_aa = -4.2" + ("" if top.states else "; a number v of the state needs [states] there")
         )
     return TopConstants(top, hyperfine) if hyperfine or top.states is not None else top.constants
 

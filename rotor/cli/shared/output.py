@@ -114,10 +114,14 @@ class Files:
         _HELD.enter_context(locked_file(end))
         self.paths[option] = target
 
-    def write(self, writers: Mapping[str, Writer]) -> None:
-        """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none."""
-        from rotor.formats.atomic_write import FULL, naming, place, unfinished_folder
+    def write(self, writers: Mapping[str, Writer]) -> list[str]:
+        """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none.
 
+        Returns why files are left out whose format cannot hold the result.
+        """
+        from rotor.formats.atomic_write import FULL, DoesNotFitError, naming, place, unfinished_folder
+
+        left_out = list[str]()
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
             for option, target in self.paths.items():
@@ -127,11 +131,16 @@ class Files:
                     if error.errno in FULL:
                         raise OSError(error.errno, error.strerror, str(target)) from error
                     raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
-                with naming(target):
-                    writers[option](folder / target.name)
+                try:
+                    with naming(target):
+                        writers[option](folder / target.name)
+                except DoesNotFitError as error:
+                    left_out.append(f"{option}: {target} is not written: {error}")
+                    continue
                 moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
             for made, path in moves:
                 place(made, path)
+        return left_out
 
 
 def _resolved(option: str, path: Path) -> Path:
@@ -144,12 +153,17 @@ def _resolved(option: str, path: Path) -> Path:
 
 
 def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:
-    """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints."""
-    files.write({**writers, "--json": lambda path: write_text(path, json())})
+    """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints.
+
+    Raises ComputationError at the end for files whose format cannot hold the result.
+    """
+    left_out = files.write({**writers, "--json": lambda path: write_text(path, json())})
     if "--json" in files.screen:
         print(json(), end="")
     else:
         show()
+    if left_out:
+        raise ComputationError("; ".join(left_out))
 
 
 def write_text(path: Path, text: str) -> None:

@@ -16,7 +16,13 @@ from rotor.arrays import Ints
 from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, with_their_spins
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, coded_lines, real_ones
+from rotor.formats.spcat.hamiltonian.file_effect import (
+    CodedLine,
+    FileEffect,
+    coded_lines,
+    real_ones,
+    reasons_of_states,
+)
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import named_by
@@ -197,11 +203,11 @@ def moments_within_states(
 
 
 def left_out(file: ParameterFile) -> list[str]:
-    """A sentence for every parameter that the declared symmetry forbids or whose spins SPIND does not name."""
+    """A sentence for every parameter that the declared symmetry forbids, or whose spins or states the file does not have."""
     states = states_of(file)
     doubled = pairs_of(states)
     lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), members_of_pairs(doubled)).odd)
-    return reasons + with_their_spins(lines, states)[1]
+    return reasons_of_states(file, len(states)) + reasons + with_their_spins(lines, states)[1]
 
 
 def members_of_pairs(doubled: list[Pair]) -> frozenset[int]:

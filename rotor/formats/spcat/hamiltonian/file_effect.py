@@ -65,7 +65,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     """The parameter lines of a file with so many states, one for each state where its series has constants of each.
 
     A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT
-    takes for a place holder, and a constant of a series is none.
+    takes for a place holder, nor one of a state that does not exist (`reasons_of_states`); a constant of a series is none.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     Raises
     ------
     ValueError
-        Naming the line, for what does not compute: an unknown operator or state, a violation of time reversal.
+        Naming the line, for what does not compute: an unknown operator, a violation of time reversal.
     """
     options, wild = file.options[0], 10 ** state_digits(states) - 1
     if not 0 <= options.xopt < 80:
@@ -94,12 +94,10 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
         low, high = sorted((digits.v1, digits.v2))
-        if parameter.value == 0.0 or (high == wild and low != wild) or is_constant(digits):
+        if parameter.value == 0.0 or (high == wild and low != wild) or is_constant(digits) or states <= high != wild:
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
-            if states <= high != wild:
-                raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
             own = None if low == wild else (low, high)
             lines = (
                 _of_series(digits, own, states, series, options)
@@ -111,6 +109,18 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
         found += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
     return found
+
+
+def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
+    """A sentence for every parameter of a state that does not exist, which SPCAT passes over."""
+    wild, reasons = 10 ** state_digits(states) - 1, list[str]()
+    for parameter in file.parameters:
+        digits = split_code(parameter.code, states)
+        high = max(digits.v1, digits.v2)
+        if states <= high != wild and parameter.value:
+            why = f"state {high} does not exist, NVIB = {states} counts from 0"
+            reasons.append(f"parameter {parameter.code} is left out, as SPCAT does: {why}")
+    return reasons
 
 
 def _plain_line(digits: Digits, states: tuple[int, int] | None, options: Options) -> CodedLine:

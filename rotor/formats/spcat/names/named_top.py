@@ -21,7 +21,7 @@ from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.file_spins import with_their_spins
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_ones
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_ones, reasons_of_states
 from rotor.formats.spcat.hamiltonian.operators import PAIRS, TYPES_BETWEEN
 from rotor.formats.spcat.hamiltonian.phases import axis_of, phases_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
@@ -68,6 +68,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     odd = phases_of(file, len(states), frozenset()).odd
     left_out += real_ones(lines, odd, frozenset())[1] + with_their_spins(lines, states)[1]
+    left_out += reasons_of_states(file, len(states))
     if odd and any(axis_of(line.typ) for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     if left_out:

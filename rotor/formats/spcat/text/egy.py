@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.atomic_write import open_atomic
+from rotor.formats.atomic_write import DoesNotFitError, open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_decimal, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, read_lines
 
@@ -146,11 +146,20 @@ def _quanta(line: Line, first: int) -> tuple[int, ...]:
 
 
 def format_level(level: Level) -> str:
-    """The line of a level as SPCAT writes it; ValueError for numbers that do not fit its columns."""
+    """The line of a level as SPCAT writes it; DoesNotFitError for numbers that do not fit its columns."""
     text = _plain_text(level)
-    if text.find(":") != _COLON or any(not -99 <= q <= 999 for q in level.quanta):
-        raise ValueError(f"{level} does not fit the columns of an .egy file")
+    wide = [f"quantum number {q}" for q in level.quanta if not -99 <= q <= 999]
+    wide += [f"{name} = {value:.10g}" for name, value, limit in _largest_of(level) if not abs(value) < limit]
+    if wide or text.find(":") != _COLON:
+        quanta = " ".join(map(str, level.quanta))
+        raise DoesNotFitError(f"level {quanta}: {wide[0] if wide else 'a number'} does not fit the columns of an .egy file")
     return text
+
+
+def _largest_of(level: Level) -> list[tuple[str, float, float]]:
+    """The numbers of a level and what is too large for their columns."""
+    columns = zip(level[:6], (10**6, 10**4, 1e9, 1e10, 1e3, 10**4), strict=True)
+    return [(name, value, limit) for (name, *_), (value, limit) in zip(_FIELDS, columns, strict=True)]
 
 
 def _plain_text(level: Level) -> str:

@@ -225,7 +225,7 @@ def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
     0 for those of rotation and state; for a sum of angular momenta the sum before it, which is N for the first
     (`deflin` and `getlin` in H. M. Pickett's program). names: of the quantum numbers of a state, rotation and state first.
     """
-    lines = _without_zeros_behind(lines, len(names))
+    lines = without_zeros_behind(lines, len(names))
     if lines.per_state != len(names):
         return lines
     rotation = sum(name in _ROTATION for name in names)
@@ -238,7 +238,21 @@ def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
     return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
 
 
-def _without_zeros_behind(lines: LineList, per_state: int) -> LineList:
+def without_v(lines: LineList, per_state: int) -> LineList:
+    """Lines of one state without its number: with v = 0 behind `per_state` quantum numbers of rotation, and nothing but zeros further on.
+
+    F of a spin cannot be 0 in both states of all lines: 0 - 0 is no line. Other lists stay as they are.
+    """
+    stripped, width = without_zeros_behind(lines, per_state + 1).quanta, 2 * (per_state + 1)
+    v = stripped[:, [per_state, width - 1]]
+    if lines.per_state or not len(lines) or not ((stripped != BLANK).sum(axis=1) == width).all() or v.any():
+        return lines
+    quanta = np.full_like(lines.quanta, BLANK)
+    quanta[:, : 2 * per_state] = np.delete(stripped[:, :width], [per_state, width - 1], axis=1)
+    return replace(lines, quanta=quanta)
+
+
+def without_zeros_behind(lines: LineList, per_state: int) -> LineList:
     """The lines without the zeros that fill the fields behind the quantum numbers of both states, which SPFIT does not look at.
 
     Programs that write .lin files for other programs too fill all twelve fields so. Other numbers there stay.
