@@ -28,6 +28,7 @@ from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
+from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import EVERY_K, StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
@@ -55,7 +56,7 @@ if TYPE_CHECKING:
 class Group:
     """States that are solved together: their options by number here, the top that stands for their symmetry, the effect.
 
-    axial_kmax: the largest K of a symmetric top whose K is good. diag: how levels are named.
+    axial_kmax: the largest K of a symmetric top whose K is good. diag: how levels are named. by_k: whether they are called by N and K.
     """
 
     states: tuple[StateOptions, ...]
@@ -64,6 +65,7 @@ class Group:
     oblate: bool
     axial_kmax: int = EVERY_K
     diag: int = 0
+    by_k: bool = False
 
     @property
     def spins(self) -> tuple[int, ...]:
@@ -90,8 +92,21 @@ class Group:
             if self.effect.pairs:
                 levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
         if not self.effect.pairs:
-            levels = named_by(levels, self.diag, self.oblate)
+            levels = named_by(levels, self.diag, self.oblate, self.diagonal(levels.jmax))
         return replace(levels, weight=self._weights(levels))
+
+    def falls_from(self, highest_n: int) -> int | None:
+        """The lowest N where the diagonal of the Hamiltonian does not rise with K (fall, in an oblate basis); None up to the highest."""
+        if self.top.kind != "asymmetric":
+            return None
+        states = [self.effect.operators(self.top), *(state.terms for state in self.effect.states(self.top))]
+        return falls_with_k(states, self.effect.parameters(self.top), highest_n, self.oblate)
+
+    def diagonal(self, highest_n: int) -> Diagonal:
+        """How the diagonal of the Hamiltonian runs up to the highest N."""
+        if self.falls_from(highest_n) is None:
+            return Diagonal.RISES
+        return Diagonal.FALLS_IN_K if self.by_k else Diagonal.FALLS
 
     def has_levels(self, twice_f: tuple[int, int]) -> bool:
         """Whether any level from the first to the last of the doubled F has a weight and a K from KNMIN on."""
@@ -346,7 +361,7 @@ def _group(
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else EVERY_K
-    return Group(tuple(states), top, effect, oblate, kmax, first.diag)
+    return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
 
 
 def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[int, int], SpeciesPairs]:

@@ -28,7 +28,12 @@ from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
 from rotor.formats.spcat.hamiltonian.states import states_of
-from rotor.formats.spcat.prediction_notes import notes_of_basis, notes_of_files, notes_of_full_basis
+from rotor.formats.spcat.prediction_notes import (
+    notes_of_basis,
+    notes_of_diagonal,
+    notes_of_files,
+    notes_of_full_basis,
+)
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -108,6 +113,7 @@ def predicted(
     notes = notes_of_files(parameters, intensities, as_spcat)
     if any(state.is_cut for group in groups for state in group.states):
         notes += notes_of_basis(groups, _groups_to_solve(parameters, intensities, as_spcat, True), request)
+    notes += notes_of_diagonal(groups, parameters.options[0].diag, _highest_n(parameters, request))
     if full_basis:
         notes += notes_of_full_basis(states_of(parameters), _highest_n(parameters, request))
     if all((levels.components == 1).all() for _, levels in solved):

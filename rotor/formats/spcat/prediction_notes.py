@@ -150,6 +150,17 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
     return energies, count
 
 
+def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
+    """A note with DIAG = 0 where the diagonal of the Hamiltonian falls with K, so that names by energy are not those by K."""
+    falls = [n for group in groups if (n := group.falls_from(highest_n)) is not None]
+    if diag or not falls:
+        return []
+    return [
+        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K (rises, in an oblate basis): SPCAT with DIAG = 0 lists "
+        "diagonal elements there, or names levels by energy; these are eigenvalues, with the K of their largest share if it is above 1/2"
+    ]
+
+
 def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[str]:
     """A note for every KNMIN and KNMAX that is lifted and would leave out levels up to the highest N."""
     lifted = [state for state in states if state.with_k_to(highest_n).is_cut]

@@ -29,7 +29,7 @@ from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
-from rotor.tops.constants import Constants
+from rotor.tops.constants import AxisOrderError, Constants
 
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
@@ -88,12 +88,29 @@ class LineWidthError(ValueError):
 
 def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     """The quantum numbers of a state in the .lin file."""
-    if is_plain(file, None):
-        return QUANTA[constants_and_matrix(file)[0].kind]
+    named = _named_constants(file)
+    if named is not None:
+        return QUANTA[named[0].kind]
     from rotor.formats.spcat.file_quanta import format_of
     from rotor.formats.spcat.fits.fit_states import groups_for_fit, names_of_quanta
 
     return names_of_quanta(format_of(file, groups_for_fit(file)))
+
+
+def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
+    """The constants of a file by name and M of `constants_and_matrix`; None where the codes themselves are fitted.
+
+    That is so for spins, states and further operators, for axes in another order than A >= B >= C, and where the sign of SPIND asks for the
+    quantum numbers of the other kind of top.
+    """
+    if not is_plain(file, None):
+        return None
+    try:
+        constants, matrix = constants_and_matrix(file)
+    except AxisOrderError:
+        return None
+    by_k = file.options[0].spind < 0
+    return None if (constants.kind in ("asymmetric", "spherical")) == by_k else (constants, matrix)
 
 
 def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
@@ -107,8 +124,9 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         if column >= 0:
             spread[row, column] = ratio
     model, constants, kmax, quanta = None, None, None, _quanta_names(file)
-    if is_plain(file, None):
-        constants, matrix = constants_and_matrix(file)
+    named = _named_constants(file)
+    if named is not None:
+        constants, matrix = named
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
         from rotor.formats.spcat.file_model import line_names

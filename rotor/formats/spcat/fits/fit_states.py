@@ -165,7 +165,7 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     pairs = group.effect.pairs
     if pairs:
         return named_by_l(levels, pairs, str(levels.representation))
-    return named_by(levels, group.diag, group.oblate)
+    return named_by(levels, group.diag, group.oblate, group.diagonal(max(j)))
 
 
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
@@ -199,7 +199,7 @@ def _of_states(
     own = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
     asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
-    naming = naming_by(group.diag, group.oblate)
+    naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
     blocks = state_units(group.top, (group.effect,), own, asked, start, naming)
     found = np.sort(blocks.found)
     if not len(found):
@@ -254,7 +254,8 @@ def _of_blocks(
     own = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
     functions = _functions_of(group, levels) if group.effect.pairs else None
-    naming = naming_by(group.diag, group.oblate) if functions is None and "kc" in levels.quanta else None
+    named = functions is None and "kc" in levels.quanta
+    naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
     blocks = unit_levels(group.top, levels, rows[found], own, start, functions, naming)
     return [_Solved(here[found], columns, blocks)]
 

@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming
 from rotor.quantum.levels import Levels
@@ -61,14 +62,16 @@ class Functions(NamedTuple):
         return np.asarray(self.names[:, 1] + self.names[:, 2] - self.n)
 
 
-def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
+def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Levels:
     """The same levels of an asymmetric top with the names that DIAG gives; those that have them already as they are."""
-    if "kc" not in levels.quanta or not (diag in BY_DIAG or any(_needs_names(block, diag) for block in levels.blocks)):
+    rises = diagonal is Diagonal.RISES
+    anew = not rises or diag in BY_DIAG
+    if "kc" not in levels.quanta or not (anew or any(_needs_names(block, diag) for block in levels.blocks)):
         return levels
     tables, shares = [], []
     for block in levels.blocks:
-        clear = _of_clear_parts(block, oblate, str(levels.representation)) if diag == 0 else None
-        if diag == 3 and isinstance(block, SpinBlock) and not _connects_wang_blocks(block):
+        clear = _of_clear_parts(block, oblate, str(levels.representation)) if diag == 0 and rises else None
+        if diag == 3 and rises and isinstance(block, SpinBlock) and not _connects_wang_blocks(block):
             clear = block.labels, block.mixing
         if clear is not None:
             tables.append(clear[0])
@@ -76,7 +79,7 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
             continue
         functions = functions_of(block, str(levels.representation))
         energies = -block.energies_mhz if oblate else block.energies_mhz
-        at = places(functions, energies, diag)
+        at = places(functions, energies, diag, diagonal)
         tables.append(functions.names[at])
         shares.append(_shares_of_groups(functions, at, diag))
     table = np.concatenate(tables)
@@ -90,23 +93,25 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
     return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
 
 
-def naming_by(diag: int, oblate: bool) -> Naming:
+def naming_by(diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Naming:
     """The same names of states without spins, for constants that change."""
-    return partial(_named_functions, diag, oblate)
+    return partial(_named_functions, diag, oblate, diagonal)
 
 
 def _named_functions(
-    diag: int, oblate: bool, blocks: Sequence[tuple[int, WangBlock]], representation: str
+    diag: int, oblate: bool, diagonal: Diagonal, blocks: Sequence[tuple[int, WangBlock]], representation: str
 ) -> NamedFunctions:
     pieces = [(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks]
     functions = _joined(pieces, representation)
     groups = np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag)
+        at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag, diagonal)
         return functions.names[at]
 
-    return NamedFunctions(groups, namer, Follows.NOTHING if diag in _ANEW else Follows.GROUPS)
+    return NamedFunctions(
+        groups, namer, Follows.NOTHING if diagonal is not Diagonal.RISES or diag in _ANEW else Follows.GROUPS
+    )
 
 
 def _needs_names(block: object, diag: int) -> bool:
@@ -154,12 +159,16 @@ def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:
     return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
 
 
-def places(functions: Functions, energies: Floats, diag: int) -> Ints:
-    """The function that names each state, (states,)."""
+def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal = Diagonal.RISES) -> Ints:
+    """The function that names each state, (states,); see `named_by`."""
     shares = functions.amplitudes**2
     if diag == 1:
         return assigned(shares, np.ones(len(shares), dtype=np.int64))
     groups = functions.wang if diag in _OF_WANG else functions.pattern
+    if diagonal is Diagonal.FALLS_IN_K and diag == 0 and (clear := clear_functions(functions.amplitudes)) is not None:
+        return clear
+    if diagonal is not Diagonal.RISES:
+        groups = connected_groups(groups, functions.k, functions.amplitudes, energies, diag)
     count = int(groups.max()) + 1
     of_group = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
     of_state = assigned(of_group, np.bincount(groups, minlength=count))

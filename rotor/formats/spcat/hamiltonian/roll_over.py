@@ -1,0 +1,119 @@
+"""Names of levels where the diagonal of a Hamiltonian does not rise with K, as in an oblate top written in prolate axes.
+
+SPCAT names the states of a Wang block by energy, as K rises (DIAG 0). Two of its rules matter where the diagonal falls (`kroll`, `hdiag`
+and `ordblk` in H. M. Pickett's program): functions that no element connects are named apart; and with DIAG 0 it takes the elements of
+all functions from the first K on, above K = 3, where the diagonal falls, out of the matrix. These functions are then states with
+first-order energies. Here all energies are eigenvalues, and such states are named after the function that has the largest share of them.
+Levels that are called by N and K alone (SPIND below 0) are named after that function in the whole block where each has more than half of
+one function: K is nearly good then. SPCAT names those of them that are connected by energy. In an oblate basis the diagonal is that of -H.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from rotor.tops.operators import Operators
+
+_FIRST_LOOKED_AT = 5  # K: the diagonal is followed from the last function of a block with K up to it on
+_CLEAR = 0.5  # above it no other function of a state, and no other state of a function, has a larger share
+_NO_ELEMENT = 1e-13  # of the largest energy: round-off of a matrix made from its eigenvectors
+
+
+class Diagonal(Enum):
+    """How the diagonal of a Hamiltonian runs, which decides how levels get names.
+
+    RISES : with K (falls, in an oblate basis). FALLS : somewhere. FALLS_IN_K : somewhere, and levels are called by N and K.
+    """
+
+    RISES = 0
+    FALLS = 1
+    FALLS_IN_K = 2
+
+
+def falls_with_k(
+    states: Iterable[Mapping[str, Operators]], values: Mapping[str, float], highest_n: int, oblate: bool
+) -> int | None:
+    """The lowest N where the diagonal of a state does not rise with K in steps of two (fall, in an oblate basis); None up to the highest.
+
+    Of H = Σ c N^2p Nz^2q ½(N₊^2n + N₋^2n) the terms with n = 0 count.
+    """
+    n, k = np.arange(highest_n + 1.0), np.arange(highest_n + 1.0)
+    found = []
+    for operators in states:
+        diagonal = np.zeros((highest_n + 1, highest_n + 1))
+        for name, powers in operators.items():
+            for (p, q, order), factor in powers.items():
+                if order == 0:
+                    diagonal += values[name] * factor * np.outer((n * (n + 1)) ** p, k ** (2 * q))
+        steps = (diagonal[:, 2:] - diagonal[:, :-2]) * (-1.0 if oblate else 1.0)
+        wrong = ((steps < 0) & (k[2:] <= n[:, None])).any(axis=1)
+        found += np.flatnonzero(wrong)[:1].tolist()
+    return min(found, default=None)
+
+
+def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats, diag: int) -> Ints:
+    """The groups of functions that levels are named by, parted where no element connects them.
+
+    Parameters
+    ----------
+    groups : (functions,) array of int
+        A group for each function, such as its Wang block.
+    k : (functions,) array of int
+    amplitudes : (functions, states) array
+        Eigenvectors in columns.
+    energies : (states,) array
+        Of H, or of -H in an oblate basis.
+    diag : int
+        With 0 functions whose diagonal elements fall are groups by themselves.
+
+    Returns
+    -------
+    (functions,) array of int
+        Numbers from 0 on.
+    """
+    hamiltonian = (amplitudes * (energies - energies.mean())) @ amplitudes.T
+    linked = np.abs(hamiltonian) > _NO_ELEMENT * np.abs(energies).max(initial=0.0)
+    if diag == 0:
+        apart = _rolled_over(groups, k, hamiltonian.diagonal())
+        linked[apart, :] = linked[:, apart] = False
+    parts = _components(linked)
+    return np.asarray(np.unique(np.column_stack([groups, parts]), axis=0, return_inverse=True)[1].reshape(-1))
+
+
+def clear_functions(amplitudes: Floats) -> Ints | None:
+    """The function (states,) that has more than half of each state; None where a state has none."""
+    shares = amplitudes**2
+    return shares.argmax(axis=0) if (shares.max(axis=0) > _CLEAR).all() else None
+
+
+def _rolled_over(groups: Ints, k: Ints, diagonal: Floats) -> NDArray[np.bool_]:
+    """Which functions SPCAT takes out of the matrix: of each group from the first on whose diagonal element is below that before it."""
+    apart = np.zeros(len(k), dtype=bool)
+    for group in np.unique(groups):
+        members = np.flatnonzero(groups == group)
+        members = members[np.argsort(k[members], kind="stable")]
+        first = max(_FIRST_LOOKED_AT - int(k[members[0]]), 0) // 2
+        falls = np.flatnonzero(np.diff(diagonal[members[first:]]) < 0)
+        if len(falls):
+            apart[members[first + falls[0] + 1 :]] = True
+    return apart
+
+
+def _components(linked: NDArray[np.bool_]) -> Ints:
+    """The lowest function that each function is connected with, over any number of steps."""
+    parts = np.arange(len(linked))
+    linked = linked | linked.T | np.eye(len(linked), dtype=bool)
+    while True:
+        lowest = np.where(linked, parts[None, :], len(parts)).min(axis=1)
+        if (lowest == parts).all():
+            return parts
+        parts = lowest
