@@ -31,6 +31,7 @@ from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants import AxisOrderError, Constants
 
+_LOOKED_AT = 20  # highest N at which the diagonal is looked at
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
 
@@ -165,7 +166,20 @@ def _of_codes(file: ParameterFile) -> list[str]:
 
     stay = stay_at_zero(file)
     at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
-    return left_out(file) + ([at_zero] if stay else [])
+    return left_out(file) + ([at_zero] if stay else []) + _of_falling_diagonals(file)
+
+
+def _of_falling_diagonals(file: ParameterFile) -> list[str]:
+    """A note of levels with spins whose names by energy are not those by K."""
+    from rotor.formats.spcat.fits.fit_states import groups_for_fit
+
+    falls = [n for group in groups_for_fit(file) if group.spins and (n := group.falls_from(_LOOKED_AT)) is not None]
+    if not falls:
+        return []
+    return [
+        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K: with spins a fit names levels of one Wang block by energy, "
+        "as K rises; write the constants in the basis of the other sign of NVIB"
+    ]
 
 
 def _largest_error(header: Header) -> float:
