@@ -127,9 +127,7 @@ def test_a_fit_finds_the_constants(options: str, tmp_path: Path):
 def test_a_fit_with_spins_says_how_levels_are_named(tmp_path: Path):
     (tmp_path / "a.lin").write_text("  1  0  2  0  0  1".ljust(36) + " 266900.0 0.01\n")
     asked = spfit_input(_file("-3 1 0 60 0 1 1 1 0 1 0", chi=0.001), read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
-    assert any(
-        "falls with K: with spins a fit names levels of one Wang block by energy" in note for note in asked.notes
-    )
+    assert any("falls with K: with spins a fit names levels of a Wang block by energy" in note for note in asked.notes)
 
 
 CASES = "cases_refused_or_wrong"

@@ -177,7 +177,7 @@ def _of_falling_diagonals(file: ParameterFile) -> list[str]:
     if not falls:
         return []
     return [
-        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K: with spins a fit names levels of one Wang block by energy, "
+        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K: with spins a fit names levels of a Wang block by energy, "
         "as K rises; write the constants in the basis of the other sign of NVIB"
     ]
 
