@@ -152,7 +152,9 @@ def format_level(level: Level) -> str:
     wide += [f"{name} = {value:.10g}" for name, value, limit in _largest_of(level) if not abs(value) < limit]
     if wide or text.find(":") != _COLON:
         quanta = " ".join(map(str, level.quanta))
-        raise DoesNotFitError(f"level {quanta}: {wide[0] if wide else 'a number'} does not fit the columns of an .egy file")
+        raise DoesNotFitError(
+            f"level {quanta}: {wide[0] if wide else 'a number'} does not fit the columns of an .egy file"
+        )
     return text
 
 
