@@ -23,7 +23,7 @@ WATER_XYZ = "3\nwater\nO 0 0 0\nH 0.75695 0 0.585882\nH -0.75695 0 0.585882\n"
 RIGID = "A=835840.288 B=435351.717 C=278138.7 MHz"
 INFO = """
     rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number near_point_group
-    near_displacement_angstrom constants_mhz uncertainties_mhz reduction
+    near_displacement_angstrom constants_mhz uncertainties_mhz estimated_errors_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
     polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source

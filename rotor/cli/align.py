@@ -252,7 +252,7 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
     acts_on = {pulse.acts_on for pulse in trace.pulses}
     facts = [("constants", report.constants_text(top))]
     if "dipole" in acts_on:
-        facts.append(("dipole", report.vector_text(top.dipole_abc_debye)))
+        facts.append(("dipole", report.dipole_text(top)))
     if "polarizability" in acts_on:
         facts.append(("polarizability", report.tensor_text(top)))
     accuracy = (

@@ -123,7 +123,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     if top.constants.representation:
         heading = "reduction" if top.constants.reduction else "representation"
         facts.append((heading, report.form_text(top.constants)))
-    dipole = report.vector_text(top.dipole_abc_debye)
+    dipole = report.dipole_text(top)
     facts += [
         ("dipole", dipole),
         ("polarizability", report.tensor_text(top)),
@@ -160,13 +160,17 @@ def _margin_text(margin: float) -> str:
 
 
 def _constants_table(top: Top) -> Table:
+    from rotor.reports.top_facts import known_digits
+    from rotor.tops.facts import estimated_errors_mhz
     from rotor.units import MHZ_PER_CM
 
-    spreads = top.constants.uncertainties
-    rows = [
-        (name, f"{mhz:.12g}", f"{spreads[name]:.2g}" if name in spreads else "", f"{mhz / MHZ_PER_CM:.10g}")
-        for name, mhz in top.constants.values.items()
-    ]
+    known, estimated = top.constants.uncertainties, estimated_errors_mhz(top)
+    rows = []
+    for name, mhz in top.constants.values.items():
+        guess = estimated.get(name)
+        error = f"{known[name]:.2g}" if name in known else f"about {known_digits(guess, guess)}" if guess else ""
+        wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
+        rows.append((name, known_digits(mhz, guess), error, wavenumber))
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
 
 

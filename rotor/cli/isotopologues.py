@@ -105,6 +105,8 @@ def _substitution(text: str) -> tuple[str, str]:
 
 def record(one: Isotopologue) -> dict[str, Any]:
     """One isotopologue by the keys of docs/command_line.md."""
+    from rotor.tops.facts import estimated_errors_mhz
+
     top, symmetry = one.top, one.top.symmetry
     return {
         "formula": one.formula,
@@ -116,6 +118,7 @@ def record(one: Isotopologue) -> dict[str, Any]:
         "kind": top.kind,
         "point_group": symmetry.point_group if symmetry else None,
         "constants_mhz": dict(top.constants.values),
+        "estimated_errors_mhz": estimated_errors_mhz(top),
         "reduction": top.constants.reduction,
         "representation": top.constants.representation,
         "rotational_constants_mhz": top.rotational_constants_mhz,
@@ -151,10 +154,24 @@ def _constants_text(top: Top) -> str:
 
 
 def _table(parent: Top, family: Sequence[Isotopologue]) -> Table:
-    columns = ("isotopologue", "abundance", "ways", "mass (u)", "kind", "group", "A (MHz)", "B (MHz)", "C (MHz)",
+    columns = ("isotopologue", "abundance", "ways", "mass (u)", "kind", "group", "A (MHz)", "B (MHz)", "C (MHz)", "± %",
                "axes", "turned (°)", "μa (D)", "μb (D)", "μc (D)", "spin weights")  # fmt: skip
     left = frozenset({"isotopologue", "kind", "group", "axes", "spin weights"})
     return Table(f"isotopologues of {parent.name or 'the molecule'}", columns, [_row(one) for one in family], left)
+
+
+def _rigid_texts(top: Top) -> list[str]:
+    """A, B, C with the digits that their estimated error leaves, and that error in per cent."""
+    from rotor.reports.top_facts import known_digits
+    from rotor.tops.facts import estimated_errors_mhz
+
+    errors = estimated_errors_mhz(top)
+    if not errors:
+        return [f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz] + [""]
+    name = next(iter(errors))
+    relative = errors[name] / top.constants[name]
+    texts = [known_digits(x, relative * x) if x < float("inf") else "-" for x in top.rotational_constants_mhz]
+    return [*texts, f"{100 * relative:.2g}"]
 
 
 def _row(one: Isotopologue) -> list[str]:
@@ -168,7 +185,7 @@ def _row(one: Isotopologue) -> list[str]:
         f"{top.mass_u:.5f}",
         top.kind,
         top.symmetry.point_group if top.symmetry else "",
-        *(f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz),
+        *_rigid_texts(top),
         one.axes,
         f"{one.turned_degrees:.2f}",
         *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),

@@ -357,7 +357,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     first, last, count = content["field_kv_per_cm"]
     facts = [
         ("constants", report.constants_text(top)),
-        ("dipole", report.vector_text(top.dipole_abc_debye)),
+        ("dipole", report.dipole_text(top)),
         ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {counted(count, 'value')}"),
     ]
     if content["intensity_w_per_cm2"]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotor.tops.facts import formula_of, top_facts
+from rotor.tops.facts import estimated_errors_mhz, formula_of, top_facts
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -95,12 +96,26 @@ def heading(top: Top) -> str:
 
 def constants_text(top: Top) -> str:
     """A, B, C, and how many distortion constants go with them."""
-    constants = top.constants
+    constants, errors = top.constants, estimated_errors_mhz(top)
     rigid = [name for name in constants.values if name in "ABC"]
-    text = ", ".join(f"{name} {constants[name]:.10g}" for name in rigid) + " MHz"
+    text = ", ".join(f"{name} {known_digits(constants[name], errors.get(name), 10)}" for name in rigid) + " MHz"
+    if errors:
+        text += f" (good to about {max(100 * errors[name] / constants[name] for name in errors):.2g} %)"
     more = len(constants.values) - len(rigid)
     text += f", and {more} of distortion" if more else ", rigid"
     return text + (f" ({form_text(constants)})" if more and constants.reduction else "")
+
+
+def known_digits(value: float, error: float | None, digits: int = 12) -> str:
+    """A number with the digits that its error leaves, two of them uncertain; with `digits` digits where no error is estimated.
+
+    >>> known_digits(6011.70626348, 72.0), known_digits(6011.70626348, 0.6), known_digits(6011.70626348, None)
+    ('6012', '6011.71', '6011.70626348')
+    """
+    if not error:
+        return f"{value:.{digits}g}"
+    decimals = 1 - math.floor(math.log10(error))
+    return f"{round(value, decimals):.{max(decimals, 0)}f}"
 
 
 def form_text(constants: Constants) -> str:
@@ -114,6 +129,14 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
     if vector is None:
         return "not known"
     return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
+
+
+def dipole_text(top: Top) -> str:
+    """The dipole of a top; of one that was estimated the first decimal, which its error of 0.2 D leaves."""
+    vector = top.dipole_abc_debye
+    if vector is None or not top.dipole_source.startswith("estimate"):
+        return vector_text(vector)
+    return vector_text([round(x, 1) for x in vector]) + " (estimated)"
 
 
 def tensor_text(top: Top) -> str:

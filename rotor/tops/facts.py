@@ -35,6 +35,7 @@ def top_facts(top: Top) -> dict[str, Any]:
         "near_displacement_angstrom": near.displacement_angstrom if near else None,
         "constants_mhz": dict(constants.values),
         "uncertainties_mhz": dict(constants.uncertainties),
+        "estimated_errors_mhz": estimated_errors_mhz(top),
         "reduction": constants.reduction,
         "representation": constants.representation,
         "rotational_constants_mhz": abc,
@@ -59,10 +60,28 @@ def top_facts(top: Top) -> dict[str, Any]:
     }
 
 
+def estimated_errors_mhz(top: Top) -> dict[str, float]:
+    """Estimated errors of A, B, C in MHz by name, where they were not measured: of a geometry, or of scaling to another isotopologue.
+
+    >>> from rotor.molecules.molecule import Molecule
+    >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]], source="a guess", uncertainty=0.01)
+    >>> {name: round(error) for name, error in estimated_errors_mhz(Top.from_molecule(co)).items()}
+    {'B': 577}
+    """
+    constants, molecule = top.constants, top.molecule
+    of_geometry = molecule is not None and top.source == molecule.source
+    relative = molecule.uncertainty if of_geometry and molecule is not None else top.scaling_error
+    if not relative:
+        return {}
+    return {
+        name: relative * constants[name] for name in "ABC" if name in constants.values.keys() - constants.uncertainties
+    }
+
+
 _OF_CONSTANTS = (
-    "kind", "constants_mhz", "uncertainties_mhz", "reduction", "rotational_constants_mhz", "rotational_constants_cm", "kappa",
-    "moments_u_angstrom2", "planar_moments_u_angstrom2", "inertial_defect_u_angstrom2", "spin_weights", "constants",
-    "dipole_abc_debye",
+    "kind", "constants_mhz", "uncertainties_mhz", "estimated_errors_mhz", "reduction", "rotational_constants_mhz",
+    "rotational_constants_cm", "kappa", "moments_u_angstrom2", "planar_moments_u_angstrom2",
+    "inertial_defect_u_angstrom2", "spin_weights", "constants", "dipole_abc_debye",
 )  # fmt: skip
 NO_CONSTANTS = "the parameters of the file have no names here; the levels are those of its own codes"
 

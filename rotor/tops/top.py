@@ -67,6 +67,7 @@ class Top:
     the constants where it has them; both belong to these constants alone (`with_constants` leaves them out). symmetry_checked:
     False takes a dipole that spin weights forbid as it is, as SPCAT does. magnetic: what a magnetic field acts on.
     internal_rotation: a methyl group that turns; constants, dipole and other tensors are then along the axes of its frame.
+    scaling_error: estimated relative error of constants that were scaled from those of another isotopologue.
 
     Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
@@ -95,6 +96,7 @@ class Top:
     level_table: LevelTable | None = None
     symmetry_checked: bool = True
     magnetic: MagneticTensors | None = None
+    scaling_error: float | None = None
 
     def __post_init__(self) -> None:
         if not self.symmetry_checked:

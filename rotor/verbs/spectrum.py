@@ -222,7 +222,7 @@ def _facts(lines: Lines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     named = lines.levels.of_named_constants
     return [
         ("constants", top_facts.constants_text(top) if named else "those of the file, which have no names here"),
-        ("dipole", top_facts.vector_text(top.dipole_abc_debye) if named else "the moments of the file"),
+        ("dipole", top_facts.dipole_text(top) if named else "the moments of the file"),
         *(
             [("spin weights", "those of the file")]
             if spin_weights is None

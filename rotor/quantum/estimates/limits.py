@@ -161,6 +161,9 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
         relative = top.molecule.uncertainty
         text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
         found.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
+    if top.scaling_error and not of_geometry:
+        text = f"A, B, C are scaled from those of another isotopologue, good to about {100 * top.scaling_error:.2g} %"
+        found.append(Limit("error of the scaling", top.scaling_error * 2 * b * (j + 1), text))
     if of_geometry and top.molecule is not None:
         found += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":

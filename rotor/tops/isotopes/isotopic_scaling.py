@@ -37,6 +37,12 @@ def _alike(kind: str) -> tuple[tuple[int, ...], ...]:
     )
 
 
+HEAVY_ERROR, HYDROGEN_ERROR = (
+    2e-4,
+    8e-3,
+)  # of scaled constants, measured: where heavy atoms were replaced, where hydrogen was
+
+
 def matched_axes(parent: Top, turned: Top) -> tuple[str, float]:
     """The parent's axes nearest to a, b, c, and the smallest cos² of the matches; free directions are taken together."""
     assert parent.frame is not None  # both are tops of a geometry
@@ -119,13 +125,16 @@ def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) 
     constants = _of_kind(values, turned.kind)
     name = parent.name or "the parent"
     note = (
-        f"constants are those of {name} times the ratio of those calculated from its geometry; such constants were 0.02 % "
-        "off where heavy atoms were replaced, and up to 0.8 % where hydrogen was"
+        f"constants are those of {name} times the ratio of those calculated from its geometry; such constants were "
+        f"{100 * HEAVY_ERROR:g} % off where heavy atoms were replaced, and up to {100 * HYDROGEN_ERROR:g} % where hydrogen was"
     )
     origin = f" ({parent.source})" if parent.source else ""
     source = f"scaled from {name}{origin} by {_ratio_text(ratios, axes)}"
-    constants, annotated = _with_distortion(parent, constants, axes, angle, _hydrogen_replaced(parent, turned))
-    return replace(turned, constants=constants, source=source, notes=(*turned.notes, note, *annotated))
+    hydrogen = _hydrogen_replaced(parent, turned)
+    constants, annotated = _with_distortion(parent, constants, axes, angle, hydrogen)
+    error = HYDROGEN_ERROR if hydrogen else HEAVY_ERROR
+    notes = (*turned.notes, note, *annotated)
+    return replace(turned, constants=constants, source=source, notes=notes, scaling_error=error)
 
 
 def _hydrogen_replaced(parent: Top, turned: Top) -> bool:
