@@ -1,6 +1,6 @@
 """Where a fit begins: velocity and width by correlation, temperatures and column densities by linear least squares.
 
-The spectrum is correlated with the thin spectrum of all species on a grid even in ln ν, where a velocity is a shift. At the best shift
+The spectrum is correlated with the thin spectrum of each species on a grid even in ln ν, where a velocity is a shift. At the best shift
 column densities that are not negative follow from linear least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares Problems,
 1974, chapter 23, as `scipy.optimize.nnls`) for each of a few temperatures, one species after the other.
 """
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
 from rotor.observed.species import SpeciesLines
 from rotor.observed.spectrum import ObservedSpectrum
@@ -23,6 +23,9 @@ WIDEST_SHIFT_KM_S = 200.0
 _UNIT_COLUMN = 1e6  # thin for every line; templates are per column density
 _MIDDLE_K = 80.0
 _MOST_POINTS = 1 << 20
+_CORRELATED_K = (30.0, 80.0, 150.0, 300.0)
+_APART = 3.0  # widths from the best shift, beyond which another is an alternative
+_CLIPPED = 8.0  # standard deviations
 
 
 def start_components(
@@ -130,7 +133,7 @@ def velocity_and_width(
 ) -> tuple[float, float]:
     """Velocity and width (km/s) at which the spectrum correlates best with the lines of all species; what is given stays.
 
-    The correlation Σ T t/√(Σ t²) is the length of the spectrum along a template t of one width: the largest is the best fit.
+    The width is that at which the best velocity stands out most.
     """
     if velocity_km_s is not None and fwhm_km_s is not None:
         return velocity_km_s, fwhm_km_s
@@ -140,44 +143,44 @@ def velocity_and_width(
     widths = widths if fwhm_km_s is None else [fwhm_km_s]
     reach = min(int(WIDEST_SHIFT_KM_S / (step * KM_PER_S)), len(grid) // 2)
     shifts = np.arange(-reach, reach + 1)
+    velocities = shifts * step * KM_PER_S
+    allowed = np.arange(len(shifts))
     if velocity_km_s is not None:
-        shifts = np.array([round(velocity_km_s / (step * KM_PER_S))])
+        allowed = np.array([int(np.argmin(np.abs(velocities - velocity_km_s)))])
     best = (-np.inf, 0.0, widths[0])
     for width in widths:
-        template = _template(grid * (1 + sight.redshift), species, width)
-        norm = float(np.linalg.norm(template))
-        if norm == 0:
-            continue
-        value = _correlation(data, template, shifts) / norm
-        place = int(np.argmax(value))
-        best = max(best, (float(value[place]), float(shifts[place] * step * KM_PER_S), width))
+        score = _score(data, grid * (1 + sight.redshift), species, width, shifts)
+        place = int(allowed[np.argmax(score[allowed])])
+        elsewhere = score[np.abs(velocities - velocities[place]) > _APART * width].max(initial=1e-300)
+        best = max(best, (float(score[place] / elsewhere), float(velocities[place]), width))
     return (best[1] if velocity_km_s is None else velocity_km_s), best[2]
 
 
+def _score(data: Floats, grid: Floats, species: Sequence[SpeciesLines], width: float, shifts: Ints) -> Floats:
+    """Σ over species of the fourth power of what the spectrum has along each: at a wrong shift lines match one at a time.
+
+    The brightest lines count no more than others, and the mean is taken out, with which a crowded spectrum matches anything.
+    """
+    length = 1 << int(len(data) + np.abs(shifts).max(initial=0)).bit_length()
+    clipped = np.minimum(data, _CLIPPED)
+    spectrum = np.fft.rfft(clipped - clipped.mean(), length).conj()
+    score = np.zeros(len(shifts))
+    for one in species:
+        best = np.zeros(len(shifts))
+        for kelvin in _CORRELATED_K:
+            t = float(np.clip(kelvin, *one.partition.range_k))
+            template = component_depth(Component(one, 1.0, t, 0.0, width), grid)[0]
+            if (norm := float(np.linalg.norm(template))) > 0:
+                best = np.maximum(best, np.fft.irfft(spectrum * np.fft.rfft(template, length), length)[shifts] / norm)
+        score += best**4
+    return score
+
+
 def _even_in_log(spectrum: ObservedSpectrum) -> tuple[float, Floats, Floats]:
-    """Step in ln ν, frequencies and intensities over the noise on an even grid."""
+    """Step in ln ν, frequencies and intensities over the noise on an even grid; 0 in gaps."""
     x = np.log(spectrum.frequency_mhz)
     step = max(float(np.median(np.diff(x))), (x[-1] - x[0]) / _MOST_POINTS)
     even = np.arange(x[0], x[-1], step)
     data = np.interp(even, x, spectrum.intensity / spectrum.noise)
     gap = np.diff(x)[np.clip(np.searchsorted(x, even) - 1, 0, len(x) - 2)] > 4 * step
     return step, np.exp(even), np.where(gap, 0.0, data)
-
-
-def _template(grid: Floats, species: Sequence[SpeciesLines], width: float) -> Floats:
-    """Thin spectra of all species at a middle temperature, each of the same length."""
-    total = np.zeros(len(grid))
-    for one in species:
-        t = float(np.clip(_MIDDLE_K, *one.partition.range_k))
-        depth = component_depth(Component(one, 1.0, t, 0.0, width), grid)[0]
-        length = float(np.linalg.norm(depth))
-        total += depth / length if length > 0 else 0.0
-    return total
-
-
-def _correlation(data: Floats, template: Floats, shifts: np.ndarray) -> Floats:
-    """Σ_n data(n) template(n + shift): a receding source has its lines at lower frequencies."""
-    from scipy.signal import correlate
-
-    full = correlate(template, data, mode="full", method="fft")
-    return np.asarray(full[len(data) - 1 + shifts])

@@ -1,0 +1,392 @@
+"""Which species a spectrum needs: forward selection with refits, then each that the others can do without is dropped.
+
+Thin templates of all candidates at a few temperatures are projected on what the model so far leaves, gain = (t·r)²/(t·t) in χ² for t·r > 0
+(orthogonal matching pursuit: S. Chen, S. A. Billings, W. Luo, Int. J. Control 50, 1873 (1989)). The best candidates are fitted with optical
+depth, the best of them stays if it gains more than a threshold that grows with the number of candidates, and all are fitted again. In the
+end every species is removed once and the others fitted without it: what χ² loses is its evidence. Lines that a species should show and
+does not count against it in χ² like any others. The noise has a part proportional to the model, for what LTE and one layer leave out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.observed.fit import Contribution, FitChoices, SourceFit, contributions, fit_source
+from rotor.observed.model import KM_PER_S, Component, Sight, component_depth, model
+from rotor.observed.species import SpeciesLines
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.observed.start import TEMPERATURES_K, velocity_and_width
+from rotor.spectra.emission import planck_k
+from rotor.table import Table
+
+THRESHOLD = 16.0  # gain of χ², beyond 2 ln(templates), from which a species counts
+_TRIED = 4  # best candidates that are fitted at each step
+_ALWAYS_REFITTED = 12  # species up to which all are fitted again at each step
+_REFIT_EVERY = 5
+_UNIDENTIFIED = 5.0  # standard deviations
+_VISIBLE = 3.0
+_RIVAL = 0.7  # of the evidence of a species, from which another that is not in the model could explain it
+_RIVALS = 3
+
+
+@dataclass(frozen=True)
+class IdentifyChoices:
+    """How species are looked for.
+
+    velocity_km_s, fwhm_km_s: where known; otherwise estimated from the spectrum. temperatures_k: of the templates. model_error: of the
+    brightness, a fraction, added to the noise. most_species: at which the search ends. threshold: gain of χ² of a species.
+    """
+
+    velocity_km_s: float | None = None
+    fwhm_km_s: float | None = None
+    temperatures_k: tuple[float, ...] = TEMPERATURES_K
+    model_error: float = 0.1
+    most_species: int = 60
+    threshold: float = THRESHOLD
+    size_arcsec: float | None = None
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A species that the spectrum needs.
+
+    component: fitted. signal: loss of χ² without it, per reduced χ². visible, expected: lines above three standard deviations in the
+    spectrum at the place of those that the model has above three. rivals: species outside the model that explain nearly as much.
+    """
+
+    component: Component
+    signal: float
+    visible: int
+    expected: int
+    rivals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Unidentified:
+    """A line that the model does not have: frequency and brightness of its peak, standard deviations, candidates with a line there."""
+
+    frequency_mhz: float
+    peak_k: float
+    deviations: float
+    candidates: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Table):
+    """Species by evidence, lines that stay unidentified, the fit of all, and how many candidates there were."""
+
+    species: tuple[Evidence, ...]
+    unidentified: tuple[Unidentified, ...]
+    fit: SourceFit | None
+    candidates: int
+    velocity_km_s: float
+    fwhm_km_s: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def names(self) -> list[str]:
+        """Of the species, the one with most evidence first."""
+        return [one.component.species.name for one in self.species]
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """species, signal, visible, expected, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
+        parts = [one.component for one in self.species]
+        numbers = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+        table: dict[str, Any] = {"species": np.array(self.names, dtype=np.str_)}
+        table |= {
+            name: np.array([getattr(one, name) for one in self.species]) for name in ("signal", "visible", "expected")
+        }
+        return table | {name: np.array([getattr(one, name) for one in parts]) for name in numbers}
+
+    def facts(self) -> dict[str, Any]:
+        """Everything as plain numbers, texts, lists and dictionaries."""
+        rows = [
+            dict(zip(self.columns, row, strict=True))
+            for row in zip(*(c.tolist() for c in self.columns.values()), strict=True)
+        ]
+        return {
+            "species": [row | {"rivals": list(one.rivals)} for row, one in zip(rows, self.species, strict=True)],
+            "unidentified": [
+                {
+                    "frequency_mhz": one.frequency_mhz,
+                    "peak_k": one.peak_k,
+                    "deviations": one.deviations,
+                    "candidates": list(one.candidates),
+                }
+                for one in self.unidentified
+            ],
+            "candidates": self.candidates,
+            "velocity_km_s": self.velocity_km_s,
+            "fwhm_km_s": self.fwhm_km_s,
+            "reduced_chi_squared": None if self.fit is None else self.fit.reduced_chi_squared,
+            "notes": list(self.notes),
+        }
+
+
+def identify(
+    spectrum: ObservedSpectrum,
+    candidates: Sequence[SpeciesLines],
+    sight: Sight | None = None,
+    choices: IdentifyChoices | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """The species that a spectrum needs, ranked by evidence, and the lines that none of the candidates explains.
+
+    Parameters
+    ----------
+    spectrum : ObservedSpectrum
+        In K, its continuum subtracted.
+    candidates : sequence of SpeciesLines
+        Such as all of a catalogue in the range of the spectrum.
+    sight : Sight, optional
+        Background, beam, redshift.
+    choices : IdentifyChoices, optional
+    progress : callable, optional
+        Called with the name of every species that enters.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        Where no candidate has a line in the range.
+
+    Notes
+    -----
+    All species have nearly the same velocity and width (free within priors in the last fit). A species with a single line in the range
+    rests on that line alone: look at its rivals.
+    """
+    sight, choices = sight or Sight(), choices or IdentifyChoices()
+    first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
+    known = [one for one in candidates if len(one.between(first, last))]
+    if not known:
+        raise ValueError(f"none of {len(candidates)} candidates has a line from {first:.10g} to {last:.10g} MHz")
+    velocity, width = velocity_and_width(spectrum, known, choices.velocity_km_s, choices.fwhm_km_s, sight)
+    bank = _Bank(spectrum, known, choices, velocity, width, sight)
+    search = _Search(spectrum, known, sight, choices, bank, progress)
+    search.run()
+    fit, kept = search.pruned()
+    evidence = (
+        tuple(sorted((_evidence(fit, one, bank, search) for one in kept), key=lambda one: -one.signal)) if fit else ()
+    )
+    return Identification(evidence, _unidentified(search, fit), fit, len(known), velocity, width)
+
+
+class _Bank:
+    """Thin templates, brightness per column density, of all candidates at all temperatures, as a sparse matrix (s t, n)."""
+
+    def __init__(
+        self,
+        spectrum: ObservedSpectrum,
+        known: Sequence[SpeciesLines],
+        choices: IdentifyChoices,
+        velocity: float,
+        width: float,
+        sight: Sight,
+    ) -> None:
+        from scipy.sparse import csr_matrix, vstack
+
+        grid = spectrum.frequency_mhz * (1 + sight.redshift)
+        self.start = [Component(one, 1.0, 80.0, velocity, width, choices.size_arcsec) for one in known]
+        self.temperatures = choices.temperatures_k
+        rows = []
+        for one in self.start:
+            for t in self.temperatures:
+                low, high = one.species.partition.range_k
+                depth = np.zeros(len(grid))
+                if low <= t <= high or low == high:
+                    depth = component_depth(replace(one, excitation_k=t), grid)[0]
+                    depth = depth * (planck_k(grid, t) - planck_k(grid, sight.background_k * (1 + sight.redshift)))
+                rows.append(csr_matrix(depth))
+        self.templates = vstack(rows).tocsr()
+        self.squares = self.templates.multiply(self.templates).tocsr()
+
+    def gains(self, residual_k: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+        """Gain of χ² and column density of every candidate at every temperature, (s, t) each."""
+        overlap = self.templates @ (residual_k / sigma**2)
+        length = self.squares @ (1 / sigma**2)
+        safe = np.where(length > 0, length, 1.0)
+        column = np.where(length > 0, overlap / safe, 0.0)
+        gain = np.where(column > 0, overlap * column, 0.0)
+        shape = (len(self.start), len(self.temperatures))
+        return gain.reshape(shape), column.reshape(shape)
+
+    def best(self, residual_k: Floats, sigma: Floats) -> tuple[Floats, list[Component]]:
+        """Of every candidate the gain at its best temperature, and a component that begins there."""
+        gain, column = self.gains(residual_k, sigma)
+        at = gain.argmax(axis=1)
+        rows = np.arange(len(at))
+        parts = [
+            replace(one, column_per_cm2=max(float(column[k, at[k]]), 1.0), excitation_k=self.temperatures[at[k]])
+            for k, one in enumerate(self.start)
+        ]
+        return gain[rows, at], parts
+
+
+class _Search:
+    """Forward selection."""
+
+    def __init__(
+        self,
+        spectrum: ObservedSpectrum,
+        known: Sequence[SpeciesLines],
+        sight: Sight,
+        choices: IdentifyChoices,
+        bank: _Bank,
+        progress: Callable[[str], None] | None,
+    ) -> None:
+        self.spectrum, self.known, self.sight, self.choices, self.bank, self.progress = (
+            spectrum,
+            known,
+            sight,
+            choices,
+            bank,
+            progress,
+        )
+        self.threshold = choices.threshold + 2 * math.log(len(known) * len(choices.temperatures_k))
+        self.numbers: list[int] = []
+        self.components: list[Component] = []
+        self.refused: set[int] = set()
+
+    def model_k(self, components: Sequence[Component] | None = None) -> Floats:
+        """Brightness of the species so far."""
+        parts = self.components if components is None else components
+        return (
+            model(parts, self.spectrum.frequency_mhz, self.sight).brightness_k
+            if parts
+            else np.zeros(len(self.spectrum))
+        )
+
+    def sigma(self, brightness_k: Floats) -> Floats:
+        """Noise with what the model may be wrong by."""
+        return np.asarray(np.hypot(self.spectrum.noise, self.choices.model_error * brightness_k))
+
+    def run(self) -> None:
+        """Add species until none gains enough."""
+        while len(self.components) < self.choices.most_species and self._add():
+            self._refit()
+
+    def _add(self) -> bool:
+        """Add the best candidate; False where none gains enough."""
+        now = self.model_k()
+        residual = self.spectrum.intensity - now
+        sigma = self.sigma(now)
+        gain, parts = self.bank.best(residual, sigma)
+        gain[[*self.numbers, *self.refused]] = 0.0
+        order = np.argsort(-gain)[:_TRIED]
+        tried = [(self._gain(parts[k], residual, sigma), int(k)) for k in order if gain[k] > self.threshold / 2]
+        if not tried:
+            return False
+        (best, component), k = max(tried, key=lambda one: one[0][0])
+        if best < self.threshold:
+            self.refused |= {number for _, number in tried}
+            return (
+                bool(gain[[i for i in range(len(gain)) if i not in self.refused]].max(initial=0.0) > self.threshold / 2)
+                and self._add()
+            )
+        self.numbers.append(k)
+        self.components.append(component)
+        if self.progress:
+            self.progress(component.species.name)
+        return True
+
+    def _gain(self, component: Component, residual: Floats, sigma: Floats) -> tuple[float, Component]:
+        """Gain of χ² of a candidate fitted with optical depth to what is left, and the fitted component."""
+        left = replace(self.spectrum, intensity=residual, noise=sigma)
+        try:
+            fit = fit_source(
+                left, [component], self.sight, FitChoices(free=("column_per_cm2", "excitation_k"), most_iterations=20)
+            )
+        except ValueError:  # out of the range of Q(T)
+            return 0.0, component
+        before = float(np.sum((residual / sigma) ** 2))
+        return before - fit.chi_squared, fit.components[0]
+
+    def _refit(self) -> None:
+        """All species together, one velocity and one width, where they are few or it is time."""
+        count = len(self.components)
+        if count <= _ALWAYS_REFITTED or count % _REFIT_EVERY == 0:
+            self.components = list(self.fit(self.components, 15).components)
+
+    def fit(self, components: Sequence[Component], iterations: int, *, alone: bool = False) -> SourceFit:
+        """A fit of components with the noise of their own model; alone: velocity and width of each."""
+        noisy = replace(self.spectrum, noise=self.sigma(self.model_k(components)))
+        shared = () if alone else ("velocity_km_s", "fwhm_km_s")
+        free = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+        return fit_source(
+            noisy, components, self.sight, FitChoices(free=free, shared=shared, most_iterations=iterations)
+        )
+
+    def pruned(self) -> tuple[SourceFit | None, list[tuple[int, Contribution]]]:
+        """The last fit, without species that the others make unnecessary, and the evidence of each that stays."""
+        while self.components:
+            fit = self.fit(self.components, 40)
+            evidence = list(enumerate(contributions(fit)))
+            weakest = min(evidence, key=lambda one: one[1].signal)
+            if weakest[1].signal >= self.threshold:
+                return fit, evidence
+            lost = {k for k, one in evidence if one.signal < self.threshold / 4} or {weakest[0]}
+            self.components = [one for k, one in enumerate(fit.components) if k not in lost]
+            self.numbers = [one for k, one in enumerate(self.numbers) if k not in lost]
+        return None, []
+
+
+def _evidence(fit: SourceFit, contribution: tuple[int, Contribution], bank: _Bank, search: _Search) -> Evidence:
+    """What speaks for a species: lost χ², lines seen of those expected, and rivals."""
+    k, one = contribution
+    component = fit.components[k]
+    alone = model([component], fit.spectrum.frequency_mhz, fit.sight).brightness_k
+    expected, visible = _lines_seen(fit, component, alone)
+    rest = fit.spectrum.intensity - (fit.model_k - alone)
+    gain, _ = bank.best(rest, fit.noise)
+    own = gain[search.numbers[k]]
+    gain[search.numbers] = 0.0
+    order = np.argsort(-gain)[:_RIVALS]
+    rivals = tuple(search.known[i].name for i in order if gain[i] > _RIVAL * own)
+    return Evidence(component, one.signal, visible, expected, rivals)
+
+
+def _lines_seen(fit: SourceFit, component: Component, alone: Floats) -> tuple[int, int]:
+    """Groups of channels where the species is above three standard deviations, and how many of them the spectrum has at half that."""
+    noise = fit.spectrum.noise
+    high = alone > _VISIBLE * noise
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int)))
+    expected = visible = 0
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        expected += 1
+        peak = start + int(alone[start:stop].argmax())
+        visible += bool(fit.spectrum.intensity[peak] > max(_VISIBLE * noise[peak], 0.5 * alone[peak]))
+    return expected, visible
+
+
+def _unidentified(search: _Search, fit: SourceFit | None) -> tuple[Unidentified, ...]:
+    """Peaks of what the model leaves above five standard deviations, a width apart, the strongest first."""
+    spectrum = search.spectrum
+    brightness = np.zeros(len(spectrum)) if fit is None else fit.model_k
+    residual = spectrum.intensity - brightness
+    deviations = residual / search.sigma(brightness)
+    width = search.bank.start[0].fwhm_km_s / KM_PER_S
+    shift = 1 - search.bank.start[0].velocity_km_s / KM_PER_S
+    out: list[Unidentified] = []
+    taken = np.zeros(len(spectrum), dtype=np.bool_)
+    for peak in np.argsort(-deviations):
+        if deviations[peak] < _UNIDENTIFIED:
+            break
+        if taken[peak]:
+            continue
+        at = float(spectrum.frequency_mhz[peak])
+        taken |= np.abs(spectrum.frequency_mhz - at) < 1.5 * width * at
+        rest = at * (1 + search.sight.redshift) / shift
+        near = [one.name for one in search.known if len(one.between(rest * (1 - width / 2), rest * (1 + width / 2)))]
+        out.append(Unidentified(at, float(spectrum.intensity[peak]), float(deviations[peak]), tuple(near[:5])))
+    return tuple(out)

@@ -1,0 +1,65 @@
+"""Identification: species that are there are named, those that are not are left out, lines of unknown species are listed."""
+
+import numpy as np
+import pytest
+from observed_cases import artificial, injected
+
+from rotor.observed.identify import IdentifyChoices, identify
+from rotor.observed.model import Component
+from rotor.observed.spectrum import observed_spectrum
+from rotor.observed.start import velocity_and_width
+
+GRID = np.arange(230e3, 230.6e3, 0.25)
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple:
+    """Twenty candidates, three of them in a spectrum at -7 km/s, and one species that is no candidate."""
+    rng = np.random.default_rng(11)
+    candidates = [artificial(f"s{i}", rng, 230e3, 230.6e3, int(rng.integers(4, 20))) for i in range(20)]
+    stranger = artificial("stranger", rng, 230e3, 230.6e3, 1)
+    parts = [
+        (candidates[2], 3e16, 60.0),
+        (candidates[7], 4e15, 30.0),
+        (candidates[11], 2e16, 150.0),
+        (stranger, 3e16, 60.0),
+    ]
+    true = [Component(one, column, t, -7.0, 3.0) for one, column, t in parts]
+    return injected(true, GRID, 0.05, rng), candidates, stranger
+
+
+def test_species_and_unidentified_lines(case: tuple) -> None:
+    spectrum, candidates, stranger = case
+    found = identify(spectrum, candidates)
+    assert set(found.names) == {"s2", "s7", "s11"}
+    assert found.velocity_km_s == pytest.approx(-7.0, abs=0.5)
+    strangest = stranger.frequency_mhz[0] * (1 + 7.0 / 299792.458)
+    assert [one.frequency_mhz for one in found.unidentified] == pytest.approx([strangest], abs=0.5)
+    signals = [one.signal for one in found.species]
+    assert signals == sorted(signals, reverse=True)
+    assert all(one.visible >= 0.6 * one.expected for one in found.species)
+    facts = found.facts()
+    assert facts["candidates"] == 20
+    assert len(facts["species"]) == 3
+
+
+def test_noise_alone_needs_nothing(case: tuple) -> None:
+    _, candidates, _ = case
+    silent = observed_spectrum(GRID, np.random.default_rng(3).normal(0, 0.05, len(GRID)), noise=0.05)
+    found = identify(silent, candidates, choices=IdentifyChoices(velocity_km_s=0.0, fwhm_km_s=3.0))
+    assert found.names == []
+    assert found.unidentified == ()
+
+
+def test_velocity_of_many_species(case: tuple) -> None:
+    spectrum, candidates, _ = case
+    velocity, width = velocity_and_width(spectrum, candidates)
+    assert velocity == pytest.approx(-7.0, abs=0.5)
+    assert width in (2.0, 4.0)
+
+
+def test_candidates_outside_the_range_are_refused(case: tuple) -> None:
+    spectrum, _, _ = case
+    far = artificial("far", np.random.default_rng(1), 5e5, 6e5)
+    with pytest.raises(ValueError, match="none of 1 candidates"):
+        identify(spectrum, [far])
