@@ -17,7 +17,9 @@ def case() -> tuple:
     """Twenty candidates, three of them in a spectrum at -7 km/s, and one species that is no candidate."""
     rng = np.random.default_rng(11)
     candidates = [artificial(f"s{i}", rng, 230e3, 230.6e3, int(rng.integers(4, 20))) for i in range(20)]
-    stranger = artificial("stranger", rng, 230e3, 230.6e3, 1)
+    taken = np.sort(np.concatenate([one.frequency_mhz for one in candidates]))
+    gap = int(np.argmax(np.diff(taken)))  # a line that none of the candidates has
+    stranger = artificial("stranger", rng, taken[gap : gap + 2].mean() - 0.1, taken[gap : gap + 2].mean() + 0.1, 1)
     parts = [
         (candidates[2], 3e16, 60.0),
         (candidates[7], 4e15, 30.0),
