@@ -63,12 +63,12 @@ def test_intensity_and_einstein_coefficient_of_co(folder: Path) -> None:
     assert np.log10(species.intensity_nm2_mhz(300.0)[0] * 4.16231 / 4.16238) == pytest.approx(-5.0105, abs=1e-5)
 
 
-def test_without_a_table_of_species_the_ratio_of_q_is_noted(folder: Path) -> None:
+def test_without_a_table_of_species_q_is_summed_and_noted(folder: Path) -> None:
+    """At 300 K the intensity is the catalogue's whatever Q is."""
     species = read_cat_species(folder / "cdms" / "c028503.cat", {})
-    assert "Einstein coefficients are not known" in species.identity["note"]
+    assert "Q summed over the 4 levels" in species.identity["note"]
     known = read_cat_species(folder / "cdms" / "c028503.cat")
-    ratio = species.intensity_nm2_mhz(100.0) / known.intensity_nm2_mhz(100.0)
-    assert np.allclose(ratio, 1.0, rtol=0.01)  # (T/300)^1 against the sum: hB/3kT at 100 K is 0.9 %
+    assert np.allclose(species.intensity_nm2_mhz(300.0), known.intensity_nm2_mhz(300.0), rtol=1e-12)
 
 
 def test_faulty_line_is_named_and_the_others_are_added(folder: Path) -> None:
