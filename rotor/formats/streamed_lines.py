@@ -30,7 +30,7 @@ from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
-from rotor.spectra.intensity import intensity_cut, jmax_for_cut
+from rotor.spectra.intensity import intensity_cut, jmax_for_cut, require_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
 from rotor.spectra.transitions import all_transitions
 from rotor.thermodynamics import PartitionFunction
@@ -147,6 +147,7 @@ def stream_lines(
         raise ValueError(f"{path}: a streamed list is written as .parquet or .cat; the suffix names the format")
     if piece_lines < 1 or memory_mb < 100:
         raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: expected at least 1 line and 100 MB")
+    require_cut(min_lgint)
     _refuse_forks(executor)
     start = line_list(
         top,

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.scenes.choice import Choice
-from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps, is_compiled
+from rotor.scenes.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 from rotor.scenes.plan_steps import error_by_finer
 
 if TYPE_CHECKING:
@@ -117,6 +117,7 @@ def planned_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Plann
     if scene.numerics.tolerance != DEFAULT_TOLERANCE or scene.numerics.step is not None:
         raise ValueError("accuracy and numerics: give one of them")
     if _is_long(request, asked):
+        _refuse_endless(request, asked)
         return Planned(*_of_beginning(request, asked))
     motions = _Motions(request)
     decade, error = _loosest(motions, asked)
@@ -131,8 +132,22 @@ def _words(decade: int) -> str:
 
 def _is_long(request: DrivenRequest, asked: float) -> bool:
     """Whether a motion takes so many steps that a search by whole motions would not be short, by those of its beginning."""
-    steps = expected_steps(replace(request, tolerance=tolerance_of(likely_decade(asked))))
+    steps = _likely_steps(request, asked)
     return steps > (LONG_STEPS if is_compiled(request) else LONG_PLAIN_STEPS)
+
+
+def _likely_steps(request: DrivenRequest, asked: float) -> int:
+    return expected_steps(replace(request, tolerance=tolerance_of(likely_decade(asked))))
+
+
+def _refuse_endless(request: DrivenRequest, asked: float) -> None:
+    """Refuse a motion of more steps than can be made."""
+    steps = _likely_steps(request, asked)
+    if steps > MOST_STEPS:
+        raise ValueError(
+            f"accuracy: this motion takes about {steps:.2g} steps, and {MOST_STEPS:.0g} take hours; give a shorter time, or a body "
+            "that turns more slowly"
+        )
 
 
 def _of_beginning(request: DrivenRequest, asked: float) -> tuple[int, str]:

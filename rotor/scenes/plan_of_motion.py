@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes.left_out import LeftOut
-from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps, some_steps, steps_of
+from rotor.scenes.motion_steps import beginning, expected_steps, first_share, some_steps, steps_of
 from rotor.scenes.plan_parts import LONG_SEARCH, Plan, peak_mb, timed
 from rotor.scenes.plan_steps import NAME, step_error
 
@@ -96,5 +96,5 @@ def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
 def _memory_mb(request: DrivenRequest) -> float:
     from rotor.classical.driven import answer_driven
 
-    first = beginning(request, 1 / BEGINNINGS)
+    first = beginning(request, first_share(request))
     return peak_mb(lambda: answer_driven(first).table.columns) * len(request.times) / len(first.times)

@@ -123,7 +123,7 @@ def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
     tables = [item for item in value if isinstance(item, Mapping)]
     if word is None:
         return [(structures[0], item) for item in tables]
-    return [(by_tag[item[word]], item) for item in tables if item.get(word) in by_tag]
+    return [(by_tag[tag], item) for item in tables if isinstance(tag := item.get(word), str) and tag in by_tag]
 
 
 def structures_in(hint: Any) -> list[Any]:

@@ -14,6 +14,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
+from queue import SimpleQueue
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -31,25 +32,29 @@ class WorkerProcesses(Executor):
 
     def __init__(self, number: int) -> None:
         self._threads = ThreadPoolExecutor(number)
-        self._local = threading.local()
-        self._pools: set[ProcessPoolExecutor] = set()
+        self._free: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
+        self._ended = False
+        self._pools = {_started_process() for _ in range(number)}
+        for pool in self._pools:
+            self._free.put(pool)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """One call, in the next process that is free; its future has WorkerKilledError where that process ends."""
         return self._threads.submit(self._call, fn, args, kwargs)
 
     def _call(self, fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
-        pool = getattr(self._local, "pool", None)
-        if pool is None:
-            pool = self._local.pool = _started_process()
-            self._pools.add(pool)
+        pool = self._free.get()
         try:
             return pool.submit(fn, *args, **kwargs).result()
         except BrokenProcessPool:
-            self._local.pool = None
             self._pools.discard(pool)
             pool.shutdown(wait=False)
+            if not self._ended:
+                pool = _started_process()
+                self._pools.add(pool)
             raise WorkerKilledError("its process was ended from outside, as by lack of memory") from None
+        finally:
+            self._free.put(pool)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes when they have done what was submitted, or, of that, only what has begun."""
@@ -59,6 +64,7 @@ class WorkerProcesses(Executor):
 
     def terminate(self) -> None:
         """End the processes now; what they were at is lost."""
+        self._ended = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for pool in tuple(self._pools):
             for process in (getattr(pool, "_processes", None) or {}).values():  # public from Python 3.14 on

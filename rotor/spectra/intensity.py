@@ -29,7 +29,16 @@ INTENSITY_NM2_MHZ = EINSTEIN_PER_MHZ3 * units.SPEED_OF_LIGHT_M_PER_S**2 / (8 * m
 
 JMAX_DEFAULT_LIMIT = 600
 USUAL_CUT = -12.0
+MOST_LOG10 = 300  # of an intensity that a double can hold
 SUSPECT_BELOW_MHZ = 100.0  # A of a molecule is larger, in MHz; smaller ones may have lost their unit
+
+
+def require_cut(min_lgint: float | None) -> None:
+    """ValueError for a cut that is no logarithm of an intensity that a double can hold; None is no cut."""
+    if min_lgint is not None and not abs(min_lgint) <= MOST_LOG10:
+        raise ValueError(
+            f"min_lgint: {min_lgint}: expected the log10 of an intensity, up to {MOST_LOG10} in size, or None for every allowed line"
+        )
 
 
 def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k: float, q: float, cut: float) -> int:

@@ -37,6 +37,7 @@ from rotor.spectra.intensity import (
     jmax_for_cut,
     largest,
     population,
+    require_cut,
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.table import counted
@@ -332,8 +333,7 @@ def line_list(
     """
     require_positive("temperature_k", temperature_k, "K")
     require_whole("jmax", jmax, 0)
-    if min_lgint is not None and math.isnan(min_lgint):
-        raise ValueError("min_lgint: nan: expected a number, or None for every allowed line")
+    require_cut(min_lgint)
     first, last = range_mhz
     if not first < last:
         raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")

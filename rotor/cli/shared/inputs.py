@@ -22,7 +22,6 @@ T = TypeVar("T")
 
 USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
 MOST_TEMPERATURES = 100_000
-MOST_LOG10 = 300  # of an intensity that a double can hold
 MOST_TIMES = 10_000_000
 
 
@@ -222,6 +221,8 @@ def cut(name: str, text: str) -> float | None:
             number = math.nan
         if not math.isfinite(number):
             raise ValueError(f"{value!r} is not a finite number or 'none'")
+        from rotor.spectra.intensity import MOST_LOG10
+
         if abs(number) > MOST_LOG10:
             raise ValueError(f"{value!r}: expected the log10 of an intensity, up to {MOST_LOG10} in size")
         return number

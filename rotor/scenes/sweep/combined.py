@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
 MEMORY_MB = 300  # for the sort; more goes to files
+SMALL_ROWS = 5_000  # of a point, up to which its rows wait as arrays of numpy: DuckDB takes 20 ms for a file, numpy 0.5
+BATCH_ROWS, BATCH_FILES = 100_000, 2_000  # of small files that are joined at once
+_SMALL, _LARGE = ".npz", ".parquet"
 
 
 def point_columns(values: Mapping[str, Any], table: Table) -> dict[str, Any]:
@@ -44,14 +47,14 @@ class CombinedFile:
     def __init__(self, target: Path) -> None:
         self.target, self.folder = target, Path(f"{target}.points")
 
-    def part(self, key: str) -> Path:
-        """Where the rows of a finished point wait."""
-        return self.folder / f"{key[:KEY_LENGTH]}.parquet"
-
     def keys(self) -> set[str]:
         """The points whose rows are there, in the file or waiting; none of a file that is no table of points."""
-        waiting = {path.stem for path in self.folder.glob("*.parquet")} if self.folder.is_dir() else set()
-        return waiting | self._joined()
+        return self._waiting().keys() | self._joined()
+
+    def _waiting(self) -> dict[str, Path]:
+        """Files of finished points by the key of the point."""
+        suffixes = (_SMALL, _LARGE)
+        return {path.stem: path for path in self.folder.glob("*") if path.suffix in suffixes}
 
     def _joined(self) -> set[str]:
         if not self.target.is_file():
@@ -63,14 +66,23 @@ class CombinedFile:
             return {str(key) for (key,) in rows}
         return set()
 
+    def open_folder(self) -> None:
+        """Make the folder in which rows wait."""
+        os.makedirs(self.folder, exist_ok=True)
+
     def write_part(self, key: str, values: Mapping[str, Any], table: Table) -> None:
         """Write the rows of a finished point to where they wait."""
         from rotor.formats.atomic_write import atomic_path
         from rotor.formats.tables import copy_columns
 
         columns = {"point": np.full(len(table), key[:KEY_LENGTH])} | point_columns(values, table)
-        with atomic_path(self.part(key)) as unfinished:
-            copy_columns(columns, unfinished, "(FORMAT parquet)")
+        small = len(table) <= SMALL_ROWS and all(np.asarray(column).dtype.kind != "O" for column in columns.values())
+        path = self.folder / f"{key[:KEY_LENGTH]}{_SMALL if small else _LARGE}"
+        with atomic_path(path) as unfinished:
+            if small:
+                np.savez(unfinished, allow_pickle=False, **columns)
+            else:
+                copy_columns(columns, unfinished, "(FORMAT parquet)")
 
     def join(self, keys: Sequence[str], provenance: str) -> None:
         """Write the file: the rows of the points with these keys, in their order; the folder is removed."""
@@ -79,29 +91,62 @@ class CombinedFile:
         from rotor.formats.atomic_write import atomic_path
         from rotor.formats.tables import quoted, run
 
-        sources = sorted(map(str, self.folder.glob("*.parquet")))
-        waiting = {Path(source).stem for source in sources}
-        before = self._joined() - waiting
+        waiting = self._waiting()
+        before = self._joined() - waiting.keys()
         with duckdb.connect() as engine, atomic_path(self.target) as unfinished:
             engine.execute("SET memory_limit = $1", [f"{MEMORY_MB}MB"])
             engine.execute("SET temp_directory = $1", [str(self.folder / "sort")])
             _register_order(engine, keys)
+            sources = [str(path) for path in self._large_files(waiting.values())]
             parts = [_rows(sources, "true")] if sources else []
             if before:
                 parts.append(_rows([str(self.target)], f"point NOT IN ({', '.join(map(quoted, ('', *waiting)))})"))
-            chosen = " UNION ALL BY NAME ".join(parts)
-            run(
-                engine,
-                f"COPY (SELECT t.* EXCLUDE (file_row_number) FROM ({chosen}) t JOIN places ON t.point = places.key "
-                f"ORDER BY places.number, t.file_row_number) TO {quoted(str(unfinished))} "
-                f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(provenance)}}})",
-                self.target,
-            )
+            if parts:
+                chosen = " UNION ALL BY NAME ".join(parts)
+                run(
+                    engine,
+                    f"COPY (SELECT t.* EXCLUDE (file_row_number) FROM ({chosen}) t JOIN places ON t.point = places.key "
+                    f"ORDER BY places.number, t.file_row_number) TO {quoted(str(unfinished))} "
+                    f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(provenance)}}})",
+                    self.target,
+                )
+            else:  # no point has rows
+                engine.execute(
+                    f"COPY (SELECT key AS point FROM places LIMIT 0) TO {quoted(str(unfinished))} (FORMAT parquet)"
+                )
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def open_folder(self) -> None:
-        """Make the folder in which rows wait."""
-        os.makedirs(self.folder, exist_ok=True)
+    def _large_files(self, paths: Iterable[Path]) -> list[Path]:
+        """The files of points, many small ones as one: what DuckDB opens takes it milliseconds each."""
+        from rotor.formats.tables import copy_columns
+
+        place = self.folder / "joined"
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir()
+        large: list[Path] = []
+        for columns in _gathered(path for path in paths if path.suffix == _SMALL):
+            large.append(place / f"{len(large)}{_LARGE}")
+            copy_columns(columns, large[-1], "(FORMAT parquet)")
+        return [*(path for path in paths if path.suffix == _LARGE), *large]
+
+
+def _gathered(paths: Iterable[Path]) -> Iterator[dict[str, Any]]:
+    """Columns of small files of equal columns, one after the other, in batches of bounded size."""
+    batches: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    for path in paths:
+        with np.load(path, allow_pickle=False) as file:
+            columns = dict(file)
+        form = tuple((name, column.dtype.kind) for name, column in columns.items())
+        batch = batches.setdefault(form, [])
+        batch.append(columns)
+        if sum(len(part["point"]) for part in batch) > BATCH_ROWS or len(batch) > BATCH_FILES:
+            yield _concatenated(batches.pop(form))
+    for batch in batches.values():
+        yield _concatenated(batch)
+
+
+def _concatenated(batch: list[dict[str, Any]]) -> dict[str, Any]:
+    return {name: np.concatenate([columns[name] for columns in batch]) for name in batch[0]}
 
 
 def _rows(files: Sequence[str], condition: str) -> str:

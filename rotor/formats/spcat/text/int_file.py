@@ -9,6 +9,7 @@ from typing import Any
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
+from rotor.spectra.intensity import MOST_LOG10
 from rotor.table import counted
 
 
@@ -59,7 +60,6 @@ _REQUEST = {
     "flags": 0, "tag": 999, "qrot": 1000.0, "fbgn": 0, "fend": 0,
     "str0": -100.0, "str1": -100.0, "fqlim_ghz": 9999.99, "temperature_k": 300.0, "maxv": -1,
 }  # fmt: skip
-MOST_LOG10 = 300  # of an intensity in nm² MHz that a double can hold
 _NAMES = ("FLAGS", "TAG", "QROT", "FBGN", "FEND", "STR0", "STR1", "FQLIM", "TEMP", "MAXV")
 
 

@@ -1,0 +1,113 @@
+"""Inputs that once ended in "this is a defect": each is one line that names the key, with exit code 2."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.scenes.motion_steps import expected_steps, first_share, steps_of
+from rotor.scenes.scene_file import parse_scene
+
+TUMBLE = """schema = 1
+kind = "tumble"
+{accuracy}
+[body]
+moments = {moments}
+angular_momentum = {momentum}
+[conditions]
+times = "0:10:11"
+[[effects]]
+effect = {effect}
+vector = [0.0, 0.0, 1.0]
+frame = "body"
+"""
+
+
+def tumble(effect='"constant torque"', moments=(6e-13, 0.6, 1.0), momentum=(1.0, 1.0, 1.0), accuracy=""):
+    return TUMBLE.format(effect=effect, moments=list(moments), momentum=list(momentum), accuracy=accuracy)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            'schema = 1\nkind = "spectrum"\nmolecule = "CO"\n[observables]\nmin_lgint = 1000\n',
+            "observables.min_lgint: 1000.0: expected the log10 of an intensity, up to 300 in size",
+        ),
+        (
+            'schema = 1\nkind = "spectrum"\nmolecule = "CO"\n[observables]\nmin_lgint = -1e308\n',
+            "observables.min_lgint: -1e+308: expected the log10",
+        ),
+        (tumble("[1, 2, 3]"), "effects[0].effect"),
+        (tumble("{ a = 1 }"), "effects[0].effect"),
+        (tumble("7"), "effects[0].effect"),
+        ('schema = 1\nkind = "align"\nmolecule = "CO"\n[[pulses]]\nshape = [1]\n', "pulses[0].shape"),
+        ('schema = 1\nkind = [1]\nmolecule = "CO"\n', "expected kind, one of"),
+        ('schema = [1]\nkind = "levels"\nmolecule = "CO"\n', "expected schema = 1"),
+        (
+            'schema = 1\nkind = "levels"\nmolecule = "CO"\n[outputs]\ncsv = "o_{jmax.x}.csv"\n[sweep]\n"observables.jmax" = [1, 2]\n',
+            "{jmax.x} is no swept name",
+        ),
+    ],
+)
+@pytest.mark.parametrize("verb", ["run", "plan"])
+def test_a_wrong_value_is_one_line(call, folder, verb, text, said):
+    Path("s.toml").write_text(text)
+    code, out, err = call(verb, "s.toml")
+    if verb == "plan" and "[sweep]" in text:
+        assert code == 2
+        return
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert said in err
+    assert "defect" not in err
+
+
+@pytest.mark.parametrize("cut", [1000.0, -301.0, float("nan"), float("inf")])
+def test_a_cut_that_no_intensity_has(cut, tmp_path):
+    top = rotor.read("CO")
+    calls = [
+        lambda: rotor.line_list(top, min_lgint=cut),
+        lambda: rotor.SpectrumRequest(top, min_lgint=cut),
+        lambda: rotor.stream_lines(top, tmp_path / "a.cat", min_lgint=cut),
+    ]
+    for make in calls:
+        with pytest.raises(ValueError, match=r"min_lgint: .*expected the log10 of an intensity"):
+            make()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("momentum", [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0)])
+def test_a_plan_of_a_body_that_turns_1e13_times_is_short(call, folder, momentum):
+    """ω = L/I is 1.7e12 about the first axis; at rest, the torque about that axis brings it there."""
+    text = tumble(momentum=momentum).replace("[0.0, 0.0, 1.0]", "[1.0, 0.0, 0.0]")
+    Path("s.toml").write_text(text)
+    start = time.process_time()
+    code, out, err = call("plan", "s.toml")
+    assert (code, err) == (0, "")
+    assert time.process_time() - start < 20  # s, compilation among them; steps one by one would take months
+    steps = int(next(line for line in out.splitlines() if line.startswith("steps")).split()[1].replace(",", ""))
+    assert steps > 1e7
+
+
+def test_an_accuracy_that_needs_endless_steps_is_refused(call, folder):
+    Path("s.toml").write_text(tumble(accuracy="accuracy = 1e-6"))
+    code, _, err = call("run", "s.toml")
+    assert code == 2
+    assert "this motion takes about" in err
+
+
+@pytest.mark.parametrize("moments", [(0.3, 0.35, 0.4), (6e-4, 0.6, 1.0)])
+def test_steps_are_expected_by_a_short_part(moments):
+    """The expected number is near the count where the count can be made."""
+    from rotor.scenes.kind import kind_of
+
+    scene = parse_scene(tumble(moments=moments))
+    request = kind_of(scene).request(scene, ".")
+    assert 0.0 < first_share(request) <= 0.05
+    np.testing.assert_allclose(
+        expected_steps(request), steps_of(request, 1.0), rtol=0.3
+    )  # of a motion not quite regular
