@@ -36,11 +36,11 @@ def tumble(effect='"constant torque"', moments=(6e-13, 0.6, 1.0), momentum=(1.0,
     [
         (
             'schema = 1\nkind = "spectrum"\nmolecule = "CO"\n[observables]\nmin_lgint = 1000\n',
-            "observables.min_lgint: 1000.0: expected the log10 of an intensity, up to 300 in size",
+            "observables.min_lgint: 1000: expected a number from -300 to 300",
         ),
         (
             'schema = 1\nkind = "spectrum"\nmolecule = "CO"\n[observables]\nmin_lgint = -1e308\n',
-            "observables.min_lgint: -1e+308: expected the log10",
+            "observables.min_lgint: -1e+308: expected a number from -300",
         ),
         (tumble("[1, 2, 3]"), "effects[0].effect"),
         (tumble("{ a = 1 }"), "effects[0].effect"),
@@ -75,7 +75,7 @@ def test_a_cut_that_no_intensity_has(cut, tmp_path):
         lambda: rotor.stream_lines(top, tmp_path / "a.cat", min_lgint=cut),
     ]
     for make in calls:
-        with pytest.raises(ValueError, match=r"min_lgint: .*expected the log10 of an intensity"):
+        with pytest.raises(ValueError, match=r"min_lgint: .*expected a (number|finite number)"):
             make()
     assert list(tmp_path.iterdir()) == []
 

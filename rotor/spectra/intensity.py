@@ -37,7 +37,7 @@ def require_cut(min_lgint: float | None) -> None:
     """ValueError for a cut that is no logarithm of an intensity that a double can hold; None is no cut."""
     if min_lgint is not None and not abs(min_lgint) <= MOST_LOG10:
         raise ValueError(
-            f"min_lgint: {min_lgint}: expected the log10 of an intensity, up to {MOST_LOG10} in size, or None for every allowed line"
+            f"min_lgint: {min_lgint:g}: expected a number from {-MOST_LOG10} to {MOST_LOG10}, or None for every allowed line"
         )
 
 
