@@ -286,8 +286,8 @@ def test_zeeman_of_bare_constants(call):
     [
         (("OCS",), "the rotational g tensor is not known: give --g"),
         (("OCS", "--g", "1,2,3,4"), "--g: 4 numbers for a top of the kind linear"),
-        (("OCS", "--g", "x"), "expected numbers between commas"),
-        (("OCS", "--g", "-.03", "--field", "0:1kV/cm"), "--field: '0:1kV/cm:51': unit 'kV/cm'"),
+        (("OCS", "--g", "x"), "'x' is not a number"),
+        (("OCS", "--g", "-.03", "--field", "0:1kV/cm"), "--field: '0:1kV/cm': unit 'kV/cm'"),
         (("OCS", "--g", "-.03", "--field", "2000T"), "2000 T is beyond 1000 T"),
         (("OCS", "--g", "-.03", "--field", "1T", "--plot", "a.png"), "--plot: a picture of a map needs two fields"),
         (("OCS", "--g", "-.03", "--nuclear-g", "14N=2"), "--nuclear-g: belongs to spins"),

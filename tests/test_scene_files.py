@@ -13,8 +13,11 @@ from hypothesis import strategies as st
 
 from rotor.scenes.scene import KINDS, AlignScene, LevelsScene, SpectrumScene, StarkScene
 from rotor.scenes.scene_file import json_schema, parse_scene, read_scene, scene_text, write_scene
-from rotor.scenes.sections import GaussianSection, KickSection, MoleculeSection, StarkConditions
+from rotor.scenes.sections import GaussianSection, KickSection, StarkConditions
 from rotor.scenes.template import template
+from rotor.verbs.subjects import molecule_section
+
+MoleculeSection = molecule_section()
 
 HEAD = 'schema = 1\nkind = "spectrum"\nmolecule = "water"\n'
 

@@ -37,7 +37,6 @@ from rotor.scenes.sections import (
     GaussianSection,
     LevelsObservables,
     LevelsOutputs,
-    MagneticSection,
     MoleculeSection,
     QuantumEffects,
     SpectrumConditions,
@@ -48,6 +47,7 @@ from rotor.scenes.sections import (
     TumbleConditions,
     VibrationSection,
     ZeemanConditions,
+    ZeemanMagnetic,
     ZeemanObservables,
 )
 from rotor.scenes.sweep import points, run_sweep
@@ -179,7 +179,7 @@ SHORT = {
     ),
     "zeeman": ZeemanScene(
         molecule="OCS",
-        magnetic=MagneticSection(g=[-0.03]),
+        magnetic=ZeemanMagnetic(g=[-0.03]),
         conditions=ZeemanConditions(field=[0, 1]),
         observables=ZeemanObservables(jmax=1),
     ),

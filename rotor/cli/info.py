@@ -13,7 +13,8 @@ from rotor.checks import require_whole
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
-from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
+from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table
+from rotor.reports.progress import sum_progress
 from rotor.reports.sources import source_facts
 
 if TYPE_CHECKING:

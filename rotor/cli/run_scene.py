@@ -167,7 +167,7 @@ def _deliver(result: SceneResult, options: Options, files: Files, command: str) 
         files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
         show_facts([("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)])
 
-    deliver(files, {}, lambda: json_with_rows(result.table, verb.rows, content), show)
+    deliver(files, {}, lambda: verb.json(result.answer, content), show)
 
 
 def _of_run(result: SceneResult) -> dict[str, Any]:

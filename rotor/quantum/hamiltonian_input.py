@@ -109,3 +109,22 @@ def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput
 
     assert isinstance(method, HyperfineMethod)
     return HamiltonianInput(distortion, hyperfine, method.method, method.tolerance_mhz)
+
+
+@dataclass(frozen=True)
+class SpinsInput:
+    """Whether spins of nuclei take part."""
+
+    hyperfine: bool | None = declared(
+        None, Flag(off=True), "With the spins of nuclei; by default where their constants are given", "effects.hyperfine",
+        common=True, example=True,
+    )  # fmt: skip
+
+
+def spins_field() -> Any:
+    """The field `hyperfine` of a request: whether spins take part."""
+
+    def split(hyperfine: bool, request: Any) -> SpinsInput:
+        return SpinsInput(hyperfine if hyperfine or request.top.spin_constants is not None else None)
+
+    return part(SpinsInput, lambda given, subject: takes_spins(given.hyperfine, subject), split, False)

@@ -141,6 +141,8 @@ class Quantity(Reader):
             return f"a finite number above {self.above:g}{unit}"
         if self.above is not None:
             return f"a number above {self.above:g} and up to {self.most:g}{unit}"
+        if self.least is not None and self.below is not None:
+            return f"a number from {self.least:g} to below {self.below:g}{unit}"
         if self.least is not None and self.most is None:
             return f"a finite number of {self.least:g}{unit} or more"
         if self.least is not None:
@@ -190,7 +192,8 @@ class Grid(Reader):
             try:
                 self.each.check(value)
             except ValueError as error:
-                raise ValueError(f"{given!r:.60}: {error}" if isinstance(given, str) else str(error)) from None
+                rule = str(error).partition(": ")[2]
+                raise ValueError(f"{given!r:.60}: {rule}" if isinstance(given, str) else str(error)) from None
         return values
 
     def _of_text(self, text: str) -> tuple[float, ...]:

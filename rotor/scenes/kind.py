@@ -107,7 +107,8 @@ def kind_of_verb(verb: Verb) -> Kind:
 
 def outputs_of(scene: Any, verb: Verb, out: Where = ".") -> dict[str, tuple[Path, ...]]:
     """The files that a scene names, counted from a folder."""
-    named = {one.name: getattr(scene.outputs, one.name) for one in verb.outputs if one.scene}
+    names = [*(one.name for one in verb.outputs if one.scene), "json"]
+    named = {name: getattr(scene.outputs, name, None) for name in names}
     return {
         name: tuple(Path(out) / one for one in (value if isinstance(value, list) else [value]))
         for name, value in named.items()

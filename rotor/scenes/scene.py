@@ -25,30 +25,15 @@ from rotor.scenes.sections import (
     EmissionObservables,
     EmissionOutputs,
     EmittingMolecule,
-    FieldEffects,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
-    GasConditions,
-    GasNumerics,
-    GasObservables,
-    MagneticSection,
     MoleculeSection,
     PulseSection,
     QuantumEffects,
-    StarkConditions,
-    StarkNumerics,
-    StarkObservables,
     TableOutputs,
-    ThermoConditions,
-    ThermoNumerics,
-    ThermoObservables,
     TumbleConditions,
     TumbleNumerics,
-    VibrationSection,
-    ZeemanConditions,
-    ZeemanNumerics,
-    ZeemanObservables,
 )
 from rotor.scenes.verbs import VERBS
 from rotor.verbs.tables import said
@@ -108,19 +93,6 @@ class SceneResult:
     reached: Reached | None = None
 
 
-class ThermoScene(Scene, frozen=True, tag="thermo"):
-    """Partition function, entropy and heat capacity of rotation."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    effects: QuantumEffects = QuantumEffects()
-    accuracy: Annotated[str | float | None, said("of Q, U and C_v", "0.1 %")] = None
-    conditions: ThermoConditions = ThermoConditions()
-    observables: ThermoObservables = ThermoObservables()
-    vibration: VibrationSection = VibrationSection()
-    numerics: ThermoNumerics = ThermoNumerics()
-    outputs: TableOutputs = TableOutputs()
-
-
 class TumbleScene(Scene, frozen=True, tag="tumble"):
     """The free rotation of a molecule; the rotation of a body, free or under effects."""
 
@@ -133,20 +105,6 @@ class TumbleScene(Scene, frozen=True, tag="tumble"):
     outputs: TableOutputs = TableOutputs()
 
 
-class GasScene(Scene, frozen=True, tag="gas"):
-    """A classical gas of free molecules: equipartition, correlation functions."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    accuracy: Annotated[
-        str | float | None,
-        said("of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)", "1 K"),
-    ] = None
-    conditions: GasConditions = GasConditions()
-    observables: GasObservables = GasObservables()
-    numerics: GasNumerics = GasNumerics()
-    outputs: TableOutputs = TableOutputs()
-
-
 class FluidScene(Scene, frozen=True, tag="fluid"):
     """Rigid molecules that attract and repel, in a periodic box."""
 
@@ -156,31 +114,6 @@ class FluidScene(Scene, frozen=True, tag="fluid"):
     )
     numerics: FluidNumerics = FluidNumerics()
     outputs: FluidOutputs = FluidOutputs()
-
-
-class StarkScene(Scene, frozen=True, tag="stark"):
-    """Levels of a molecule in a static electric field."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
-    conditions: StarkConditions = StarkConditions()
-    observables: StarkObservables = StarkObservables()
-    effects: FieldEffects = FieldEffects()
-    numerics: StarkNumerics = StarkNumerics()
-    outputs: TableOutputs = TableOutputs()
-
-
-class ZeemanScene(Scene, frozen=True, tag="zeeman"):
-    """Levels of a molecule in a static magnetic field."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    accuracy: Annotated[str | float | None, said("of the energies", "1 Hz")] = None
-    magnetic: MagneticSection = MagneticSection()
-    conditions: ZeemanConditions = ZeemanConditions()
-    observables: ZeemanObservables = ZeemanObservables()
-    effects: FieldEffects = FieldEffects()
-    numerics: ZeemanNumerics = ZeemanNumerics()
-    outputs: TableOutputs = TableOutputs()
 
 
 class AlignScene(Scene, frozen=True, tag="align"):
@@ -218,12 +151,8 @@ class EmissionScene(Scene, frozen=True, tag="emission"):
 
 
 _WRITTEN: Mapping[str, type[Scene]] = {
-    "thermo": ThermoScene,
     "tumble": TumbleScene,
-    "gas": GasScene,
     "fluid": FluidScene,
-    "stark": StarkScene,
-    "zeeman": ZeemanScene,
     "align": AlignScene,
     "fit": FitScene,
     "emission": EmissionScene,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import msgspec
 from msgspec import field
 
 from rotor.verbs.tables import Section, said
@@ -88,29 +87,6 @@ class TableOutputs(Section, frozen=True):
     plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "out.png")] = None
 
 
-class ThermoConditions(Section, frozen=True):
-    """The gas."""
-
-    temperature: Annotated[Grid | None, said("temperatures (K); by default some from 5 to 1000 K", "10:1000K:100")] = (
-        None
-    )
-    pressure: Annotated[
-        Quantity | None, said("of the ideal gas, whose functions are then given too (bar)", "1 bar")
-    ] = None
-
-
-class ThermoObservables(Section, frozen=True):
-    """Of which molecules."""
-
-    species: Annotated[str, said("equilibrium, normal, para, ortho, or a class of the spin weights")] = "equilibrium"
-
-
-class ThermoNumerics(Section, frozen=True):
-    """Knobs."""
-
-    relative_error: Annotated[float, said("of Q, U and C_v, the levels left out of the sums")] = 1e-6
-
-
 class BodySection(Section, frozen=True):
     """A rigid body instead of a molecule, in any coherent units."""
 
@@ -135,26 +111,6 @@ class TumbleConditions(Section, frozen=True):
     temperature: Annotated[Quantity, said("whose thermal mean |L| is, half a degree off the middle axis (K)")] = "300 K"
     angular_momentum: Annotated[list[float] | None, said("instead, along a, b, c (ħ)", [10.0, 0.1, 0.1])] = None
     times: Annotated[Grid | None, said("ps of a molecule; by default two periods", "0:2:201")] = None
-
-
-class GasConditions(Section, frozen=True):
-    """The gas."""
-
-    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
-
-
-class GasObservables(Section, frozen=True):
-    """What is measured."""
-
-    times: Annotated[Grid | None, said("of the correlation functions (ps); none without files", "0:2:201")] = None
-    confidence: Annotated[float, said("of the test of equipartition")] = 0.99
-
-
-class GasNumerics(Section, frozen=True):
-    """Knobs."""
-
-    molecules: Annotated[int, said("how many are drawn")] = 20_000
-    seed: Annotated[int, said("of the random numbers")] = 1
 
 
 class FluidConditions(Section, frozen=True):
@@ -198,67 +154,10 @@ class FluidOutputs(Section, frozen=True):
     checkpoint_every: Annotated[int, said("steps between checkpoints")] = 1000
 
 
-class StarkConditions(Section, frozen=True):
-    """The fields."""
-
-    field: Annotated[Grid, said("static electric fields (kV/cm)")] = "0:100kV/cm:201"
-    direction: Annotated[list[float], said("of the field")] = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    intensity: Annotated[Quantity, said("of a laser along Z, far from resonance (W/cm2)")] = 0.0
-
-
-class StarkObservables(Section, frozen=True):
-    """Which states."""
-
-    jmax: Annotated[int, said("levels of the free molecule up to this J")] = 2
-    m: Annotated[list[float] | None, said("|M| of the states, |M_F| with spins; by default all", [0, 1])] = None
-    diabatic_gap: Annotated[Quantity | None, said("labels that pass crossings with a smaller gap (MHz)", "10 MHz")] = (
-        None
-    )
-
-
-class StarkNumerics(Section, frozen=True):
-    """Knobs."""
-
-    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
-    tolerance: Annotated[Quantity, said("of the energies, the basis being finite (MHz)")] = "1e-4 MHz"
-
-
 class FieldEffects(Section, frozen=True):
     """What the Hamiltonian consists of besides the semi-rigid rotor and the field."""
 
     hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
-
-
-class MagneticSection(Section, frozen=True):
-    """What a magnetic field acts on; by default what the file of the molecule has in its table [magnetic]."""
-
-    g: Annotated[
-        list[float] | None,
-        said("rotational g: aa, bb, cc[, ab, ac, bc]; along and across the axis; or one of a linear top", [-0.03]),
-    ] = None
-    magnetisability: Annotated[list[float] | None, said("likewise (1e-6 erg/(G² mol))", [-3.0, 2.0, -7.0])] = None
-    nuclear_g: Annotated[dict[str, float] | None, said("of spins; by default that of the isotope", {"14N": 0.4038})] = (
-        None
-    )
-
-
-class ZeemanConditions(Section, frozen=True):
-    """The fields."""
-
-    field: Annotated[Grid, said("static magnetic fields along Z (T)")] = "0:5T:51"
-
-
-class ZeemanObservables(Section, frozen=True):
-    """Which states."""
-
-    jmax: Annotated[int, said("levels of the free molecule up to this J")] = 2
-
-
-class ZeemanNumerics(Section, frozen=True):
-    """Knobs."""
-
-    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 12)] = None
-    tolerance: Annotated[Quantity, said("of the energies, the basis being finite (MHz)")] = "1e-6 MHz"
 
 
 class GaussianSection(Section, frozen=True, tag="gaussian", tag_field="shape"):

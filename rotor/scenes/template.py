@@ -13,16 +13,10 @@ from rotor.scenes.scene_file import structures_in, toml_value
 from rotor.verbs.verb import verb_of
 
 STARTS: dict[str, dict[str, Any]] = {
-    "thermo": {"molecule.source": "water", "conditions.temperature": "10:1000K:100", "outputs.csv": "thermo.csv"},
     "tumble": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},
-    "gas": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "gas.csv"},
     "fluid": {
         "conditions.model": "spce", "conditions.molecules": 216, "conditions.ensemble": "langevin",
         "conditions.steps": 20_000, "outputs.csv": "fluid.csv", "outputs.checkpoint": "fluid.npz",
-    },
-    "stark": {"molecule.source": "OCS", "conditions.field": "0:200kV/cm:201", "outputs.csv": "stark.csv"},
-    "zeeman": {
-        "molecule.source": "OCS", "magnetic.g": [-0.03], "conditions.field": "0:5T:51", "outputs.csv": "zeeman.csv",
     },
     "align": {
         "molecule.source": "OCS", "pulses.shape": "gaussian", "pulses.peak": "1e13 W/cm2", "pulses.fwhm": "1 ps",

@@ -16,11 +16,13 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.checks import require_between, require_positive, require_top, require_whole
+from rotor.checks import require_top
 from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import OF_SPINS, model_limits, model_sizes, populated_j
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf
@@ -46,18 +48,22 @@ class GasRequest:
     """
 
     top: Top
-    molecules: int = 20_000
-    temperature_k: float = 300.0
-    seed: int = 1
-    confidence: float = 0.99
-    times_ps: tuple[float, ...] | None = None
+    molecules: int = declared(20_000, Whole(2, MOST_MOLECULES), "How many are drawn", "numerics.molecules", common=True)
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
+    )
+    seed: int = declared(1, Whole(0), "Seed of the random numbers", "numerics.seed")
+    confidence: float = declared(
+        0.99, Quantity(above=0, below=1), "Of the test of equipartition", "observables.confidence"
+    )
+    times_ps: tuple[float, ...] | None = declared(
+        None, Grid("ps"), "Of the correlation functions: start:stop:count or a comma list (ps)", "observables.times", common=True,
+        example="0:2:201",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         require_top(self.top)
-        require_whole("molecules", self.molecules, 2, MOST_MOLECULES)
-        require_whole("seed", self.seed, 0)
-        require_positive("temperature_k", self.temperature_k, "K")
-        require_between("confidence", self.confidence, 0, 1)
+        check_fields(self)
         if self.times_ps is not None:
             if not 0 < len(self.times_ps) <= MOST_TIMES:
                 raise ValueError(

@@ -12,6 +12,9 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.hamiltonian_input import effects_field
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Grid, Quantity, Text
 from rotor.table import TextOf
 from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermodynamics.classical_onset import classical_above_if_known
@@ -23,6 +26,7 @@ from rotor.thermodynamics.functions import (
 )
 from rotor.thermodynamics.level_sums import Progress
 from rotor.thermodynamics.vibration import VibrationalStates
+from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 TEMPERATURES_K = (
     5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0, 298.15, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1000.0,
 )  # fmt: skip
+MOST_TEMPERATURES = 100_000
 CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
 
 
@@ -44,12 +49,23 @@ class ThermoRequest:
     """
 
     top: Top
-    temperatures_k: Sequence[float] = TEMPERATURES_K
-    species: str = "equilibrium"
-    vibrations: VibrationalStates | None = None
-    pressure_bar: float | None = None
-    relative_error: float = 1e-6
-    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    temperatures_k: Sequence[float] = declared(
+        TEMPERATURES_K, Grid("K", each=Quantity("K", above=0), most_points=MOST_TEMPERATURES), "Temperatures: 10:1000K:100 or 10,20,50 K",
+        "conditions.temperature", common=True, example="10:1000K:100",
+    )  # fmt: skip
+    species: str = declared(
+        "equilibrium", Text(metavar="NAME"), "equilibrium, normal (frozen), para, ortho, or a class of the spin weights",
+        "observables.species", common=True,
+    )  # fmt: skip
+    vibrations: VibrationalStates | None = vibrations_field()
+    pressure_bar: float | None = declared(
+        None, Quantity("bar", above=0, metavar="P"), "Pressure of the ideal gas, whose functions are then given too (bar)",
+        "conditions.pressure", common=True, example="1 bar",
+    )  # fmt: skip
+    relative_error: float = declared(
+        1e-6, Quantity(above=0), "Of Q, U and C_v: the levels left out of the sums", "numerics.relative_error"
+    )
+    effects: tuple[QuantumEffect, ...] = effects_field()
 
     def __post_init__(self) -> None:
         require_top(self.top)
@@ -57,16 +73,14 @@ class ThermoRequest:
             raise ValueError("temperatures_k: expected at least one temperature")
         for temperature in self.temperatures_k:
             require_positive("temperatures_k", temperature, "K")
-        require_positive("relative_error", self.relative_error)
+        check_fields(self)
         known = species_names(self.top)
         if self.species not in known:
             only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
             raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
         refuse_species_of_totals(self.top, self.species, self.effects)
-        if self.pressure_bar is not None:
-            require_positive("pressure_bar", self.pressure_bar, "bar")
-            if self.top.mass_u is None:
-                raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
+        if self.pressure_bar is not None and self.top.mass_u is None:
+            raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
 
 
 @dataclass(frozen=True, repr=False)

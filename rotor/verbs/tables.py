@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from rotor.requests.field import Field
-from rotor.requests.readers import Flag, Grid, Names, Pairs, Quantity, Range, Text
+from rotor.requests.readers import Flag, Names, Quantity, Text
 from rotor.verbs.verb import Output
 
 
@@ -80,15 +80,11 @@ def _default(one: Field) -> Any:
         return list(one.default)
     if one.default is None or isinstance(one.reader, Flag | Text):
         return one.default
-    if isinstance(one.reader, Range):
-        return one.reader.show(one.default) or None
+    if isinstance(one.default, tuple):  # a file that says nothing means the same
+        return None
     if isinstance(one.reader, Quantity) and one.reader.unit:
         return one.reader.show(one.default)
-    return (
-        one.reader.write(one.default)
-        if isinstance(one.reader, Grid | Pairs) or isinstance(one.default, tuple)
-        else one.default
-    )
+    return one.reader.write(one.default)
 
 
 @cache

@@ -66,7 +66,8 @@ class Work:
 @dataclass(frozen=True)
 class Report:
     """What a report and files are made from. content: as of the JSON. shown: options of the verb. typed: what was given.
-    provenance: of files. view: of a picture. sources: printed whole.
+    provenance: of files. view: of a picture. sources: printed whole. executor: shares the work of further tables. made: those that
+    several files need.
     """
 
     content: Mapping[str, Any]
@@ -75,6 +76,8 @@ class Report:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     sources: bool = False
+    executor: Executor | None = None
+    made: dict[str, Any] = field(default_factory=dict)
 
     @property
     def command(self) -> dict[str, Any]:
@@ -123,12 +126,14 @@ def no_notes(answer: Any) -> Iterable[str]:
 
 @dataclass(frozen=True)
 class Extra:
-    """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. read: values by identity from the text."""
+    """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. metavar: empty for an option without a value.
+    read: values by identity from the text, which what was typed itself overrides; None: the verb reads all of them together.
+    """
 
     option: str
     metavar: str
     help: str
-    read: Callable[[str], Mapping[str, Any]]
+    read: Callable[[Any], Mapping[str, Any]] | None = None
     instead_of: tuple[str, ...] = ()
     panel: str = ""
     common: bool = False
@@ -176,7 +181,7 @@ class Verb:
     several fields. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
 
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
-    these files.
+    these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
     """
 
     name: str
@@ -205,6 +210,8 @@ class Verb:
     build: Callable[[Verb, Given, Subject], Any] | None = None
     adapt: Callable[[Any, Mapping[str, Any], Given], Any] | None = None
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
+    read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
+    records: Callable[[Any], Table | None] | None = None
 
     @cached_property
     def fields(self) -> dict[str, Field]:
@@ -241,6 +248,13 @@ class Verb:
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """What a scene in a folder holds, by dotted key, to ask for the same again."""
         return {**self.subject.saved(request, subject, folder), **written_fields(request)}
+
+    def json(self, answer: Any, content: Mapping[str, Any]) -> str:
+        """The content as JSON text, with all rows."""
+        from rotor.reports.screen import json_text, json_with_rows
+
+        table = self.table(answer) if self.records is None else self.records(answer)
+        return json_text({**content, self.rows: None}) if table is None else json_with_rows(table, self.rows, content)
 
     def output(self, name: str) -> Output:
         """A file by its name."""

@@ -15,7 +15,7 @@ import typer
 from rotor.cli.shared.options import PlainCommand
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, Field
 from rotor.requests.readers import Flag
-from rotor.verbs.verb import Output, Verb
+from rotor.verbs.verb import Extra, Output, Verb
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
@@ -44,10 +44,7 @@ class Parameter:
 def parameters_of(verb: Verb) -> list[Parameter]:
     """Every option of a verb."""
     found = [_input(one) for one in verb.options.values()]
-    found += [
-        Parameter(one.option, one.option, one.help, one.metavar, one.panel, one.common, str, False, one.many)
-        for one in verb.extras
-    ]
+    found += [_extra(one) for one in verb.extras]
     found += [_file(one) for one in verb.outputs]
     found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
@@ -90,6 +87,13 @@ def _default_text(one: Field) -> str:
     if one.default is None or one.default is False or one.default is True or one.default in ((), "", {}):
         return ""
     return one.reader.show(one.default)
+
+
+def _extra(one: Extra) -> Parameter:
+    kind = str if one.metavar else bool
+    return Parameter(
+        one.option, one.option, one.help, one.metavar, one.panel or OUTPUT, one.common, kind, many=one.many
+    )
 
 
 def _file(one: Output) -> Parameter:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -46,20 +45,6 @@ def answering() -> Iterator[None]:
         raise ComputationError(
             "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
         ) from error
-
-
-def sum_progress() -> Callable[[int, int], None] | None:
-    """A line on a terminal, rewritten as a sum over levels goes on, for sums that take longer than two seconds; else None."""
-    if not sys.stderr.isatty():
-        return None
-    start = time.monotonic()
-
-    def show(j: int, last: int) -> None:
-        """How far the levels are solved, after two seconds."""
-        if time.monotonic() - start > 2.0:
-            print(f"\rlevels solved to J = {j} of about {last} ", end="", file=sys.stderr, flush=True)
-
-    return show
 
 
 def note(text: str) -> None:

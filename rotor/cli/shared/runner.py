@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from rotor.cli.shared.command import refuse_overwriting
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
-from rotor.reports.screen import json_with_rows
 from rotor.requests.fill import Given
 from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
 
@@ -31,25 +30,21 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     request = request if verb.adapt is None else verb.adapt(request, outputs, given)
     if verb.check is not None:
         verb.check(request, outputs, shown)
-    with working(verb, typed) as executor, answering() if verb.sound else naming(verb):
-        answer = answer_of(
-            verb, request, Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True)
-        )
     head = {"command": str(context.obj), "input": subject.text}
-    report = report_of(verb, answer, head, given, view)
-    refuse_nothing_to_draw(verb, answer, files)
-    for text in verb.notes(answer):
-        note(text)
-    report.content["files"] = files.names  # type: ignore[index]
-    writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
-    if "--save-scene" in files.paths:
-        writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
-    deliver(
-        files,
-        writers,
-        lambda: json_with_rows(verb.table(answer), verb.rows, report.content),
-        lambda: verb.show(answer, report),
-    )
+    with working(verb, typed) as executor:
+        with answering() if verb.sound else naming(verb):
+            work = Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True)
+            answer = answer_of(verb, request, work)
+        report = report_of(verb, answer, head, given, view, executor)
+        refuse_nothing_to_draw(verb, answer, files)
+        for text in verb.notes(answer):
+            note(text)
+        report.content["files"] = files.names  # type: ignore[index]
+        writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
+        if "--save-scene" in files.paths:
+            writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
+        with naming(verb):
+            deliver(files, writers, lambda: verb.json(answer, report.content), lambda: verb.show(answer, report))
 
 
 def answer_of(verb: Verb, request: Any, work: Work) -> Any:
@@ -60,28 +55,32 @@ def answer_of(verb: Verb, request: Any, work: Work) -> Any:
         raise ComputationError(str(error)) from error
 
 
-def report_of(verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any) -> Report:
+def report_of(
+    verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any, executor: Executor | None = None
+) -> Report:
     """What the report, the JSON and the files are made from. head: command or scene, and input."""
     from rotor.version import version
 
     shown = verb.read_shown(given)
     with answering():
         content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    return Report(content, shown, given, dict(head), view, bool(getattr(shown, "sources", False)))
+    return Report(content, shown, given, dict(head), view, bool(getattr(shown, "sources", False)), executor)
 
 
 def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
     """The texts, options that stand for others replaced by what they mean."""
     values = {name: value for name, value in typed.items() if name in verb.fields}
     for one in verb.extras:
-        if one.option in typed:
-            for other in one.instead_of:
-                if other in typed:
-                    raise ValueError(f"{one.option} and {verb.fields[other].flag}: give one of them")
-            try:
-                values |= one.read(typed[one.option])
-            except ValueError as error:
-                raise ValueError(f"{one.option}: {error}") from None
+        if one.option not in typed or one.read is None:
+            continue
+        if double := next((other for other in one.instead_of if other in typed), None):
+            raise ValueError(f"{one.option} and {verb.fields[double].flag}: give one of them")
+        try:
+            values = {**one.read(typed[one.option]), **values}
+        except ValueError as error:
+            raise ValueError(f"{one.option}: {error}") from None
+    if verb.read_extras is not None:
+        values |= verb.read_extras({one.option: typed[one.option] for one in verb.extras if one.option in typed})
     return values
 
 

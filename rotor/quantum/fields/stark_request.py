@@ -7,10 +7,11 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_positive, require_whole
+import numpy as np
+
+from rotor.checks import require_positive
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import (
-    DEFAULT_TOLERANCE_MHZ,
     Z,
     acting,
     checked_direction,
@@ -22,12 +23,18 @@ from rotor.quantum.effects.stark import (
 from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import MOST_AT_EDGE
+from rotor.quantum.fields.readers import MOST_J, highest_j, read_direction, read_m
+from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Custom, Grid, Quantity, Whole
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
+
+POINTS = 201  # of a range of fields without a count
 
 
 @dataclass(frozen=True)
@@ -41,28 +48,55 @@ class StarkRequest:
     """
 
     top: Top
-    fields_kv_per_cm: tuple[float, ...]
-    j_highest: int = 2
-    m_values: tuple[float, ...] | None = None
-    intensity_w_per_cm2: float = 0.0
-    direction: tuple[float, float, float] = Z
-    jmax: int | None = None
-    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
-    diabatic_gap_mhz: float | None = None
-    hyperfine: bool = False
+    fields_kv_per_cm: tuple[float, ...] = declared(
+        tuple(np.linspace(0.0, 100.0, POINTS).tolist()), Grid("kV/cm", points=POINTS),
+        "Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)", "conditions.field", common=True,
+        typed="0:100kV/cm:201",
+    )  # fmt: skip
+    j_highest: int = declared(
+        2,
+        Custom(highest_j, scene_type=int),
+        "Levels up to this J of the free molecule",
+        "observables.jmax",
+        option="--states",
+        common=True,
+    )
+    m_values: tuple[float, ...] | None = declared(
+        None, Custom(read_m, list, "LIST", list[float]), "|M| of the states: 0,1; by default all. With spins |M_F|: 0.5,1.5",
+        "observables.m", common=True, example=[0, 1],
+    )  # fmt: skip
+    intensity_w_per_cm2: float = declared(
+        0.0, Quantity("W/cm2", metavar="I"), "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
+    )
+    direction: tuple[float, float, float] = declared(
+        Z, Custom(read_direction, list, "ANGLE", list[float]), "Angle of the field with the light of the laser (degrees); M is mixed then",
+        "conditions.direction", option="--tilt", example=[0.0, 0.0, 1.0],
+    )  # fmt: skip
+    jmax: int | None = declared(
+        None,
+        Whole(2, MOST_J),
+        "Highest J of the basis; by default what the tolerance needs",
+        "numerics.jmax",
+        example=30,
+    )
+    tolerance_mhz: float = declared(
+        1e-4, Quantity("MHz", above=0, metavar="E"), "Of the energies (MHz)", "numerics.tolerance", typed="1e-4 MHz"
+    )
+    diabatic_gap_mhz: float | None = declared(
+        None, Quantity("MHz", above=0, metavar="GAP"),
+        "Follow states diabatically through avoided crossings narrower than this (MHz)", "observables.diabatic_gap", example="10 MHz",
+    )  # fmt: skip
+    hyperfine: bool = spins_field()
     most_at_edge: float = MOST_AT_EDGE
 
     def __post_init__(self) -> None:
+        check_fields(self)
         checked_j(self.j_highest)
         if self.hyperfine:
             doubled_m(self.top, self.effects, self.m_values, self.j_highest)
         else:
             checked_m(self.m_values, self.j_highest)
-        require_whole("jmax", self.jmax, 2)
-        require_positive("tolerance_mhz", self.tolerance_mhz)
         require_positive("most_at_edge", self.most_at_edge)
-        if self.diabatic_gap_mhz is not None:
-            require_positive("diabatic_gap_mhz", self.diabatic_gap_mhz)
         checked_direction(self.direction)
         if self.tilted and self.m_values is not None:
             raise ValueError("m_values: a field at an angle with the light mixes M; leave them out")

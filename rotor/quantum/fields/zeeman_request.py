@@ -8,7 +8,8 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_positive, require_whole
+import numpy as np
+
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
@@ -17,6 +18,10 @@ from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import checked_fields
+from rotor.quantum.fields.readers import MOST_J, highest_j
+from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.field import SPINS, check_fields, declared
+from rotor.requests.readers import Custom, Grid, Pairs, Quantity, Whole
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 from rotor.tops.magnetic import MagneticTensors
@@ -25,6 +30,8 @@ from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
+
+POINTS = 51  # of a range of fields without a count
 
 
 @dataclass(frozen=True)
@@ -37,19 +44,44 @@ class ZeemanRequest:
     """
 
     top: Top
-    fields_tesla: tuple[float, ...]
-    j_highest: int = 2
-    jmax: int | None = None
-    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
-    hyperfine: bool = False
-    nuclear_g: Mapping[str, float] | None = None
+    fields_tesla: tuple[float, ...] = declared(
+        tuple(np.linspace(0.0, 5.0, POINTS).tolist()), Grid("T", points=POINTS),
+        "Fields: start:stop[:count], of 51 by default, or a comma list (T, mT or G)", "conditions.field", common=True, typed="0:5T:51",
+    )  # fmt: skip
+    j_highest: int = declared(
+        2,
+        Custom(highest_j, scene_type=int),
+        "Levels up to this J of the free molecule",
+        "observables.jmax",
+        option="--states",
+        common=True,
+    )
+    jmax: int | None = declared(
+        None,
+        Whole(2, MOST_J),
+        "Highest J of the basis; by default what the tolerance needs",
+        "numerics.jmax",
+        example=12,
+    )
+    tolerance_mhz: float = declared(
+        DEFAULT_TOLERANCE_MHZ,
+        Quantity("MHz", above=0, metavar="E"),
+        "Of the energies (MHz)",
+        "numerics.tolerance",
+        typed="1e-6 MHz",
+    )
+    hyperfine: bool = spins_field()
+    nuclear_g: Mapping[str, float] | None = declared(
+        None, Pairs(float, "spin", "14N=0.4038"),
+        "g = moment/(nuclear magneton x spin) of spins, 14N=0.4038,...; by default of the isotope", "magnetic.nuclear_g",
+        example={"14N": 0.4038}, panel=SPINS,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
+        check_fields(self)
         checked_j(self.j_highest)
         checked_fields(self.fields_tesla, "T", HIGHEST_TESLA)
         checked_g(self.top, self.magnetic.g)
-        require_whole("jmax", self.jmax, 2)
-        require_positive("tolerance_mhz", self.tolerance_mhz)
         if self.nuclear_g and not self.hyperfine:
             raise ValueError("nuclear_g: belongs to spins; ask for the hyperfine structure too")
         _ = self.effects, self.spin_g

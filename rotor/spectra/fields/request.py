@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import require_one_of, require_positive
+from rotor.checks import require_one_of
 from rotor.quantum.fields.stark_request import StarkRequest
+from rotor.requests.field import CONDITIONS, OBSERVABLES, check_fields, declared
+from rotor.requests.readers import Custom, Quantity, Range, Text
 from rotor.spectra.fields.light import LightText, light_of
 from rotor.table import Table
 from rotor.thermodynamics.field_mixture import POPULATIONS, field_mixture
@@ -25,9 +27,33 @@ MOST_POINTS = 2_000_000
 FIELDS_OF_SPREAD = 41
 
 
-@dataclass(frozen=True)
-class FieldRequest:
-    """Lines, spectra and mixtures in the fields of a `StarkRequest`; every field is checked when the request is made.
+def _read_light(given: Any) -> LightText:
+    if given in ("parallel", "perpendicular", "isotropic") or not isinstance(given, str):
+        return tuple(given) if isinstance(given, list) else given
+    try:
+        numbers = tuple(float(part) for part in given.removesuffix("deg").split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (1, 3):
+        raise ValueError(
+            f"{given!r}: expected parallel, perpendicular, isotropic, an angle in degrees, or a direction such as 1,0,1"
+        )
+    return numbers if len(numbers) == 3 else numbers[0]
+
+
+def _read_line(given: Any) -> tuple[str, str]:
+    if not isinstance(given, str):
+        upper, lower = given
+        return str(upper), str(lower)
+    parts = [" ".join(part.replace(",", " ").split()) for part in given.split(" - ")]
+    if len(parts) != 2 or not all(parts):
+        raise ValueError(f"{given!r}: expected quantum numbers of two levels, such as '1 - 0' or '2 1 2 - 1 1 1'")
+    return parts[0], parts[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldSample:
+    """What lines, spectra and mixtures in fields are of; every field is checked when it is made.
 
     light: "parallel", "perpendicular", "isotropic", an angle with the field in degrees, or a direction. temperature_k, populations: as in
     `field_lines`. line: labels of two free levels, lines between others are left out; None: all. linewidth_mhz, range_mhz: of the
@@ -35,24 +61,55 @@ class FieldRequest:
     fraction of the field; 0: the same everywhere.
     """
 
-    stark: StarkRequest
-    light: LightText = "parallel"
-    temperature_k: float = 300.0
-    populations: str = "equilibrium"
-    line: tuple[str, str] | None = None
-    linewidth_mhz: float = 1.0
-    range_mhz: tuple[float, float] | None = None
-    spread: float = 0.0
+    light: LightText = declared(
+        "parallel", Custom(_read_light, metavar="NAME"),
+        "Of --lines: parallel, perpendicular, isotropic, the angle with the field (degrees), or a direction X,Y,Z", option="--light",
+        panel=CONDITIONS,
+    )  # fmt: skip
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Of --lines, --spectrum and --mixture (K)", option="--temperature", panel=CONDITIONS,
+        common=True,
+    )  # fmt: skip
+    populations: str = declared(
+        "equilibrium", Text(POPULATIONS, "NAME"), "equilibrium in the field, or adiabatic: those of the free molecule, as in a beam",
+        option="--populations", panel=CONDITIONS,
+    )  # fmt: skip
+    line: tuple[str, str] | None = declared(
+        None,
+        Custom(_read_line),
+        "Lines between two free levels alone, such as '1 - 0'",
+        option="--line",
+        panel=OBSERVABLES,
+    )
+    linewidth_mhz: float = declared(
+        1.0, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum of the lines of --spectrum (MHz)", option="--linewidth",
+        panel=OBSERVABLES,
+    )  # fmt: skip
+    range_mhz: tuple[float, float] | None = declared(
+        None,
+        Range("MHz"),
+        "Frequencies of --spectrum (MHz); by default those of the lines",
+        option="--range",
+        panel=OBSERVABLES,
+    )
+    spread: float = declared(
+        0.0, Quantity(least=0, below=0.25), "Of --spectrum: standard deviation of the field over the sample, a fraction of it",
+        option="--spread", panel=CONDITIONS,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         light_of(self.light)
-        require_positive("temperature_k", self.temperature_k, "K")
+        check_fields(self)
         require_one_of("populations", self.populations, POPULATIONS)
-        require_positive("linewidth_mhz", self.linewidth_mhz, "MHz")
-        if not 0 <= self.spread < 0.25:
-            raise ValueError(f"spread: {self.spread:g} of the field: a number from 0 to 0.25 is expected")
         if self.range_mhz is not None and not 0 <= self.range_mhz[0] < self.range_mhz[1]:
             raise ValueError(f"range_mhz: {self.range_mhz}: two frequencies that rise are expected")
+
+
+@dataclass(frozen=True)
+class FieldRequest(FieldSample):
+    """Lines, spectra and mixtures of a sample in the fields of a `StarkRequest`."""
+
+    stark: StarkRequest
 
 
 def lines_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> FieldLines:

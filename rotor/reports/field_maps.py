@@ -1,0 +1,28 @@
+"""Facts and table of a map of levels in a static field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports.screen import Table
+
+if TYPE_CHECKING:
+    from rotor.quantum.fields.field_map import FieldMap
+
+SHOWN = 24  # states on screen
+
+
+def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
+    """J max, how exact energies are, and the population at the edge, as a line of the report."""
+    accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
+    rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
+    return "accuracy", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
+
+
+def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[slice], list[str]]) -> Table:
+    """The first states by M and block, a row each, made from the rows of its curve in the map."""
+    curves = states.curves()
+    rows = [row_of(rows_of) for rows_of in curves[:SHOWN]]
+    title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
+    return Table(f"{title}, by M and block", names, rows, frozenset({"state"}))

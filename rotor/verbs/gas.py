@@ -1,0 +1,168 @@
+"""`gas`: a classical gas of free molecules, tested for equipartition; its correlation functions."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports import top_facts
+from rotor.reports.progress import counting
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.requests.fill import Given
+from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
+from rotor.verbs.molecule import STATES
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Report, Verb, Work
+
+if TYPE_CHECKING:
+    from rotor.classical.gas.ensembles import Correlations
+
+SHOWN = 11  # rows of the correlation functions in the report
+_PROVENANCE = ("source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source")
+
+EXAMPLES = """\b
+Examples:
+  rotor gas water --molecules 20000 --temperature 300 --seed 7 --json -
+  rotor gas OCS --times 0:5:201 --csv ocs.csv --plot ocs.png"""
+
+
+def adapt(request: GasRequest, outputs: Mapping[str, Any], given: Given) -> GasRequest:
+    """Times until the correlation functions have settled, where files ask for them and none are given."""
+    if request.times_ps is None and outputs.keys() & {"csv", "parquet", "json", "plot"}:
+        return replace(request, times_ps=settling_times_ps(request.top, request.temperature_k))
+    return request
+
+
+def answer(request: GasRequest, work: Work) -> GasAnswer:
+    """The gas, tested, and its correlation functions on all cores; the answer does not depend on their number."""
+    if request.times_ps is None:
+        return answer_gas(request)
+    bar = counting(request.molecules, "molecules") if work.progress else nullcontext()
+    with ThreadPoolExecutor(os.cpu_count()) as pool, bar as advance:
+        return answer_gas(request, pool, advance)
+
+
+def write_table(answer: GasAnswer, path: Path, report: Report) -> None:
+    """The correlation functions as a file."""
+    from rotor.formats import write
+
+    write(answer.correlations, path, settings=_provenance(report))
+
+
+def draw(answer: GasAnswer, path: Path, report: Report) -> None:
+    """The picture of the test and of the correlation functions as a file."""
+    from rotor.plots.gas import plot_gas
+    from rotor.plots.picture import name_of_top
+
+    content, view = report.content, report.view
+    title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
+    plateau, record = content["c1_plateau"], _provenance(report)
+    plot_gas(answer.test, answer.correlations, path, title=title, plateau=plateau, view=view, provenance=record)
+
+
+def _provenance(report: Report) -> dict[str, Any]:
+    return {**report.provenance, **{name: report.content[name] for name in _PROVENANCE}}
+
+
+def show(answer: GasAnswer, report: Report) -> None:
+    """Print the test of equipartition and the correlation functions."""
+    curves, content, top = answer.correlations, report.content, answer.request.top
+    print(f"{top_facts.heading(top)}, a classical gas")
+    show_facts(_facts(answer, content))
+    print()
+    show_table(_degrees_table(content))
+    if curves is not None:
+        print()
+        show_table(_curves_table(curves))
+    sources = source_facts(top, ("constants",), report.sources)
+    show_facts([*sources, *top_facts.left_out_facts(content["left_out"])])
+
+
+def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top, test = answer.request.top, answer.test
+    a, b, c = top.rotational_constants_mhz
+    rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
+    count = content["degrees_of_freedom"]
+    drawn = f"{content['molecules']} molecules at {content['temperature_k']:g} K, seed {content['seed']}"
+    left_out = "" if top.mass_u is not None else "; translations are left out, as the mass is not known"
+    facts = [
+        ("rigid top", f"{rigid} MHz, distortion neglected"),
+        ("drawn", f"{drawn}; moved freely for {content['tested_at_ps']:.4g} ps, exactly"),
+        ("degrees", f"{count['translation']} translations, {count['rotation']} rotations a molecule{left_out}"),
+        ("test", str(test)),
+    ]
+    if answer.correlations is not None:
+        facts += [("C1", f"of {content['vector_source']}"), ("C2", f"of {content['tensor_source']}")]
+        start = content["short_time_per_ps2"]
+        begins = f"C1 as 1 - {0.5 * start['c1']:.5g} t², C2 as 1 - {0.5 * start['c2']:.5g} t² (t in ps)"
+        facts.append(("closed forms", f"{begins}; C1 ends at {content['c1_plateau']:.5g}"))
+    return facts
+
+
+def _degrees_table(content: Mapping[str, Any]) -> Table:
+    rows = [
+        [
+            d["name"], f"{d['energy_cm']:.4f}", f"{d['expected_cm']:.4f}", f"{d['mean']:.5f}", f"{d['mean_spread']:.5f}",
+            f"{d['sigma']:+.2f}", f"{d['p_value']:.3g}", f"{d['spread']:.4f}", f"{d['ks_p_value']:.3g}",
+        ]
+        for d in content["degrees"]
+    ]  # fmt: skip
+    columns = ("degree", "E (cm-1)", "½kT", "2E/kT", "±", "σ", "p", "spread", "p (KS)")
+    return Table(
+        "mean kinetic energy by degree; spread √2 = 1.4142 expected", columns, rows, left=frozenset({"degree"})
+    )
+
+
+def _curves_table(curves: Correlations) -> Table:
+    count = len(curves)
+    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
+    columns = ("t (ps)", *list(curves.columns)[1:])
+    data = list(curves.columns.values())
+    cells = [[f"{data[0][i]:.4g}", *(f"{column[i]:.5f}" for column in data[1:])] for i in rows]
+    few = "" if len(cells) == count else f", {len(cells)} of {count} times"
+    return Table(f"correlation functions{few}", columns, cells)
+
+
+VERB = Verb(
+    name="gas",
+    about="A classical gas of free molecules: equipartition, correlation functions.",
+    examples=EXAMPLES,
+    request=GasRequest,
+    answer=answer,
+    table=lambda answer: answer.test if answer.correlations is None else answer.correlations,
+    records=lambda answer: answer.correlations,
+    rows="correlation",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the correlation functions as CSV", write_table, "out.csv"),
+        Output("parquet", (".parquet",), "Write the correlation functions as Parquet", write_table, "out.parquet"),
+        Output("plot", PICTURES, "Draw the test and the functions (.png, .pdf, .svg)", draw, "out.png"),
+    ),
+    subject=OneMolecule(
+        (
+            "polarizability",
+            "anisotropy",
+            "spin_weights",
+            "spin_constants",
+            "spins",
+            *STATES,
+            "calculator",
+            "hessian",
+            "symmetry_tolerance",
+        )
+    ),
+    drawn="ps",
+    scaled=False,
+    adapt=adapt,
+    accuracy="of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)",
+    accuracy_example="1 K",
+    start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "gas.csv"},
+    sound=False,
+)

@@ -1,0 +1,203 @@
+"""`stark`: levels of a molecule in a static electric field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
+from rotor.reports import top_facts
+from rotor.reports.field_maps import accuracy_fact, table_of_states
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.requests.fill import Given
+from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
+from rotor.table import counted
+from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Writer
+
+if TYPE_CHECKING:
+    from rotor.quantum.fields.field_map import FieldMap
+    from rotor.tops.top import Top
+
+EXAMPLES = """\b
+Examples:
+  rotor stark OCS --field 0:200kV/cm --states "J<=2" --plot ocs.png --csv ocs.csv
+  rotor stark indole --field 0:200kV/cm --states "J<=2" --plot indole.png
+  rotor stark --constants "A=5655.2654 B=1546.8759 C=1214.4040 MHz" --dipole-abc 4.5152,0,0 --field 0,100kV/cm
+  rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --tilt 45 --states "J<=1"
+  rotor stark OCS --field 0:5kV/cm:21 --states "J<=3" --line "2 - 1" --light perpendicular --lines lobes.csv --coefficients c.csv
+  rotor stark OCS --field 20kV/cm --states "J<=6" --spread 0.005 --linewidth 0.5MHz --range 0:90GHz --spectrum ocs.csv
+  rotor stark HC3N --field 0:2kV/cm --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
+  rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
+
+
+@dataclass(frozen=True)
+class StarkShown(FieldSample, Shown):
+    """What lines, spectra and mixtures are of."""
+
+
+def prepare(top: Top, reading: Reading, given: Given) -> Top:
+    """The top with its dipole and, where light acts, its polarizability."""
+    top = with_some_dipole(top, reading)
+    return with_known_polarizability(top, reading) if given.values.get("conditions.intensity") else top
+
+
+def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
+    """ValueError for a picture of a single field."""
+    if "plot" in outputs and len(request.fields_kv_per_cm) < 2:
+        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+
+
+def _further(name: str) -> Writer:
+    """What writes a table that is made from the map."""
+
+    def write_table(answer: StarkAnswer, path: Path, report: Report) -> None:
+        """The table as a file."""
+        from rotor.formats import write
+
+        write(_made(name, answer, report), path, settings=dict(report.provenance))
+
+    return write_table
+
+
+def _made(name: str, answer: StarkAnswer, report: Report) -> Any:
+    """A further table, made once for all files that need it."""
+    if name not in report.made:
+        sample = {one.name: getattr(report.shown, one.name) for one in fields(FieldSample)}
+        report.made[name] = MAKERS[name](FieldRequest(answer.request, **sample), answer.states, report.executor)
+    return report.made[name]
+
+
+def write_map(answer: StarkAnswer, path: Path, report: Report) -> None:
+    """The map as a file."""
+    from rotor.formats import write
+
+    dipole = {"dipole_abc_debye": answer.request.top.dipole_abc_debye}
+    write(answer.states, path, settings={**report.provenance, **dipole})
+
+
+def draw(answer: StarkAnswer, path: Path, report: Report) -> None:
+    """The picture of the map as a file."""
+    from rotor.plots.picture import name_of_top
+    from rotor.plots.stark import plot_stark
+
+    title = name_of_top(answer.request.top)
+    plot_stark(answer.states, path, title=title, view=report.view, provenance=report.command)
+
+
+def draw_lines(answer: StarkAnswer, path: Path, report: Report) -> None:
+    """The picture of the lines against the field as a file."""
+    from rotor.plots.stark import plot_lobes
+
+    plot_lobes(
+        _made("lines", answer, report), path, title=report.content["name"] or "", provenance=dict(report.provenance)
+    )
+
+
+def show(answer: StarkAnswer, report: Report) -> None:
+    """Print the conditions and the first states."""
+    top, content = answer.request.top, report.content
+    print(top_facts.heading(top))
+    show_facts(_facts(top, content))
+    print()
+    show_table(_table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1])))
+    show_facts([*source_facts(top, ("constants", "dipole"), report.sources), *top_facts.model_facts(content)])
+
+
+def _table(states: FieldMap, mixed: bool) -> Table:
+    """The first states, by M and block; M has a sign where three components of the dipole act."""
+    first, last = states.fields[0], states.fields[-1]
+
+    def row(rows: slice) -> list[str]:
+        """One row of the printed table."""
+        at, end = rows.start, rows.stop - 1
+        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
+        m = "mixed" if mixed else f"{states.m[at]:g}"
+        return [str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)]
+
+    names = (
+        "state",
+        "M",
+        f"E at {first:g} kV/cm (MHz)",
+        f"E at {last:g} kV/cm (MHz)",
+        "μ_eff there (D)",
+        "⟨cosθ⟩ there",
+    )
+    return table_of_states(states, names, row)
+
+
+def _along(direction: list[float]) -> str:
+    x, _, z = direction
+    if not x:
+        return "along Z"
+    return f"at {math.degrees(math.atan2(x, z)):g}° with Z"
+
+
+def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    first, last, count = content["field_kv_per_cm"]
+    facts = [
+        ("constants", top_facts.constants_text(top)),
+        ("dipole", top_facts.dipole_text(top)),
+        ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {counted(count, 'value')}"),
+    ]
+    if content["intensity_w_per_cm2"]:
+        facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))
+    return [*facts, accuracy_fact(content)]
+
+
+_CSV = (".csv",)
+VERB = Verb(
+    name="stark",
+    about="Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures.",
+    examples=EXAMPLES,
+    request=StarkRequest,
+    answer=lambda request, work: answer_stark(request, work.executor),
+    table=lambda answer: answer.states,
+    rows="states",
+    show=show,
+    outputs=(
+        Output("csv", _CSV, "Write the map as CSV", write_map, "out.csv"),
+        Output("parquet", (".parquet",), "Write the map as Parquet", write_map, "out.parquet"),
+        Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
+        Output("lines", _CSV, "Write the lines in every field, resolved in M, as CSV", _further("lines"), scene=False),
+        Output("lobes", PICTURES, "Draw the lines against the field (.png, .pdf, .svg)", draw_lines, scene=False),
+        Output(
+            "spectrum", _CSV, "Write the cross section at the highest field as CSV", _further("spectrum"), scene=False
+        ),
+        Output(
+            "coefficients",
+            _CSV,
+            "Write Stark coefficients of the states, or of --line, as CSV",
+            _further("coefficients"),
+            scene=False,
+        ),
+        Output(
+            "mixture",
+            _CSV,
+            "Write means of the thermal mixture against the field as CSV",
+            _further("mixture"),
+            scene=False,
+        ),
+        Output(
+            "deflection",
+            _CSV,
+            "Write effective dipoles, one column for each state, as CSV",
+            _further("deflection"),
+            scene=False,
+        ),
+    ),
+    subject=OneMolecule(("anisotropy", "spin_weights", "calculator", "hessian", *STATES), prepare),
+    shown=StarkShown,
+    drawn="kV/cm",
+    scaled=False,
+    workers="blocks of states",
+    check=check,
+    sound=False,
+    accuracy="of the energies",
+    start={"molecule": "OCS", "conditions.field": "0:200kV/cm:201", "outputs.csv": "stark.csv"},
+)

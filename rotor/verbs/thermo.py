@@ -1,0 +1,180 @@
+"""`thermo`: partition function, energy, entropy and heat capacity of rotation, and of the ideal gas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports import top_facts
+from rotor.reports.progress import sum_progress
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.requests.field import CONDITIONS
+from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work
+
+if TYPE_CHECKING:
+    from rotor.thermodynamics import ThermoFunctions
+
+SHOWN = 25  # rows of the table in the report
+
+EXAMPLES = """\b
+Examples:
+  rotor thermo water
+  rotor thermo water --temperature 10:1000K:100 --csv water.csv --plot water.png
+  rotor thermo HCN --hyperfine --temperature 0.0001,0.001,0.01,0.1,1
+  rotor thermo H2 --species ortho --temperature 5:300K:60 --plot ortho.png
+  rotor thermo water --gas --pressure 1bar --vibration 1595,3657,3756 --temperature 298.15"""
+
+
+def answer(request: ThermoRequest, work: Work) -> ThermoAnswer:
+    """The functions, with a line on a terminal while levels are summed."""
+    return answer_thermo(request, sum_progress() if work.progress else None)
+
+
+def draw(answer: ThermoAnswer, path: Path, report: Report) -> None:
+    """The picture of the heat capacity as a file."""
+    from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
+    from rotor.plots.picture import name_of_top
+
+    request = answer.request
+    grid = tuple(curve_temperatures(answer.functions.temperature_k).tolist())
+    smooth = answer_thermo(replace(request, temperatures_k=grid, pressure_bar=None)).functions
+    label = "quantum" if request.species == "equilibrium" else f"quantum, {request.species}"
+    title = name_of_top(request.top) if report.view.title is None else report.view.title
+    plot_heat_capacity([Panel(title, {label: smooth})], path, view=report.view, provenance=dict(report.provenance))
+
+
+def show(answer: ThermoAnswer, report: Report) -> None:
+    """Print constants, conditions, and the functions by temperature."""
+    functions, content = answer.functions, report.content
+    print(top_facts.heading(functions.top))
+    show_facts(_facts(functions, content))
+    print()
+    show_table(_rotation_table(functions))
+    if functions.gas is not None:
+        print()
+        show_table(_gas_table(functions))
+    print()
+    sources = source_facts(functions.top, ("constants", "spin weights"), report.sources)
+    show_facts([*sources, *top_facts.model_facts(content)])
+
+
+def _facts(functions: ThermoFunctions, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top = functions.top
+    corrections = content["classical_corrections"]
+    series = " ".join(
+        f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
+        for value, unit in zip(corrections.values(), ("/T", "/T²", " T", " T²"), strict=True)
+        if value
+    )
+    return [
+        ("constants", top_facts.constants_text(top)),
+        *top_facts.weights_facts(top, content["spin_weights"]),
+        *(one for one in top_facts.states_facts(top) if not one[1].startswith("dipole")),
+        ("species", _species_text(functions, content)),
+        ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
+        ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
+        ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
+        ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        *_spin_facts(content["hyperfine"]),
+        ("vibration", content["vibrations"] or "left out: no states given"),
+    ]
+
+
+def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """How many functions of spins Q counts, and where their splittings are in it."""
+    if used is None:
+        return []
+    up_to, size = used["summed_up_to_k"], f"splittings of {used['splitting_mhz']:.2g} MHz"
+    where = "too small to change them" if up_to is None else f"summed level by level up to {up_to:g} K"
+    return [("hyperfine", f"Q counts {used['spin_functions']:.6g} functions of the spins; {size}, {where}")]
+
+
+def _onset_text(tolerance: float, above_k: float | None) -> str:
+    if above_k is None:
+        return f"where it is good to {tolerance:.0%} of C_v is not known: no sum over levels reaches so far"
+    return f"good to {tolerance:.0%} of C_v above {above_k:.4g} K (rigid top, equilibrium)"
+
+
+def _summed_to(jmax: int) -> str:
+    return f"to J = {jmax} at most" if jmax >= 0 else "none: classical with corrections"
+
+
+def _species_text(functions: ThermoFunctions, content: Mapping[str, Any]) -> str:
+    text = functions.species
+    if functions.fractions:
+        text += ", frozen: " + ", ".join(f"{name} {x:.4g}" for name, x in functions.fractions.items())
+    others = [name for name in content["species_known"] if name != functions.species]
+    return text + (f"; there are {', '.join(others)} too" if others else "; all levels are of one species")
+
+
+def _theta_text(theta: Sequence[float]) -> str:
+    known = [f"{name} {value:.6g}" for name, value in zip("ABC", theta, strict=True) if math.isfinite(value)]
+    return ", ".join(known) + " K"
+
+
+def _rows(functions: ThermoFunctions) -> list[int]:
+    count = len(functions)
+    return sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else list(range(count))
+
+
+def _rotation_table(functions: ThermoFunctions) -> Table:
+    rows = _rows(functions)
+    columns = ("T (K)", "Q", "Q classical", "Q corrected", "U (J/mol)", "S (J/mol K)", "Cv/R", "classical", "corrected")
+    formats = ("{:g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6f}", "{:.1f}", "{:.6f}")
+    data = list(functions.columns.values())[: len(columns)]
+    cells = [
+        [form.format(x[i]) if math.isfinite(x[i]) else "-" for form, x in zip(formats, data, strict=True)] for i in rows
+    ]
+    few = "" if len(rows) == len(functions) else f", {len(rows)} of {len(functions)} temperatures"
+    return Table(f"rotation{few}; U from the lowest level, S with nuclear spin as the weights count it", columns, cells)
+
+
+def _gas_table(functions: ThermoFunctions) -> Table:
+    gas = functions.gas
+    assert gas is not None  # asked for by the caller
+    data = (gas.cp_j_per_mol_k, gas.entropy_j_per_mol_k, gas.enthalpy_j_per_mol, gas.gibbs_j_per_mol_k)
+    columns = ("T (K)", "Cp (J/mol K)", "S (J/mol K)", "H-H(0) (J/mol)", "-(G-H(0))/T (J/mol K)")
+    cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in _rows(functions)]
+    spin = f"R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
+    return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
+
+
+VERB = Verb(
+    name="thermo",
+    about="Rotational partition function, energy, entropy and heat capacity, quantum and classical.",
+    examples=EXAMPLES,
+    request=ThermoRequest,
+    answer=answer,
+    table=lambda answer: answer.functions,
+    rows="functions",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the table as CSV, in full precision", example="out.csv"),
+        Output("parquet", (".parquet",), "Write the table as Parquet", example="out.parquet"),
+        Output("plot", PICTURES, "Draw the heat capacity (.png, .pdf, .svg)", draw, "out.png"),
+    ),
+    subject=OneMolecule(
+        ("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles", "calculator", "hessian")
+    ),
+    drawn="K",
+    extras=(
+        Extra(
+            "--gas",
+            "",
+            "Functions of the ideal gas too, with translation; at 1 bar unless --pressure says otherwise",
+            lambda _: {"conditions.pressure": "1 bar"},
+            (),
+            CONDITIONS,
+            True,
+        ),
+    ),
+    accuracy="of Q, U and C_v",
+    accuracy_example="0.1 %",
+    start={"molecule": "water", "conditions.temperature": "10:1000K:100", "outputs.csv": "thermo.csv"},
+)

@@ -1,0 +1,204 @@
+"""`zeeman`: levels of a molecule in a static magnetic field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
+from rotor.reports import top_facts
+from rotor.reports.field_maps import accuracy_fact, table_of_states
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.requests.field import CONDITIONS, all_fields, declared
+from rotor.requests.fill import Given, read_instance
+from rotor.requests.readers import Numbers
+from rotor.table import counted
+from rotor.verbs.molecule import FIELDS, STATES, Reading
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Report, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.quantum.fields.field_map import FieldMap
+    from rotor.tops.magnetic import Tensor
+    from rotor.tops.top import Top
+
+EXAMPLES = """\b
+Examples:
+  rotor zeeman --constants "B=6081.492 MHz" --g -0.03 --field 0:5T --plot levels.png --csv levels.csv
+  rotor zeeman --constants "A=10 B=6 C=4 GHz" --g 0.6,-0.2,0.3 --magnetisability -3,2,-7 --field 0:20T:41 --states "J<=1"
+  rotor zeeman HC3N --g -0.01 --field 0:200G --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
+  rotor zeeman molecule.toml --field 1T --json -"""
+
+_PROVENANCE = ("g_abc", "magnetisability_abc", "nuclear_g")
+
+
+@dataclass(frozen=True)
+class MagneticInput:
+    """What a magnetic field acts on; by default what the file of the molecule has in its table [magnetic]."""
+
+    g: tuple[float, ...] | None = declared(
+        None, Numbers(example="0.6,-0.2,0.3"), "Rotational g tensor along a, b, c: aa,bb,cc[,ab,ac,bc]; parallel,perpendicular; or g",
+        "magnetic.g", common=True, panel=CONDITIONS, example=[-0.03],
+    )  # fmt: skip
+    magnetisability: tuple[float, ...] | None = declared(
+        None, Numbers(example="-3,2,-7"), "Likewise, with its sign, in 1e-6 erg/(G² mol); by default left out", "magnetic.magnetisability",
+        panel=CONDITIONS, example=[-3.0, 2.0, -7.0],
+    )  # fmt: skip
+
+
+_MAGNETIC = {one.identity: one for one in all_fields(MagneticInput).values()}
+
+
+class MagneticMolecule(OneMolecule):
+    """A molecule with the tensors on which a magnetic field acts."""
+
+    fields = {**{one.identity: one for one in FIELDS.values()}, **_MAGNETIC}  # noqa: RUF012
+
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """Inputs of the molecule, and its tensors."""
+        return {**super().options, **_MAGNETIC}
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The molecule and the tensors that were given."""
+        magnetic = subject.values["top"].magnetic
+        given = {"magnetic.g": _numbers(magnetic.g), "magnetic.magnetisability": _numbers(magnetic.magnetisability)}
+        typed = magnetic.source.startswith("given")
+        tensors = {name: value for name, value in given.items() if value is not None and typed}
+        return {**super().saved(request, subject, folder), **tensors}
+
+
+def _numbers(tensor: Tensor | None) -> list[float] | None:
+    """aa, bb, cc, and ab, ac, bc where one of them is there."""
+    if tensor is None:
+        return None
+    (aa, ab, ac), (_, bb, bc), (_, _, cc) = tensor
+    mixed = [ab, ac, bc]
+    return [aa, bb, cc, *(mixed if any(mixed) else [])]
+
+
+def with_tensors(top: Top, reading: Reading, given: Given) -> Top:
+    """The top with the tensors that are given, else those of its file."""
+    from rotor.tops.magnetic import MagneticTensors, tensor_for
+
+    magnetic, called = (
+        read_instance(MagneticInput, given),
+        {one.name: one.called(given.style) for one in _MAGNETIC.values()},
+    )
+
+    def tensor(name: str) -> Tensor | None:
+        numbers = getattr(magnetic, name)
+        try:
+            return None if numbers is None else tensor_for(top.kind, list(numbers))
+        except ValueError as error:
+            raise ValueError(f"{called[name]}: {error}") from None
+
+    g, chi = tensor("g"), tensor("magnetisability")
+    if g is not None:
+        source = f"given ({called['g']}, {called['magnetisability']})" if chi else f"given ({called['g']})"
+        return replace(top, magnetic=MagneticTensors(g, chi, source))
+    if top.magnetic is None:
+        raise ValueError(
+            f"the rotational g tensor is not known: give {called['g']} aa,bb,cc (principal axes), parallel,perpendicular of a "
+            "symmetric top, or the one g of a linear top"
+        )
+    return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
+
+
+def check(request: ZeemanRequest, outputs: Mapping[str, Any], shown: Any) -> None:
+    """ValueError for a picture of a single field."""
+    if "plot" in outputs and len(request.fields_tesla) < 2:
+        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+
+
+def write_map(answer: ZeemanAnswer, path: Path, report: Report) -> None:
+    """The map as a file."""
+    from rotor.formats import write
+
+    tensors = {name: report.content[name] for name in _PROVENANCE}
+    write(answer.states, path, settings={**report.provenance, **tensors})
+
+
+def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
+    """The picture of the map as a file."""
+    from rotor.plots.picture import name_of_top
+    from rotor.plots.zeeman import plot_zeeman
+
+    title, spins = name_of_top(answer.request.top), len(answer.request.spin_g)
+    plot_zeeman(answer.states, path, title=title, spins=spins, view=report.view, provenance=report.command)
+
+
+def show(answer: ZeemanAnswer, report: Report) -> None:
+    """Print the conditions and the first states."""
+    top = answer.request.top
+    print(top_facts.heading(top))
+    show_facts(_facts(answer, report.content))
+    print()
+    show_table(_table(answer.states))
+    show_facts([*source_facts(top, ("constants",), report.sources), *top_facts.model_facts(report.content)])
+
+
+def _table(states: FieldMap) -> Table:
+    """The first states, by M and block."""
+    first, last = states.fields[0], states.fields[-1]
+
+    def row(rows: slice) -> list[str]:
+        """One row of the printed table."""
+        at, end = rows.start, rows.stop - 1
+        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end])
+        return [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]
+
+    names = ("state", "M", f"E at {first:g} T (MHz)", f"E at {last:g} T (MHz)", "moment there (μ_N)")
+    return table_of_states(states, names, row)
+
+
+def _facts(answer: ZeemanAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    first, last, count = content["field_tesla"]
+    facts = [
+        ("constants", top_facts.constants_text(answer.request.top)),
+        ("g", _tensor_text(content["g_abc"])),
+        ("field", f"{first:g} to {last:g} T along Z, {counted(count, 'value')}"),
+    ]
+    if content["magnetisability_abc"] is not None:
+        facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))
+    if content["nuclear_g"]:
+        facts.append(("g of spins", ", ".join(f"{name} {value:g}" for name, value in content["nuclear_g"].items())))
+    return [*facts, accuracy_fact(content)]
+
+
+def _tensor_text(tensor: Tensor) -> str:
+    (aa, ab, ac), (_, bb, bc), (_, _, cc) = tensor
+    mixed = [f"{name} {value:g}" for name, value in (("ab", ab), ("ac", ac), ("bc", bc)) if value]
+    return ", ".join([f"aa {aa:g}", f"bb {bb:g}", f"cc {cc:g}", *mixed])
+
+
+VERB = Verb(
+    name="zeeman",
+    about="Levels in a static magnetic field: energies, labels and magnetic moments of every M, with nuclear spins where asked.",
+    examples=EXAMPLES,
+    request=ZeemanRequest,
+    answer=lambda request, work: answer_zeeman(request, work.executor),
+    table=lambda answer: answer.states,
+    rows="states",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the map as CSV", write_map, "out.csv"),
+        Output("parquet", (".parquet",), "Write the map as Parquet", write_map, "out.parquet"),
+        Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
+    ),
+    subject=MagneticMolecule(
+        ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "calculator", "hessian", *STATES),
+        with_tensors,
+    ),
+    drawn="T",
+    scaled=False,
+    workers="blocks of states",
+    check=check,
+    sound=False,
+    accuracy="of the energies",
+    accuracy_example="1 Hz",
+    start={"molecule": "OCS", "magnetic.g": [-0.03], "conditions.field": "0:5T:51", "outputs.csv": "zeeman.csv"},
+)
