@@ -373,7 +373,7 @@ LOADED = {  # of HEAVY, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermodynamics.functions"},
     "levels": set(),
     "raman": {"rotor.spectra", "rotor.spectra.raman"},
-    "stark": {"rotor.quantum.effects.stark"},
+    "stark": {"rotor.spectra", "rotor.quantum.effects.stark"},
     "zeeman": {"rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman"},
     "thermo": {"rotor.thermodynamics.functions"},
     "tumble": {"rotor.classical", "numba"},
