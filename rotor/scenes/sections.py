@@ -10,45 +10,14 @@ from typing import Annotated, Any
 
 from msgspec import field
 
+from rotor.verbs.subjects import molecule_section
 from rotor.verbs.tables import Section, said
 
 Quantity = float | str
 Grid = list[float] | str
 
 
-class MoleculeSection(Section, frozen=True):
-    """Which molecule; either `source` or `constants`."""
-
-    source: Annotated[str | None, said("a name, a file (counted from the scene's folder) or SMILES:...", "water")] = (
-        None
-    )
-    constants: Annotated[str | None, said("constants by name instead of a source", "A=9.2 B=3 C=2.5 GHz")] = None
-    isotopes: Annotated[list[str], said("other isotopes, by atom number or element", ["1=2H"])] = field(
-        default_factory=list
-    )
-    dipole: Annotated[list[float] | None, said("in the frame of the input (D)", [0.0, 0.0, 1.85])] = None
-    dipole_abc: Annotated[list[float] | None, said("in principal axes (D)", [0.0, 1.85, 0.0])] = None
-    polarizability: Annotated[
-        list[float] | None,
-        said("aa, bb, cc[, ab, ac, bc] in principal axes; or along and across the axis (Å³)", [8.0, 4.0]),
-    ] = None
-    spin_weights: Annotated[dict[str, int] | None, said("of the levels", {"ee": 1, "eo": 3, "oe": 3, "oo": 1})] = None
-    spin_constants: Annotated[str | None, said("of nuclear and electron spins (MHz)", "chi_aa(14N)=-4.22 MHz")] = None
-    spins: Annotated[str | None, said("sizes and order of the spins", "14N=1")] = None
-    state_constants: Annotated[
-        str | None, said("further states and what couples them (MHz)", "E[1]=120GHz B[1]=10GHz W[0,1]=3 MHz")
-    ] = None
-    state_dipoles: Annotated[
-        str | None, said("in and between states, along a, b, c (D)", "[1] 0,0,1.3 [0,1] 0,0,1.47")
-    ] = None
-    state_weights: Annotated[str | None, said("spin weights of states", "[0] even=1,odd=3 [1] even=3,odd=1")] = None
-    state_symmetry: Annotated[str | None, said("group of the states, by which couplings are checked", "C2v")] = None
-    state_names: Annotated[str | None, said("of all states, from 0 on", "0+,0-")] = None
-    calculator: Annotated[str | None, said("ASE calculator that refines the geometry first", "xtb")] = None
-    hessian: Annotated[str | None, said("file of the Hessian that quartic distortion follows from", "hessian.txt")] = (
-        None
-    )
-    symmetry_tolerance: Annotated[Quantity | None, said("how far nuclei may be off a symmetry (Å)", "0.005 Å")] = None
+MoleculeSection: Any = molecule_section()
 
 
 class QuantumEffects(Section, frozen=True):
@@ -239,7 +208,7 @@ class AlignNumerics(Section, frozen=True):
     seed: Annotated[int, said("of the classical gas")] = 1
 
 
-class EmittingMolecule(MoleculeSection, frozen=True):
+class EmittingMolecule(MoleculeSection, frozen=True):  # type: ignore[misc,call-arg]
     """A molecule of the source; either `source` or `constants`."""
 
     column: Annotated[float, said("molecules in the line of sight (1/cm²)")] = 1e14
