@@ -1,0 +1,145 @@
+"""How far a result can be trusted: five sources of error, each a number in the unit of the result or a reason why there is none.
+
+| term | what it is | how it is stated |
+|---|---|---|
+| rounding | double precision | a bound |
+| truncation | basis, contraction, cut, J max, step, order, interpolation | a bound |
+| model | effects that are left out, geometry, vibration | a size, right within a factor of 3 |
+| data | uncertainties of constants, dipole, Q | one standard deviation |
+| statistics | a finite number of samples | one standard deviation |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+NOT_ESTIMATED = "not estimated"
+
+
+@dataclass(frozen=True)
+class ErrorTerm:
+    """One source of error of a result.
+
+    value: in the unit of the budget; None where it is not estimated. source: from what the value follows, or why there is none.
+    remedy: what would lower it.
+
+    >>> ErrorTerm(4e-7, "J max 15").text("MHz")
+    '4e-07 MHz (J max 15)'
+    >>> ErrorTerm(None, "the dipole has no stated uncertainty").text("MHz")
+    'not estimated: the dipole has no stated uncertainty'
+    """
+
+    value: float | None
+    source: str
+    remedy: str = ""
+
+    def __post_init__(self) -> None:
+        if self.value is not None and not (math.isfinite(self.value) and self.value >= 0):
+            raise ValueError(f"an error of {self.value}: expected a finite number of at least 0, or None with a reason")
+        if not self.source:
+            raise ValueError("an error without its source: expected what it follows from, or why it is not estimated")
+
+    def text(self, unit: str) -> str:
+        """Value, unit and source as on the screen."""
+        if self.value is None:
+            return f"{NOT_ESTIMATED}: {self.source}"
+        number = "exact" if self.value == 0 else f"{self.value:.2g} {unit}".rstrip()
+        return f"{number} ({self.source})"
+
+    def as_json(self, unit: str) -> dict[str, Any]:
+        """`value`, `unit` and `from`, or a value of null with `reason`; `remedy` where there is one."""
+        origin = {"reason": self.source} if self.value is None else {"from": self.source}
+        return {"value": self.value, "unit": unit, **origin} | ({"remedy": self.remedy} if self.remedy else {})
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """The errors of a result.
+
+    of: the observable ("frequencies"). unit: of the values; empty for a pure number.
+
+    >>> budget = ErrorBudget(
+    ...     "frequencies", "MHz", ErrorTerm(1e-9, "eigenvalues"), ErrorTerm(4e-7, "J max 15"),
+    ...     ErrorTerm(0.5, "Doppler width not counted"), ErrorTerm(0.02, "constants"), ErrorTerm(0.0, "nothing is sampled"))
+    >>> budget.line()
+    'errors of frequencies: left out about 0.5 MHz (Doppler width not counted), data 0.02 MHz (constants), numerical 4e-07 MHz (J max 15)'
+    >>> budget.numerical
+    4.01e-07
+    """
+
+    of: str
+    unit: str
+    rounding: ErrorTerm
+    truncation: ErrorTerm
+    model: ErrorTerm
+    data: ErrorTerm
+    statistics: ErrorTerm
+
+    @property
+    def terms(self) -> dict[str, ErrorTerm]:
+        """The five terms by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("of", "unit")}
+
+    @property
+    def numerical(self) -> float | None:
+        """Bound of rounding and truncation together; None where one of them is not estimated."""
+        parts = (self.rounding.value, self.truncation.value)
+        return None if None in parts else math.fsum(part for part in parts if part is not None)
+
+    @property
+    def total(self) -> float | None:
+        """Bounds and sizes added to the standard deviations of data and statistics together; None where a term is not estimated."""
+        numerical, model = self.numerical, self.model.value
+        spread = (self.data.value, self.statistics.value)
+        if numerical is None or model is None or spread[0] is None or spread[1] is None:
+            return None
+        return numerical + model + math.hypot(spread[0], spread[1])
+
+    def shown(self) -> Iterator[tuple[str, ErrorTerm]]:
+        """Terms for the screen, largest first, those not estimated last; rounding and truncation as one, terms that are 0 left out."""
+        larger = max((self.truncation, self.rounding), key=lambda term: -1.0 if term.value is None else term.value)
+        missing = next((term for term in (self.truncation, self.rounding) if term.value is None), None)
+        numerical = missing or ErrorTerm(self.numerical, larger.source, larger.remedy)
+        named = [
+            ("numerical", numerical),
+            ("left out", self.model),
+            ("data", self.data),
+            ("statistics", self.statistics),
+        ]
+        known = [(name, term) for name, term in named if term.value]
+        yield from sorted(known, key=lambda pair: -(pair[1].value or 0.0))
+        yield from ((name, term) for name, term in named if term.value is None)
+
+    def line(self) -> str:
+        """One line of a report."""
+        texts = [
+            f"{name} {'about ' if name == 'left out' and term.value else ''}{term.text(self.unit)}"
+            for name, term in self.shown()
+        ]
+        return f"errors of {self.of}: " + (", ".join(texts) or "none beyond the last digit")
+
+    def above(self, accuracy: float) -> dict[str, ErrorTerm]:
+        """The terms that exceed an accuracy (in the unit of the budget), largest first."""
+        return {name: term for name, term in self.shown() if term.value is not None and term.value > accuracy}
+
+    def verdict(self, accuracy: float) -> str:
+        """One line that compares an accuracy that was requested with the whole budget.
+
+        >>> exact = ErrorTerm(0.0, "exact")
+        >>> geometry = ErrorTerm(300.0, "an estimated geometry", "measured constants")
+        >>> ErrorBudget("frequencies", "MHz", exact, ErrorTerm(7e-9, "J max 9"), exact, geometry, exact).verdict(1e-3)
+        'accuracy 0.001 MHz: numerical error 7e-09 MHz; data 3e+02 MHz is larger (an estimated geometry); measured constants would lower it'
+        """
+        numerical = "not estimated" if self.numerical is None else f"{self.numerical:.2g} {self.unit}".rstrip()
+        parts = [f"accuracy {accuracy:g} {self.unit}".rstrip() + f": numerical error {numerical}"]
+        for name, term in self.above(accuracy).items():
+            remedy = f"; {term.remedy} would lower it" if term.remedy else ""
+            parts.append(f"{name} {term.value:.2g} {self.unit}".rstrip() + f" is larger ({term.source}){remedy}")
+        return "; ".join(parts)
+
+    def as_json(self) -> Mapping[str, Any]:
+        """The terms by name, with `of`."""
+        return {"of": self.of, **{name: term.as_json(self.unit) for name, term in self.terms.items()}}
