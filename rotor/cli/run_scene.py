@@ -216,12 +216,15 @@ def _show(result: SceneResult) -> None:
 
 
 def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
-    """The error that was reached, where the scene asks for one."""
-    one = result.reached
-    if one is None:
+    """The accuracy that the scene requests beside the numerical error, and beside the other errors where they are known."""
+    reached = result.reached
+    if reached is None:
         return []
-    unit = f" {one.unit}" if one.unit else ""
-    return [("accuracy", f"{one.error:.2g}{unit} reached, {one.asked:g}{unit} asked for: {one.how}")]
+    unit = f" {reached.unit}" if reached.unit else ""
+    budget = getattr(result.answer, "errors", None)
+    larger = "" if budget is None or budget.unit != reached.unit else budget.shortfall(reached.asked)
+    text = f"{reached.asked:g}{unit}: numerical error at most {reached.error:.2g}{unit} ({reached.how})"
+    return [("accuracy", text + (f"; {larger}" if larger else ""))]
 
 
 def _some_rows(table: Columns) -> Table:

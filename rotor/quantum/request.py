@@ -13,12 +13,14 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.estimates.budgets import levels_budget
 from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.limits import limit_facts
+from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Quantity, Whole
 from rotor.table import Table, TextOf
@@ -137,6 +139,13 @@ class LevelsAnswer(TextOf):
         """The limits of these levels, in sentences."""
         return warnings_of(self.request.top, self.table.levels)
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the energies can be trusted."""
+        request, levels = self.request, self.table.levels
+        limits = every_limit(request.top, max(request.jmax, 1), levels.effects)
+        return levels_budget(request.top, levels, self.table.rows, limits)
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         request = self.request
@@ -153,6 +162,7 @@ class LevelsAnswer(TextOf):
             "hyperfine": hyperfine_facts(request.top, self.table.levels),
             "notes": [*request.top.notes, *self.warnings],
             **limit_facts(request.top, max(request.jmax, 1), self.table.levels.effects),
+            "errors": self.errors.as_json(),
         }
 
 

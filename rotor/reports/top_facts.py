@@ -38,8 +38,36 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
     return {**begin(command, text), **top_facts(top)}
 
 
+MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
+SMALL = 0.1  # of the largest: effects below it are counted together
+
+
+def error_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The line of the error budget, where the content has one."""
+    if "errors" not in content:
+        return []
+    from rotor.requests.budget import ErrorBudget
+
+    name, _, text = ErrorBudget.from_json(content["errors"]).line().partition(": ")
+    return [("errors", f"{name.removeprefix('errors ')}: {text}")]
+
+
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.estimates.limits.limit_facts`."""
+    """Errors, effects of the model and what it leaves out, largest first, from `rotor.quantum.estimates.limits.limit_facts`."""
+    return [*error_facts(content), *_effects_and_limits(content)]
+
+
+def _larger_limits(limits: Sequence[Mapping[str, Any]]) -> tuple[list[Mapping[str, Any]], str]:
+    """The limits to print, and a sentence that counts the others: smaller than a tenth of the largest, or beyond the fourth."""
+    sizes = [limit["size_mhz"] for limit in limits if limit["size_mhz"] is not None]
+    least = SMALL * max(sizes, default=0.0)
+    larger = [limit for limit in limits if limit["size_mhz"] is None or limit["size_mhz"] >= least]
+    shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
+    others = [limit["name"] for limit in limits if limit not in shown]
+    return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
+
+
+def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     from rotor.quantum.estimates.beyond import Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
@@ -49,7 +77,9 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     facts = [("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
-    limits = [with_option(Limit(**one).sentence, content["command"]) for one in content["limits"]]
+    larger, others = _larger_limits(content["limits"])
+    limits = [with_option(Limit(**limit).sentence, content["command"]) for limit in larger]
+    limits += [others] if others else []
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
     )

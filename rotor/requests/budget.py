@@ -12,8 +12,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 NOT_ESTIMATED = "not estimated"
@@ -65,7 +66,7 @@ class ErrorBudget:
     ...     "frequencies", "MHz", ErrorTerm(1e-9, "eigenvalues"), ErrorTerm(4e-7, "J max 15"),
     ...     ErrorTerm(0.5, "Doppler width not counted"), ErrorTerm(0.02, "constants"), ErrorTerm(0.0, "nothing is sampled"))
     >>> budget.line()
-    'errors of frequencies: left out about 0.5 MHz (Doppler width not counted), data 0.02 MHz (constants), numerical 4e-07 MHz (J max 15)'
+    'errors of frequencies: left out about 0.5 MHz (Doppler width not counted), data 0.02 MHz (constants), numerical 4e-07 MHz'
     >>> budget.numerical
     4.01e-07
     """
@@ -114,32 +115,47 @@ class ErrorBudget:
         yield from ((name, term) for name, term in named if term.value is None)
 
     def line(self) -> str:
-        """One line of a report."""
-        texts = [
-            f"{name} {'about ' if name == 'left out' and term.value else ''}{term.text(self.unit)}"
-            for name, term in self.shown()
-        ]
+        """One line of a report: sizes with the first part of their sources; the table has the whole."""
+        texts = []
+        for name, term in self.shown():
+            about = "about " if name == "left out" and term.value else ""
+            source = "" if name == "numerical" and term.value is not None else re.split("[;:]", term.source)[0]
+            texts.append(f"{name} {about}{replace(term, source=source or 'x').text(self.unit)}".removesuffix(" (x)"))
         return f"errors of {self.of}: " + (", ".join(texts) or "none beyond the last digit")
 
     def above(self, accuracy: float) -> dict[str, ErrorTerm]:
         """The terms that exceed an accuracy (in the unit of the budget), largest first."""
         return {name: term for name, term in self.shown() if term.value is not None and term.value > accuracy}
 
-    def verdict(self, accuracy: float) -> str:
-        """One line that compares an accuracy that was requested with the whole budget.
+    def shortfall(self, accuracy: float) -> str:
+        """What exceeds an accuracy, largest first, and what would lower it; empty where nothing does.
 
         >>> exact = ErrorTerm(0.0, "exact")
-        >>> geometry = ErrorTerm(300.0, "an estimated geometry", "measured constants")
-        >>> ErrorBudget("frequencies", "MHz", exact, ErrorTerm(7e-9, "J max 9"), exact, geometry, exact).verdict(1e-3)
-        'accuracy 0.001 MHz: numerical error 7e-09 MHz; data 3e+02 MHz is larger (an estimated geometry); measured constants would lower it'
+        >>> geometry = ErrorTerm(300.0, "error of the geometry", "measured constants")
+        >>> ErrorBudget("frequencies", "MHz", exact, ErrorTerm(7e-9, "J max 9"), geometry, exact, exact).shortfall(1e-3)
+        'left out about 3e+02 MHz is larger (error of the geometry); measured constants would lower it'
         """
-        numerical = "not estimated" if self.numerical is None else f"{self.numerical:.2g} {self.unit}".rstrip()
-        parts = [f"accuracy {accuracy:g} {self.unit}".rstrip() + f": numerical error {numerical}"]
+        parts = []
         for name, term in self.above(accuracy).items():
+            size = f"{'about ' if name == 'left out' else ''}{term.value:.2g} {self.unit}".rstrip()
             remedy = f"; {term.remedy} would lower it" if term.remedy else ""
-            parts.append(f"{name} {term.value:.2g} {self.unit}".rstrip() + f" is larger ({term.source}){remedy}")
+            parts.append(f"{name} {size} is larger ({term.source}){remedy}")
         return "; ".join(parts)
 
-    def as_json(self) -> Mapping[str, Any]:
-        """The terms by name, with `of`."""
-        return {"of": self.of, **{name: term.as_json(self.unit) for name, term in self.terms.items()}}
+    def as_json(self) -> dict[str, Any]:
+        """The terms by name, with `of` and `unit`."""
+        return {
+            "of": self.of,
+            "unit": self.unit,
+            **{name: term.as_json(self.unit) for name, term in self.terms.items()},
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> ErrorBudget:
+        """The budget that `as_json` wrote."""
+        terms = {
+            name: ErrorTerm(term["value"], term.get("from") or term["reason"], term.get("remedy", ""))
+            for name, term in content.items()
+            if name not in ("of", "unit")
+        }
+        return cls(of=content["of"], unit=content["unit"], **terms)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +11,15 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.estimates.budgets import parameter_names
+from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
+from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Quantity, Whole
+from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
@@ -113,6 +118,20 @@ class RamanAnswer(TextOf):
             return "J max leaves none"
         return "the polarizability is isotropic, or the levels that it connects do not exist"
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the shifts can be trusted."""
+        lines = self.lines
+        top, effects = lines.top, lines.levels.effects
+        parameters = parameter_names(top, lines.levels)
+        covariance = known_covariance(top, parameters)
+        errors = None
+        if covariance is not None:
+            errors = line_errors(level_spread(top, lines.levels, covariance), lines.initial, lines.final)
+        limits = every_limit(top, populated_j(top, lines.temperature_k), effects)
+        source = source_of_errors(top, parameters, None)
+        return frequencies_budget(lines.levels, limits, lines.cross_section_cm2_per_sr, errors, source, "shifts")
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
         lines = self.lines
@@ -129,6 +148,7 @@ class RamanAnswer(TextOf):
             "line_count": len(lines),
             "hyperfine": hyperfine_facts(lines.top, lines.levels),
             **limit_facts(lines.top, populated_j(lines.top, lines.temperature_k), lines.levels.effects),
+            "errors": self.errors.as_json(),
         }
 
 

@@ -15,11 +15,13 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.spins.method import hyperfine_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Flag, Quantity, Range, Text, Whole
+from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
@@ -231,6 +233,14 @@ class SpectrumAnswer(TextOf):
             return "without a permanent dipole there is no rotational absorption"
         return "none of the allowed ones is inside the range and above the cut; widen the range or lower the cut"
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the frequencies can be trusted."""
+        lines = self.lines
+        named = lines.levels.of_named_constants
+        limits = every_limit(lines.top, self.typical_j, lines.levels.effects) if named else ()
+        return frequencies_budget(lines.levels, limits, lines.intensity_nm2_mhz, lines.error_mhz, lines.errors_from)
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
         lines, layer = self.lines, self.request.layer
@@ -253,6 +263,7 @@ class SpectrumAnswer(TextOf):
             "hyperfine": hyperfine_facts(lines.top, lines.levels),
             "notes": [*lines.top.notes, *lines.warnings],
             **limit_facts(lines.top, self.typical_j, lines.levels.effects),
+            "errors": self.errors.as_json(),
         }
         if lines.levels.of_named_constants:
             return found

@@ -117,6 +117,7 @@ class Shown:
     """Options of every verb that has a report."""
 
     sources: bool = declared(False, Flag(), "Print the sources of the numbers in full", option="--sources")
+    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
 
 
 def no_notes(answer: Any) -> Iterable[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.cli.shared.command import refuse_overwriting
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
+from rotor.reports.screen import show_facts
 from rotor.requests.fill import Given
 from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
 
@@ -44,7 +45,20 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         if "--save-scene" in files.paths:
             writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
         with naming(verb):
-            deliver(files, writers, lambda: verb.json(answer, report.content), lambda: verb.show(answer, report))
+            deliver(
+                files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
+            )
+
+
+def show_answer(verb: Verb, answer: Any, report: Report) -> None:
+    """The report of a verb, with the table of errors where it is requested."""
+    verb.show(answer, report)
+    if getattr(report.shown, "errors", False) and "errors" in report.content:
+        from rotor.reports.error_table import error_rows
+
+        print()
+        print(f"errors of {report.content['errors']['of']}")
+        show_facts(error_rows(report.content["errors"]))
 
 
 def answer_of(verb: Verb, request: Any, work: Work) -> Any:

@@ -1,0 +1,93 @@
+"""Error budgets of levels and of what follows from them (`rotor.requests.budget`).
+
+Rounding: eigenvalues of a symmetric matrix are those of a matrix within a few units in the last place of its norm (LAPACK Users' Guide,
+section 4.7), so that no energy is off by more than `ROUNDING` times the largest one. Truncation: every J of a free top is a complete block;
+spins by an approximate method have that method's bound. Model: the sum of the sizes of the effects that are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
+from rotor.quantum.spins.method import used_method
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+
+if TYPE_CHECKING:
+    from rotor.arrays import Floats, Ints
+    from rotor.quantum.levels import Levels
+    from rotor.tops.top import Top
+
+ROUNDING = 8 * float(np.finfo(np.float64).eps)
+GEOMETRY = ("error of the geometry", "vibration-rotation difference")
+NO_SAMPLES = ErrorTerm(0.0, "nothing is sampled")
+NO_UNCERTAINTIES = "no uncertainties of the constants are known"
+
+
+def rounding_term(energies_mhz: Floats) -> ErrorTerm:
+    """Rounding of energies by the largest of them."""
+    return ErrorTerm(ROUNDING * float(np.abs(energies_mhz).max(initial=0.0)), "eigenvalues in double precision")
+
+
+def truncation_term(levels: Levels) -> ErrorTerm:
+    """What the basis of levels leaves out: nothing but what an approximate method of spins neglects."""
+    used = used_method(levels)
+    if used is None or not used.estimate_mhz:
+        return ErrorTerm(0.0, "every J is a complete block")
+    return ErrorTerm(used.estimate_mhz, f"spins by the method {used.method}", "the exact method of spins")
+
+
+def model_term(limits: Sequence[Limit]) -> ErrorTerm:
+    """The sum of the effects that are left out, named after the largest; those without a size are named.
+
+    >>> model_term([Limit("centrifugal distortion", 2.0, ""), Limit("electron spin", None, "")]).text("MHz")
+    '2 MHz (centrifugal distortion; electron spin not estimated)'
+    """
+    sizes = [(limit.size_mhz, limit.name) for limit in limits if limit.size_mhz is not None]
+    unknown = ", ".join(limit.name for limit in limits if limit.size_mhz is None)
+    if not sizes:
+        return ErrorTerm(None, unknown or "no effect that is left out has a known size")
+    largest = max(sizes)[1]
+    source = largest + (f" and {len(sizes) - 1} more" if len(sizes) > 1 else "")
+    remedy = "measured constants" if largest in GEOMETRY else f"{largest} in the calculation"
+    return ErrorTerm(
+        float(sum(size for size, _ in sizes)), source + (f"; {unknown} not estimated" if unknown else ""), remedy
+    )
+
+
+def data_term(errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
+    """The largest standard deviation that uncertain constants give.
+
+    errors_mhz: of the energies or lines; None where they are not known. source: where they come from, or why there are none.
+    """
+    if errors_mhz is None or not len(errors_mhz):
+        return ErrorTerm(None, (source or NO_UNCERTAINTIES).removeprefix("none: "))
+    return ErrorTerm(float(errors_mhz.max()), f"constants: {source}", "more precise constants")
+
+
+def parameter_names(top: Top, levels: Levels) -> tuple[str, ...]:
+    """The constants that levels depend on, each once."""
+    return tuple(dict.fromkeys(name for effect in levels.effects for name in effect.parameters(top)))
+
+
+def levels_budget(top: Top, levels: Levels, rows: Ints, limits: Sequence[Limit]) -> ErrorBudget:
+    """The errors of the energies of some rows of levels.
+
+    limits: what the calculation leaves out, at the highest J.
+    """
+    parameters = parameter_names(top, levels)
+    covariance = known_covariance(top, parameters)
+    errors = None if covariance is None else level_errors(top, levels, covariance)[rows]
+    return ErrorBudget(
+        of="energies",
+        unit="MHz",
+        rounding=rounding_term(levels.energy_mhz),
+        truncation=truncation_term(levels),
+        model=model_term(limits),
+        data=data_term(errors, source_of_errors(top, parameters, None)),
+        statistics=NO_SAMPLES,
+    )
