@@ -24,6 +24,7 @@ from rotor.quantum.request import LevelsRequest, answer_levels
 
 KEYS = {
     "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "hyperfine", "levels", "files",
+    "errors",
 }  # fmt: skip
 
 
