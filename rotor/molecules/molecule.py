@@ -34,6 +34,7 @@ class Molecule:
     positions_angstrom : (n, 3) array, Å
     mass_numbers : n mass numbers; left out, they are those of `symbols` or of the most abundant isotopes
     charge : in elementary charges
+    multiplicity : 2S + 1 of the electrons. None: not known
     electronic : "even" where half turns leave the electronic state alike, as in every closed shell; "odd" where those that
         change places of like nuclei turn its sign, as in the Σg- of O2. Nuclear-spin weights need it
     dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; that of an ion
@@ -64,6 +65,7 @@ class Molecule:
     positions_angstrom: Floats
     mass_numbers: tuple[int, ...] = ()
     charge: int = 0
+    multiplicity: int | None = None
     electronic: str = "even"
     dipole_debye: Floats | None = None
     dipole_source: str = ""
@@ -91,6 +93,7 @@ class Molecule:
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
 
+        _refuse_multiplicity(self.multiplicity, sum(one.element_number for one in nuclei) - int(charge))
         if self.electronic not in ELECTRONIC:
             raise ValueError(f"electronic {self.electronic!r}: expected 'even' (a closed shell) or 'odd' (such as Σg-)")
 
@@ -277,6 +280,19 @@ def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int
         elif atom not in found and old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
             found[atom] = chi * (new.quadrupole_barn / old.quadrupole_barn)
     return found
+
+
+def _refuse_multiplicity(multiplicity: int | None, electrons: int) -> None:
+    """ValueError for a multiplicity 2S + 1 that so many electrons cannot have."""
+    if multiplicity is None:
+        return
+    if isinstance(multiplicity, bool) or multiplicity != int(multiplicity) or multiplicity < 1:
+        raise ValueError(f"multiplicity {multiplicity!r}: expected 2S + 1 of the electrons, a whole number from 1 on")
+    if multiplicity % 2 == electrons % 2:
+        kind = "odd" if electrons % 2 else "even"
+        raise ValueError(
+            f"multiplicity {multiplicity}: with an {kind} number of electrons ({electrons}) it is {'even' if electrons % 2 else 'odd'}"
+        )
 
 
 def _refuse_lopsided(tensor: Floats | None) -> None:

@@ -11,8 +11,9 @@ The ideal gas has translation too (O. Sackur and H. Tetrode 1911-12; Mayer and M
 
     S_tr = R ln[(2πmkT/h²)^(3/2) kT/p] + 5R/2,    H - H(0) = U_rot + U_vib + 5RT/2,    C_p = C_rot + C_vib + 5R/2,
 
-and leaves R ln of the number of nuclear-spin functions out of S and of -(G - H(0))/T, as published tables do. Neglected:
-that rotational constants differ between vibrational states, electronic states, and forces between molecules.
+and leaves R ln of the number of nuclear-spin functions out of S and of -(G - H(0))/T, as published tables do. Electronic states, the
+functions of the spin of a radical among them, count in the gas (`rotor.thermodynamics.electronic`). Neglected: that rotational
+constants differ between vibrational and electronic states, and forces between molecules.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermodynamics.classical_limit import classical_limit
+from rotor.thermodynamics.electronic import ElectronicStates, electronic_states_of
 from rotor.thermodynamics.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermodynamics.species import implied_symmetry_number, spin_species
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
@@ -48,7 +50,7 @@ class IdealGas:
     """What translation and vibration make of the rotational functions, at one pressure.
 
     cp_j_per_mol_k, entropy_j_per_mol_k, enthalpy_j_per_mol (H - H(0)), gibbs_j_per_mol_k (-(G - H(0))/T): (n,); nuclear
-    spin is left out of the last and of the entropy.
+    spin is left out of the last and of the entropy. electronic: the electronic states that count.
     """
 
     pressure_bar: float
@@ -57,6 +59,7 @@ class IdealGas:
     entropy_j_per_mol_k: Floats
     enthalpy_j_per_mol: Floats
     gibbs_j_per_mol_k: Floats
+    electronic: ElectronicStates
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +114,7 @@ class ThermoFunctions(Table):
                 "spin_factor": self.spin_factor,
                 "vibrations": self.vibrations.text if self.vibrations is not None else None,
                 "pressure_bar": self.gas.pressure_bar if self.gas is not None else None,
+                "electronic": self.gas.electronic.text if self.gas is not None else None,
                 "mass_u": self.gas.mass_u if self.gas is not None else None,
                 "jmax": int(self.jmax.max()),
                 "relative_error": float(self.relative_error.max()),
@@ -153,6 +157,7 @@ def thermodynamic_functions(
     species: str = "equilibrium",
     vibrations: VibrationalStates | None = None,
     pressure_bar: float | None = None,
+    electronic: ElectronicStates | None = None,
     relative_error: float = 1e-6,
     progress: Progress | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
@@ -167,6 +172,8 @@ def thermodynamic_functions(
         "ortho", or a class of the spin weights such as "E"; see `species_names`.
     vibrations : vibrational states; none: vibration is left out.
     pressure_bar : of an ideal gas, whose functions are then given too; the top must have a mass.
+    electronic : electronic states of the ideal gas; by default the spin functions of the molecule (`electronic_states_of`), or none
+        where the effects have the spin of electrons, whose functions Q counts then.
     relative_error : of Q, U and C_v, asked; larger, up to 10 %, where levels count that the distortion constants do not
         serve: `ThermoFunctions.relative_error` says what was reached.
     progress : called as `progress(j, last)` as a long sum goes on.
@@ -196,7 +203,11 @@ def thermodynamic_functions(
     else:
         sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress, effects=effects)
         rotation = _rotation(top, species, parts, fractions, sums, effects)
-    return _with_gas(_with_vibration(rotation, vibrations), pressure_bar)
+    if pressure_bar is None:
+        return _with_vibration(rotation, vibrations)
+    if electronic is None:
+        electronic = ElectronicStates() if _has_electrons(top, effects) else electronic_states_of(top.molecule)
+    return _with_gas(_with_vibration(rotation, vibrations), pressure_bar, electronic)
 
 
 def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, float]]:
@@ -224,6 +235,18 @@ def refuse_species_of_totals(top: Top, species: str, effects: Sequence[QuantumEf
     if species != "equilibrium" and any(spin.total for effect in effects for spin in effect.spins(top)):
         raise ValueError(
             f"species: {species!r}: with nuclei that are coupled to a total spin species are not separated; expected equilibrium"
+        )
+
+
+def _has_electrons(top: Top, effects: Sequence[QuantumEffect]) -> bool:
+    return any(spin.electron for effect in effects for spin in effect.spins(top))
+
+
+def refuse_electrons_twice(top: Top, effects: Sequence[QuantumEffect], electronic: ElectronicStates | None) -> None:
+    """ValueError for electronic states beside effects that have the spin of electrons, whose functions Q counts."""
+    if electronic is not None and _has_electrons(top, effects):
+        raise ValueError(
+            "electronic: the constants of the electron spin make Q count its functions already; leave one of the two out"
         )
 
 
@@ -316,10 +339,8 @@ def _with_vibration(rotation: ThermoFunctions, vibrations: VibrationalStates | N
     return replace(rotation, vibrations=vibrations, q_vib=np.exp(ln_q), cv_vib_over_r=cv)
 
 
-def _with_gas(found: ThermoFunctions, pressure_bar: float | None) -> ThermoFunctions:
-    """The same with the functions of the ideal gas at a pressure, if one is given."""
-    if pressure_bar is None:
-        return found
+def _with_gas(found: ThermoFunctions, pressure_bar: float, electronic: ElectronicStates) -> ThermoFunctions:
+    """The same with the functions of the ideal gas at a pressure."""
     if not (math.isfinite(pressure_bar) and pressure_bar > 0):
         raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
     if found.top.mass_u is None:
@@ -328,16 +349,19 @@ def _with_gas(found: ThermoFunctions, pressure_bar: float | None) -> ThermoFunct
     ln_q_vib, mean_vib, cv_vib = np.zeros((3, len(t)))
     if found.vibrations is not None:
         ln_q_vib, mean_vib, cv_vib = vibrational_functions(found.vibrations, t)
-    enthalpy = found.energy_j_per_mol + rt * (mean_vib + 2.5)
+    ln_q_el, mean_el, cv_el = electronic.functions(t)
+    enthalpy = found.energy_j_per_mol + rt * (mean_vib + mean_el + 2.5)
     entropy = found.entropy_j_per_mol_k - GAS_CONSTANT * math.log(found.spin_factor)
-    entropy = entropy + GAS_CONSTANT * (ln_q_vib + mean_vib) + translational_entropy(t, found.top.mass_u, pressure_bar)
+    entropy = entropy + GAS_CONSTANT * (ln_q_vib + mean_vib + ln_q_el + mean_el)
+    entropy = entropy + translational_entropy(t, found.top.mass_u, pressure_bar)
     gas = IdealGas(
         pressure_bar=pressure_bar,
         mass_u=found.top.mass_u,
-        cp_j_per_mol_k=GAS_CONSTANT * (found.cv_over_r + cv_vib + 2.5),
+        cp_j_per_mol_k=GAS_CONSTANT * (found.cv_over_r + cv_vib + cv_el + 2.5),
         entropy_j_per_mol_k=entropy,
         enthalpy_j_per_mol=enthalpy,
         gibbs_j_per_mol_k=entropy - enthalpy / t,
+        electronic=electronic,
     )
     return replace(found, gas=gas)
 

@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_positive, require_top
+from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.requests.field import check_fields, declared
-from rotor.requests.readers import Grid, Quantity, Text
+from rotor.requests.readers import Custom, Grid, Quantity, Text
 from rotor.table import TextOf
 from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermodynamics.classical_onset import classical_above_if_known
+from rotor.thermodynamics.electronic import ElectronicStates
 from rotor.thermodynamics.functions import (
     ThermoFunctions,
+    refuse_electrons_twice,
     refuse_species_of_totals,
     species_names,
     thermodynamic_functions,
@@ -39,13 +41,18 @@ MOST_TEMPERATURES = 100_000
 CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
 
 
+def _electronic(given: ElectronicStates | str) -> ElectronicStates:
+    return ElectronicStates.parse(given) if isinstance(given, str) else given
+
+
 @dataclass(frozen=True)
 class ThermoRequest:
     """Thermodynamic functions to compute; every field is checked when the request is made.
 
     temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None leaves
-    vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass.
-    relative_error: of Q, U and C_v. effects: what the Hamiltonian consists of, spins among it where Q is to count them.
+    vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass. electronic:
+    degeneracies of electronic states of the ideal gas; None: those of the molecule. relative_error: of Q, U and C_v. effects: what
+    the Hamiltonian consists of, spins among it where Q is to count them.
     """
 
     top: Top
@@ -61,6 +68,11 @@ class ThermoRequest:
     pressure_bar: float | None = declared(
         None, Quantity("bar", above=0, metavar="P"), "Pressure of the ideal gas, whose functions are then given too (bar)",
         "conditions.pressure", common=True, example="1 bar",
+    )  # fmt: skip
+    electronic: ElectronicStates | None = declared(
+        None, Custom(_electronic, lambda states: states.listed, "LIST", str),
+        "Degeneracies of electronic states of the ideal gas, with energies (cm⁻¹); by default those of the molecule",
+        "observables.electronic", example="2,2@121.1",
     )  # fmt: skip
     relative_error: float = declared(
         1e-6, Quantity(above=0), "Of Q, U and C_v: the levels left out of the sums", "numerics.relative_error"
@@ -79,8 +91,12 @@ class ThermoRequest:
             only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
             raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
         refuse_species_of_totals(self.top, self.species, self.effects)
-        if self.pressure_bar is not None and self.top.mass_u is None:
-            raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
+        if self.electronic is not None and self.pressure_bar is None:
+            raise ValueError("electronic: counts in the ideal gas; give --gas, or its pressure")
+        if self.pressure_bar is not None:
+            refuse_electrons_twice(self.top, self.effects, self.electronic)
+            if self.top.mass_u is None:
+                raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,6 +139,7 @@ class ThermoAnswer(TextOf):
             "relative_error": float(functions.relative_error.max()),
             "vibrations": vibrations.text if vibrations is not None else None,
             "pressure_bar": gas.pressure_bar if gas is not None else None,
+            "electronic": gas.electronic.text if gas is not None else None,
             "hyperfine": functions.hyperfine,
             **limit_facts(top, populated_j(top, float(functions.temperature_k.max())), self.effects),
         }
@@ -142,6 +159,7 @@ def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> T
         species=request.species,
         vibrations=request.vibrations,
         pressure_bar=request.pressure_bar,
+        electronic=request.electronic,
         relative_error=request.relative_error,
         progress=progress,
         effects=request.effects,

@@ -141,7 +141,8 @@ def _gas_table(functions: ThermoFunctions) -> Table:
     data = (gas.cp_j_per_mol_k, gas.entropy_j_per_mol_k, gas.enthalpy_j_per_mol, gas.gibbs_j_per_mol_k)
     columns = ("T (K)", "Cp (J/mol K)", "S (J/mol K)", "H-H(0) (J/mol)", "-(G-H(0))/T (J/mol K)")
     cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in _rows(functions)]
-    spin = f"R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
+    states = "" if gas.electronic.degeneracies == (1,) else f"{gas.electronic.text}; "
+    spin = f"{states}R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
     return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
 
 

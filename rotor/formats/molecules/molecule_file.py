@@ -10,6 +10,7 @@
     atoms = [["O", 0.0, 0.0, 0.1], ...]
 
     charge = 0                          # may be left out, as may the next
+    multiplicity = 1                    # 2S + 1 of the electrons; thermodynamic functions of the gas count it
     electronic = "even"                 # or "odd": half turns that change places of like nuclei turn the sign of the
                                         # electronic state, as in the 3Σg- of O2 (spin weights of isotopologues need it)
 

@@ -184,7 +184,9 @@ def geometry(
     """
     if table is None:
         return None
-    table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge", "electronic", "unverified"))
+    table.refuse_unknown(
+        ("kind", "source", "vibrational_difference", "atoms", "charge", "multiplicity", "electronic", "unverified")
+    )
     symbols, positions = _atoms(table)
     try:
         molecule = Molecule(
@@ -194,6 +196,7 @@ def geometry(
             source=table.text("source"),
             uncertainty=table.number("vibrational_difference", 0.0),
             charge=table.content.get("charge", 0),
+            multiplicity=table.content.get("multiplicity"),
             electronic=table.choice("electronic", ELECTRONIC) or "even",
         )
     except ValueError as reason:

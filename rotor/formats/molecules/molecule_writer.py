@@ -93,6 +93,7 @@ def _geometry(molecule: MoleculeFile) -> dict[str, Any]:
         "kind": molecule.geometry_kind,
         "vibrational_difference": molecule.vibrational_difference,
         "charge": body.charge or None,
+        "multiplicity": body.multiplicity,
         "electronic": None if body.electronic == "even" else body.electronic,
         "atoms": [[label, *position] for label, position in zip(labels, body.positions_angstrom.tolist(), strict=True)],
     }

@@ -216,5 +216,13 @@ def g2_molecule(name: str) -> Molecule:
         raise ValueError(
             f"{name!r} is no file and no molecule of ASE's g2{hint}; give a path, or 'SMILES:...' for a SMILES"
         )
-    molecule = from_ase(g2[name])
-    return replace(molecule, name=name, source="ASE g2: MP2(full)/6-31G*, Curtiss et al. 1997", uncertainty=0.02)
+    atoms = g2[name]
+    unpaired = round(float(sum(atoms.get_initial_magnetic_moments())))  # the collection gives those of the ground state
+    molecule = from_ase(atoms)
+    return replace(
+        molecule,
+        name=name,
+        multiplicity=unpaired + 1,
+        source="ASE g2: MP2(full)/6-31G*, Curtiss et al. 1997",
+        uncertainty=0.02,
+    )
