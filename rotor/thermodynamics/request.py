@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_top
+from rotor.checks import require_positive, require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
