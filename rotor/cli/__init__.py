@@ -41,6 +41,8 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "fit": "Constants from measured lines, with their errors.",
     "structure": "Structures from the constants of isotopologues.",
     "convert": "Constants from one file format into another.",
+    "identify": "Which species an observed spectrum needs.",
+    "catalogue": "A local catalogue of lines: add, list, show.",
     "cat": "A catalogue as a table, filtered or compared.",
     "new": "A commented scene file to begin with.",
     "plan": "What a scene will do, its cost, what it omits.",

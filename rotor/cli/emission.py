@@ -12,6 +12,8 @@ from rotor.checks import require_whole
 from rotor.cli.shared import inputs, plot_options
 from rotor.cli.shared.hyperfine import HyperfineOptions, effects_of_each, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.observed_emission import ObservedOptions, Wanted, run_observed
+from rotor.cli.shared.observed_options import SpectrumOptions
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     Files,
@@ -44,7 +46,9 @@ Examples:
   rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10
   rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv
   rotor emission CO HCN --band ALMA3 --column 1e18,1e15 --excitation 40,10 --width 300 --redshift 2.3
-  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16"""
+  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16
+  rotor emission CH3OH HCN --over spectrum.fits --column 1e16,1e14 --velocity 4 --plot pages.pdf
+  rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width"""
 
 NAMES = {
     "columns_per_cm2": "--column", "column_per_cm2": "--column", "excitation_k": "--excitation", "background_k": "--background",
@@ -121,14 +125,28 @@ class Outputs:
 
 @grouped()
 def command(
-    context: typer.Context, options: Options, spins: HyperfineOptions, outputs: Outputs, picture: PlotOptions
+    context: typer.Context,
+    options: Options,
+    observed: ObservedOptions,
+    spectrum: SpectrumOptions,
+    spins: HyperfineOptions,
+    outputs: Outputs,
+    picture: PlotOptions,
 ) -> None:
-    """Brightness temperature of a source in local thermodynamic equilibrium."""
+    """Brightness temperature of a source in local thermodynamic equilibrium; over, or fitted to, an observed spectrum."""
     one_thread_of_blas()
     require_whole("--top", options.top_lines, 0)
     if not options.sources:
         raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
     files = Files.of(outputs)
+    if observed.file is not None:
+        if outputs.save_scene:
+            raise ValueError(
+                "--save-scene: an observed spectrum is no part of a scene; expected without --over and --fit"
+            )
+        with inputs.fields_as_options(**NAMES):
+            run_observed(context, _wanted(context, options), observed, spectrum, files)
+        return
     drawn = plot_options.settings_of(picture, files)
     with inputs.fields_as_options(**NAMES):
         request = _request(options, spins)
@@ -143,6 +161,23 @@ def command(
     show = lambda: _show(answer, options.top_lines)  # noqa: E731
     writers = _writers(answer, content, drawn) | save_made(lambda folder: _scene(request, options, folder), outputs)
     deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), show)
+
+
+def _wanted(context: typer.Context, options: Options) -> Wanted:
+    """What was typed of the source; a fit estimates the rest."""
+    typed = {
+        name: getattr(options, name) if "DEFAULT" not in str(context.get_parameter_source(name)) else None
+        for name in ("column", "excitation", "velocity", "width")
+    }
+    range_mhz = None if options.band is None and options.range_ is None else _range(options)
+    return Wanted(
+        sources=_sources(options),
+        background=options.background,
+        redshift=options.redshift,
+        range_mhz=range_mhz,
+        partition=options.partition,
+        **typed,
+    )
 
 
 def _request(options: Options, spins: HyperfineOptions) -> EmissionRequest:

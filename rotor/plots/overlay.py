@@ -1,0 +1,168 @@
+"""Pages of panels: an observed spectrum with a model over it, modelled lines named, blends marked, unidentified lines shown."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.observed.model import Component, Sight, model
+from rotor.observed.overlay_table import line_table
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.plots.names import SPACE, Peak, name_peaks
+from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new_figure, save, styled
+
+PANELS = 6  # on a page
+CHANNELS = 1500  # in a panel, where their number is not given
+_MOST_NAMES = 14
+_GAP = 20.0  # channels
+PAGE_INCHES = (8.3, 11.7)
+
+
+def plot_overlay(
+    spectrum: ObservedSpectrum,
+    components: Sequence[Component],
+    path: str | os.PathLike[str],
+    *,
+    sight: Sight | None = None,
+    unidentified_mhz: Sequence[float] = (),
+    panels: int | None = None,
+    title: str = "",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw an observed spectrum with a model over it; a .pdf has as many pages as it needs, .png and .svg have one long page.
+
+    Parameters
+    ----------
+    spectrum : ObservedSpectrum
+    components : sequence of Component
+        The model; none draws the spectrum alone.
+    path : path
+    sight : Sight, optional
+    unidentified_mhz : sequence of float, optional
+        Marked by triangles.
+    panels : int, optional
+        Into how many the range is cut; by default one for every 1500 channels.
+    title : str, optional
+    provenance : mapping, optional
+        Written into the metadata of the file.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is no picture.
+    """
+    suffix = checked_suffix(path)
+    wanted = panels or max(1, round(len(spectrum) / CHANNELS))
+    count = len(panel_ranges(spectrum, wanted))
+    pages = (
+        [list(range(count))]
+        if suffix != ".pdf"
+        else [list(range(i, min(i + PANELS, count))) for i in range(0, count, PANELS)]
+    )
+    arguments = (spectrum, components, sight or Sight(), tuple(unidentified_mhz), wanted)
+    text = title or os.path.basename(spectrum.source) or "spectrum"
+    if len(pages) == 1:
+        save(overlay_figure(*arguments, pages[0], title=text), path, text, provenance or {})
+        return
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    from rotor.formats.atomic_write import atomic_path
+
+    with atomic_path(path) as unfinished, PdfPages(unfinished, metadata={"Title": text, "CreationDate": None}) as book:
+        for number, page in enumerate(pages, start=1):
+            book.savefig(overlay_figure(*arguments, page, title=f"{text}, page {number} of {len(pages)}"))
+
+
+def overlay_figure(
+    spectrum: ObservedSpectrum,
+    components: Sequence[Component],
+    sight: Sight,
+    unidentified_mhz: Sequence[float],
+    count: int,
+    page: Sequence[int],
+    *,
+    title: str = "",
+) -> Any:
+    """A matplotlib figure of some of the `count` panels of a spectrum."""
+    edges = panel_ranges(spectrum, count)
+    brightness = (
+        model(components, spectrum.frequency_mhz, sight).brightness_k if components else np.zeros(len(spectrum))
+    )
+    lines = line_table(spectrum, components, sight).columns
+    names = list(dict.fromkeys(one.species.name for one in components))
+    with styled():
+        size = (
+            PAGE_INCHES[0],
+            min(PAGE_INCHES[1], 1.2 + 2.6 * len(page)) if len(page) <= PANELS else 1.2 + 1.9 * len(page),
+        )
+        figure = new_figure(size)
+        for place, number in enumerate(page, start=1):
+            axes = figure.add_subplot(len(page), 1, place)
+            _panel(axes, spectrum, brightness, edges[number], unidentified_mhz)
+            figure.canvas.draw()
+            _name(axes, lines, names, spectrum, brightness)
+        axes.set_xlabel("Frequency (GHz)")
+        figure.supylabel(
+            "Brightness temperature (K)" if spectrum.unit == "K" else f"Intensity ({spectrum.unit})", fontsize=9
+        )
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
+    return figure
+
+
+def panel_ranges(spectrum: ObservedSpectrum, count: int) -> list[tuple[float, float]]:
+    """First and last frequency of some `count` panels: at least one for each stretch without a gap."""
+    gaps = np.flatnonzero(np.diff(spectrum.frequency_mhz) > _GAP * spectrum.channel_mhz) + 1
+    share = len(spectrum) / count
+    out = []
+    for stretch in np.split(spectrum.frequency_mhz, gaps):
+        pieces = np.array_split(stretch, max(1, round(len(stretch) / share)))
+        out += [(float(piece[0]), float(piece[-1])) for piece in pieces if len(piece) > 1]
+    return out
+
+
+def _panel(
+    axes: Any, spectrum: ObservedSpectrum, brightness: Floats, edges: tuple[float, float], unidentified: Sequence[float]
+) -> None:
+    inside = (spectrum.frequency_mhz >= edges[0]) & (spectrum.frequency_mhz <= edges[1])
+    x, y, m = spectrum.frequency_mhz[inside] / 1e3, spectrum.intensity[inside], brightness[inside]
+    axes.step(x, y, where="mid", color=GREY, linewidth=0.5, label="observed")
+    axes.plot(x, m, color=ORANGE, linewidth=0.7, label="model")
+    top = float(max(y.max(initial=0.0), m.max(initial=0.0), 5 * np.median(spectrum.noise)))
+    bottom = float(min(y.min(initial=0.0), m.min(initial=0.0)))
+    axes.set_xlim(edges[0] / 1e3, edges[1] / 1e3)
+    axes.set_ylim(1.05 * bottom, SPACE * top + 0.15 * top)
+    marked = [at / 1e3 for at in unidentified if edges[0] <= at <= edges[1]]
+    if marked:
+        axes.plot(
+            marked,
+            np.interp(marked, x, y) + 0.04 * top,
+            linestyle="",
+            marker="v",
+            markersize=3,
+            color=BLUE,
+            label="unidentified",
+        )
+
+
+def _name(
+    axes: Any, lines: Mapping[str, Any], names: Sequence[str], spectrum: ObservedSpectrum, brightness: Floats
+) -> None:
+    """Names above modelled lines in the colour of their species; a star marks a blend."""
+    first, last = (1e3 * one for one in axes.get_xlim())
+    rows = np.flatnonzero([first <= at <= last for at in lines["observed_mhz"].tolist()])
+    peaks = [
+        Peak(
+            float(lines["observed_mhz"][i]) / 1e3,
+            max(float(lines["total_k"][i]), float(lines["observed_k"][i])),
+            str(lines["species"][i]) + (" *" if lines["blend"][i] else ""),
+            PALETTE[names.index(str(lines["species"][i])) % len(PALETTE)],
+        )
+        for i in rows
+    ]
+    inside = (spectrum.frequency_mhz >= first) & (spectrum.frequency_mhz <= last)
+    drawn = np.stack([spectrum.frequency_mhz[inside] / 1e3, np.maximum(spectrum.intensity, brightness)[inside]], axis=1)
+    name_peaks(axes, peaks, drawn, _MOST_NAMES)
