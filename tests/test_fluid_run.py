@@ -229,6 +229,24 @@ def test_a_box_wrapped_into_its_cell_runs_as_the_whole_one(folder):
     assert abs(one.total_ev - other.total_ev).max() < 1e-9  # eV: round-off of other places of the same molecules
 
 
+@pytest.mark.parametrize("ensemble", ["nve", "langevin", "nose-hoover"])
+def test_a_run_that_ended_between_checkpoints_continues_bit_for_bit(folder, ensemble):
+    """25 steps, then 61, of an interval of 14: one run of 61 steps. A checkpoint at step 25 made them differ by 1e-14."""
+    settings = replace(SETTINGS, steps=61, every=1, ensemble=ensemble)
+    whole, parts = box(), box()
+    record = run_fluid(whole, settings, Outputs(checkpoint="whole.npz", checkpoint_every=14))
+    files = Outputs(csv="run.csv", trajectories=("run.xyz",), checkpoint="run.npz", checkpoint_every=14)
+    run_fluid(box(), replace(settings, steps=25), files)
+    again = run_fluid(parts, settings, files, resume=True)
+    for name, column in record.columns.items():
+        assert np.array_equal(column, again.columns[name]), name
+    assert np.array_equal(whole.positions, parts.positions)
+    assert np.array_equal(whole.get_momenta(), parts.get_momenta())
+    rows = Path("run.csv").read_text().splitlines()
+    assert len(rows) == 63
+    assert len(set(rows)) == 63
+
+
 def test_what_cannot_be_resumed_is_refused(folder):
     settings = replace(SETTINGS, steps=14)
     run_fluid(box(), settings, FILES)

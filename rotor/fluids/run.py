@@ -2,7 +2,9 @@
 
 After each checkpoint the calculator discards its state (lists of neighbours, the last result), as after a
 restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
-uninterrupted one does, on one machine with the same settings and the same interval of checkpoints.
+uninterrupted one does, on one machine with the same settings and the same interval of checkpoints. A run that ends between two
+checkpoints writes none there, which would discard the calculator's state where a longer run does not: when it is continued, the
+steps since the last checkpoint are computed again.
 """
 
 from __future__ import annotations
@@ -253,7 +255,7 @@ class _Run:
                 dynamics.step()
                 dynamics.nsteps += 1
                 self._write()
-                if dynamics.nsteps % self.outputs.checkpoint_every == 0 or dynamics.nsteps == steps:
+                if dynamics.nsteps % self.outputs.checkpoint_every == 0:
                     self._save()
                 now = time.perf_counter() - started
                 if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
