@@ -71,7 +71,7 @@ _KINDS: dict[str, dict[str, float]] = {
     "fluence": {"J/cm2": 1.0, "mJ/cm2": 1e-3, "J/m2": 1e-4},
     "magnetic field": {"T": 1.0, "mT": 1e-3, "G": 1e-4, "gauss": 1e-4},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
-    "moment of inertia": {"kg*m2": 1.0, "g*cm2": 1e-7},
+    "moment of inertia": {"kg*m2": 1.0, "g*cm2": 1e-7, "u*Å2": ATOMIC_MASS_KG * 1e-20},
     "angular velocity": {
         "rad/s": 1.0,
         "deg/s": math.pi / 180,
@@ -90,6 +90,8 @@ _KINDS: dict[str, dict[str, float]] = {
 _ALIASES = {
     "cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "μm": "um", "Debye": "debye", "Angstrom": "angstrom",
     "Å^3": "Å3", "Å³": "Å3", "angstrom^3": "angstrom3",
+    "u A^2": "u*Å2", "u A2": "u*Å2", "u A²": "u*Å2", "u*A2": "u*Å2", "u*A^2": "u*Å2", "u Å2": "u*Å2", "u Å^2": "u*Å2", "u Å²": "u*Å2",
+    "u*Å²": "u*Å2", "u angstrom2": "u*Å2", "u*angstrom2": "u*Å2", "u angstrom^2": "u*Å2", "u*angstrom^2": "u*Å2", "u*Å^2": "u*Å2",
     "kg m2": "kg*m2", "kg m^2": "kg*m2", "kg m²": "kg*m2", "g cm2": "g*cm2", "g cm^2": "g*cm2", "g cm²": "g*cm2",
     "g/cm^3": "g/cm3", "g/cm³": "g/cm3", "kg/m^3": "kg/m3", "kg/m³": "kg/m3",
     "cm-2": "1/cm2", "cm^-2": "1/cm2", "cm⁻²": "1/cm2", "/cm2": "1/cm2", "/cm^2": "1/cm2", "/cm²": "1/cm2", "1/cm²": "1/cm2",

@@ -203,6 +203,18 @@ def test_fitted_constants_of_the_library_are_pointed_out(source, changes, entry)
     assert not [note for note in rotor.read(entry).notes if "the library has" in note]
 
 
+def test_a_symmetric_isotopologue_has_no_tensor_elements_of_rounding_size(call):
+    """ND3 from NH3 had C_ac = 1e-10 MHz, which mixes K and -K: levels were pairs with Ka and Kc."""
+    top = rotor.read("NH3", isotopes="H=2H")
+    names = {name.partition("(")[0] for name in top.spin_constants.values}
+    assert names == {"chi_cc", "C_aa", "C_bb", "C_cc"}
+    code, out, err = call("levels", "NH3", "--isotope", "H=2H", "--hyperfine", "--jmax", "2")
+    assert code == 0, err
+    assert "Ka" not in out
+    turned = rotor.read("NH3", isotopes="2=2H").spin_constants.values
+    assert any(name.startswith("C_ac") for name in turned)  # the axes of NH2D are turned by 9 degrees
+
+
 def test_other_molecules_are_not_pointed_out(call):
     """Neither an isotopologue that the library lacks, nor the parent, nor another placement of the same isotopes."""
     for changes in ("O=18O", "2=3H"):

@@ -348,3 +348,14 @@ def test_a_named_body_turns_over_by_itself(call, tmp_path):
     assert "one turn a second, 0.5 degrees off the intermediate axis, across" in " ".join(out.split())
     assert (tmp_path / "r.png").exists()
     assert call("tumble", "--body", "Wing Nut", "--times", "0:1s:3", "--json", "-")[0] == 0
+
+
+def test_moments_of_a_molecule_in_its_unit(call):
+    """The same motion as in kg m², and a table whose small numbers are shown."""
+    start = ("--omega", "1,20,0 rad/ps", "--times", "0:1ps:3")
+    _, out, _ = call("tumble", "--moments", "0.614,1.154,1.768 u A^2", *start)
+    assert "1.01957e-35" in out
+    _, text, _ = call("tumble", "--moments", "0.614,1.154,1.768 u A^2", *start, "--json", "-")
+    moments = [value * 1.66053906892e-47 for value in (0.614, 1.154, 1.768)]
+    _, si, _ = call("tumble", "--moments", ",".join(map(repr, moments)) + " kg m2", *start, "--json", "-")
+    assert json.loads(text)["energy"] == pytest.approx(json.loads(si)["energy"], rel=1e-14)  # round-off

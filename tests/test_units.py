@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import scipy.constants
@@ -85,3 +87,10 @@ def test_bad_ranges(text):
 def test_bad_grids(text):
     with pytest.raises(ValueError, match=r"grid|number"):
         units.parse_grid(text, "MHz")
+
+
+@pytest.mark.parametrize("unit", ["u A^2", "u*A2", "u Å²", "u angstrom^2"])
+def test_moments_of_molecules_in_their_unit(unit):
+    """B = h/(8π² I): 505379.00844 MHz of 1 u Å² (CONVENTIONS.md)."""
+    moment = units.parse_quantity(f"1 {unit}", "kg*m2")
+    assert units.PLANCK_J_S / (8 * math.pi**2 * moment) * 1e-6 == pytest.approx(505379.00844, rel=1e-11)  # digits

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 SHOWN = 11  # rows of the motion in the report
 
+SMALL = 1e-4  # of the components of a column
 EXAMPLES = """\b
 Examples:
   rotor tumble water --plot water.png --gif water.gif
@@ -258,8 +260,7 @@ def _motion_table(start: Start, table: MotionTable) -> Table:
     columns += ["qw", "qx", "qy", "qz"]
     data = list(table.columns.values())[: len(columns)]
     cells = [
-        [f"{column[i]:.6g}" if k == 0 else f"{round(column[i], 6) + 0.0:.6f}" for k, column in enumerate(data)]
-        for i in rows
+        [f"{column[i]:.6g}" if k == 0 else _component(column[i], column) for k, column in enumerate(data)] for i in rows
     ]
     title = "the motion" if len(cells) == count else f"the motion, {len(cells)} of {count} times"
     return Table(title, columns, cells)
@@ -279,3 +280,9 @@ def _per(name: str) -> str:
 
 def _bracket(name: str) -> str:
     return f" ({name})" if name else ""
+
+
+def _component(value: float, column: Sequence[float]) -> str:
+    """Six decimals, or six digits where the whole column is so small that decimals would show nothing (SI units of molecules)."""
+    largest = max(abs(one) for one in column)
+    return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 LETTERS = ("aa", "bb", "cc", "ab", "ac", "bc")
 DIFFERENCES = ("ab-ba", "ac-ca", "bc-cb")
+ROUND_OFF = (
+    1e-6  # of a tensor: elements that symmetry makes 0 are below it, as moments that it makes equal differ by less
+)
 TURNED_DEGREES = 0.1  # from which axes count as turned where a tensor off the diagonal is not known
 
 
@@ -152,7 +155,10 @@ def chi_tensor(chi: Mapping[str, float]) -> Floats:
 
 
 def named_chi(tensor: Floats) -> dict[str, float]:
-    """chi_aa, chi_bb-cc and what is not 0 off the diagonal, of a tensor; what is below 1e-6 of it counts as 0."""
+    """chi_aa, chi_bb-cc and what is not 0 off the diagonal, of a tensor; rounding taken out; chi_cc alone where it is symmetric about c."""
+    tensor = without_rounding(tensor)
+    if np.count_nonzero(tensor) == 3 and tensor[0, 0] == tensor[1, 1]:  # symmetric about c
+        return {"chi_cc": float(tensor[2, 2])}
     found = {
         "aa": tensor[0, 0],
         "bb-cc": tensor[1, 1] - tensor[2, 2],
@@ -160,8 +166,21 @@ def named_chi(tensor: Floats) -> dict[str, float]:
         "ac": tensor[0, 2],
         "bc": tensor[1, 2],
     }
-    least = 1e-6 * float(np.abs(tensor).max())
-    return {f"chi_{letters}": float(value) for letters, value in found.items() if abs(value) > least}
+    return {f"chi_{letters}": float(value) for letters, value in found.items() if value}
+
+
+def without_rounding(tensor: Floats) -> Floats:
+    """A tensor (3, 3) with 0 for elements below `ROUND_OFF` of it, and equal diagonal elements where they differ by less.
+
+    >>> without_rounding(np.diag([1.0, 1.00000001, -2.0])).diagonal().tolist()
+    [1.000000005, 1.000000005, -2.0]
+    """
+    least = ROUND_OFF * float(np.abs(tensor).max())
+    out = np.where(np.abs(tensor) > least, tensor, 0.0)
+    for i, k in ((0, 1), (1, 2)):
+        if abs(out[i, i] - out[k, k]) <= least:
+            out[i, i] = out[k, k] = (out[i, i] + out[k, k]) / 2
+    return out
 
 
 def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) -> dict[str, float]:
@@ -179,11 +198,12 @@ def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) 
     electrons = change.rotation @ (tensor * change.moments) @ change.rotation.T
     with np.errstate(divide="ignore", invalid="ignore"):
         new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
+    new = without_rounding(new)
     mean, half = (new + new.T) / 2, (new - new.T) / 2
     found = {letters: _element(mean, letters) for letters in LETTERS}
     if any("-" in name for name in own):  # else C_ab stands for both orders
         found |= {letters: _element(half, letters) for letters in DIFFERENCES}
-    return {f"C_{letters}": value for letters, value in found.items() if abs(value) > 1e-9 * float(np.abs(new).max())}
+    return {f"C_{letters}": value for letters, value in found.items() if value}
 
 
 def _element(tensor: Floats, letters: str) -> float:
