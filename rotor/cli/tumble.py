@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from rotor.cli.shared.tumble_inputs import Options, Start, read_start
 from rotor.reports.sources import with_sources
 
 if TYPE_CHECKING:
+    from rotor.arrays import Floats
     from rotor.classical.motion import MotionTable
     from rotor.classical.tumble import TumbleAnswer
 
@@ -282,7 +282,7 @@ def _bracket(name: str) -> str:
     return f" ({name})" if name else ""
 
 
-def _component(value: float, column: Sequence[float]) -> str:
+def _component(value: float, column: Floats) -> str:
     """Six decimals, or six digits where the whole column is so small that decimals would show nothing (SI units of molecules)."""
-    largest = max(abs(one) for one in column)
+    largest = float(max(abs(column.min()), abs(column.max())))
     return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"
