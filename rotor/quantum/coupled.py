@@ -420,11 +420,18 @@ def _add_own(out: Floats, block: CoupledBlock, v: int, operators: Operators) -> 
             out[part.place, part.place] += _dense(block_bands(of_j, part.basis)) + scalar * np.eye(part.basis.size)
 
 
-def _add_between(out: Floats, block: CoupledBlock, bra: int, ket: int, operator: JOperator) -> None:
+def elements_between(
+    block: CoupledBlock, bra: int, ket: int, operator: JOperator
+) -> Iterator[tuple[Part, Part, Floats]]:
+    """The elements of an operator between the parts of two states, or of one, of a block: the parts and an array (functions, functions)."""
     for up in block.parts:
         for low in block.parts:
             if (up.v, low.v) == (bra, ket):
-                between = between_blocks(up.basis, low.basis, operator).real
-                out[up.place, low.place] += between
-                if bra != ket:
-                    out[low.place, up.place] += between.T
+                yield up, low, between_blocks(up.basis, low.basis, operator).real
+
+
+def _add_between(out: Floats, block: CoupledBlock, bra: int, ket: int, operator: JOperator) -> None:
+    for up, low, between in elements_between(block, bra, ket, operator):
+        out[up.place, low.place] += between
+        if bra != ket:
+            out[low.place, up.place] += between.T

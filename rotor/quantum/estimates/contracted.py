@@ -26,7 +26,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Plan, SpinBlock
-from rotor.quantum.spins.lines import ALONE, ParameterOperator
+from rotor.quantum.spins.lines import ALONE, parameter_operators
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
 from rotor.quantum.spins.rotor import Channel, RotorBlock
 
@@ -329,7 +329,7 @@ def _units(
     top: Top, effects: tuple[QuantumEffect, ...], plan: Plan, used: set[int], names: Sequence[str]
 ) -> tuple[dict[int, Unit], dict[tuple[int, int], dict[Channel, Unit]]]:
     """Unit matrices of every parameter over the functions of the basis, of the rotation and of what couples it to the spins."""
-    operators = [ParameterOperator(top, effects, name, plan.shared) for name in names]
+    operators = parameter_operators(top, effects, names, plan.shared)
     parts = {i: _in_functions(i, plan.blocks[i]) for i in used}
     rotations, couplings = dict[int, Unit](), dict[tuple[int, int], dict[Channel, Unit]]()
     for i, k in [*plan.operators, *((i, i) for i in used if (i, i) not in plan.operators)]:

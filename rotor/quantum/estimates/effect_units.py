@@ -29,7 +29,7 @@ from rotor.quantum.estimates.unit_matrices import (
 )
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
-from rotor.quantum.spins.lines import ParameterOperator
+from rotor.quantum.spins.lines import Declared, ParameterOperator
 from rotor.quantum.spins.operators import AxialState, Basis, Scalar
 from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel, RotorBlock
@@ -221,8 +221,9 @@ class _SpinUnits:
         self._shared = blocks[0].shared
         rotation = _Rotation.of(top, effects, names, blocks) if apart else None
         self._rotation = rotation
+        declared = Declared.of(top, effects)
         self._operators = {
-            place: ParameterOperator(top, effects, name, self._shared)
+            place: ParameterOperator(top, effects, name, self._shared, declared)
             for place, name in enumerate(names)
             if rotation is None or name not in rotation.names
         }

@@ -1,4 +1,4 @@
-"""Elements of molecule-fixed tensors between levels with spins, and how such levels depend on the parameters.
+"""Elements of molecule-fixed tensors between levels with spins, and those of ∂H/∂c of each parameter.
 
 A dipole touches no spin: its element between two functions is that of the rotation times a product of 6j symbols,
 
@@ -9,25 +9,27 @@ see `coupling.tensor_coefficients`. Elements of the rotation are computed once f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
+from rotor.quantum.spins.blocks import Shared, SpinBlock, operators_between, product
 from rotor.quantum.spins.contraction import MOST_RANK, by_numbers, tensors_of_stacks
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
 from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.states import Coupling, State
 from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
 from rotor.quantum.tensors import acting_on as body_acting_on
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -230,88 +232,76 @@ def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Flo
     return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
 
 
-def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
-    """∂E/∂c = ⟨i|∂H/∂c|i⟩ of levels with spins; see `derivatives.level_derivatives`.
+class Declared(NamedTuple):
+    """What effects declare: operators of N by state, couplings, spin terms."""
 
-    Parameters
-    ----------
-    top : Top
-        The constants that the levels were solved with.
-    levels : Levels
-        Levels with spins and their eigenvectors.
-    names : sequence of str
-        Parameters, in the order of the columns.
-    rows : (rows,) array of int
-        Indices of the levels.
+    states: Sequence[tuple[int, Mapping[str, Operators]]]
+    couplings: list[Coupling]
+    spin_terms: list[SpinTerm]
 
-    Returns
-    -------
-    (rows, names) array
-        MHz per MHz.
+    @classmethod
+    def of(cls, top: Top, effects: Sequence[QuantumEffect]) -> Declared:
+        """The declarations of all effects, in their order."""
+        states = [
+            (one.v, one.terms) for effect in effects for one in (State(0, effect.operators(top)), *effect.states(top))
+        ]
+        return cls(
+            states,
+            [one for effect in effects for one in effect.couplings(top)],
+            [term for effect in effects for term in effect.spin_terms(top)],
+        )
 
-    Raises
-    ------
-    ValueError
-        For levels without vectors.
-    """
-    out = np.zeros((len(levels), len(names)))
-    if not levels.blocks:
-        raise ValueError("these levels have no vectors; solve them with their spins anew")
-    shared = levels.blocks[0].shared
-    for column, name in enumerate(names):
-        of_name = ParameterOperator(top, levels.effects, name, shared)
-        for block in levels.blocks:
-            out[block.start : block.start + len(block.energies_mhz), column] = of_name.expectations(block)
-    return np.asarray(out[rows])
+
+def parameter_operators(
+    top: Top, effects: Sequence[QuantumEffect], names: Iterable[str], shared: Shared
+) -> list[ParameterOperator]:
+    """∂H/∂c of several parameters."""
+    declared = Declared.of(top, effects)
+    return [ParameterOperator(top, effects, name, shared, declared) for name in names]
 
 
 class ParameterOperator:
     """∂H/∂c of one parameter over the parts of spin blocks, each element of the rotation computed once."""
 
-    def __init__(self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared) -> None:
+    def __init__(
+        self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared, declared: Declared | None = None
+    ) -> None:
+        """declared: what the effects declare, where operators of many parameters are made."""
         self._top, self._effects, self._name, self._shared = top, effects, name, shared
-        terms = [term for effect in effects for term in effect.spin_terms(top) if term.name == name]
-        self._channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
+        declared = declared or Declared.of(top, effects)
+        terms = [term for term in declared.spin_terms if term.name == name]
+        self.channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
         self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
-        self._own = [
-            (state, operators)
-            for effect in effects
-            for state, terms in ({0: effect.operators(top)} | {one.v: one.terms for one in effect.states(top)}).items()
-            if (operators := terms.get(name))
-        ]
-        self._couplings = [one for effect in effects for one in effect.couplings(top) if one.name == name]
+        self._own = [(v, operators) for v, terms in declared.states if (operators := terms.get(name))]
+        self._couplings = [one for one in declared.couplings if one.name == name]
+
+    @property
+    def powers(self) -> list[tuple[int, Operators]] | None:
+        """By states the powers of N that the parameter multiplies; None where it multiplies other operators of N."""
+        others = self._couplings or any(
+            effect.j_operator(self._top, self._name, 1, self._shared.representation) is not None
+            for effect in self._effects
+            if self._name in effect.parameters(self._top)
+        )
+        return None if others else self._own
 
     def connects(self, up: SpinPart, low: SpinPart) -> bool:
         """Whether there may be elements between two parts: an operator of the rotation alone has them within one solved block."""
-        return bool(self._channels) or up.number == low.number
-
-    def expectations(self, block: SpinBlock) -> Floats:
-        """⟨i|∂H/∂c|i⟩ of every state of a block, (n,)."""
-        total = np.zeros(len(block.energies_mhz))
-        known: dict[Channel, Floats] = {}
-        for a, up in enumerate(block.parts):
-            for low in block.parts[: a + 1]:
-                for channel, element in self.elements(up, low).items():
-                    if channel not in known:
-                        known[channel] = coefficients_of(self._shared.scheme, channel, block.patterns)
-                    matrix = product(known[channel][up.patterns, low.patterns], element)
-                    bra, ket = block.vectors[up.place], block.vectors[low.place]
-                    total += (2.0 if low is not up else 1.0) * np.einsum("in,in->n", bra, matrix @ ket)
-        return total
+        return bool(self.channels) or up.number == low.number
 
     def elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
         """Elements between the states of the rotation of two parts, by channel."""
         key = (up.number, low.number)
         if key not in self._known:
             found: dict[Channel, Floats] = {}
-            if self._channels:
-                found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
-            if up.number == low.number and (own := self._rotation(up.rotor)) is not None:
+            if self.channels:
+                found = operators_between(up.rotor, low.rotor, self.channels, self._shared.representation)
+            if up.number == low.number and (own := self.rotation(up.rotor)) is not None:
                 found[ALONE] = found[ALONE] + own if ALONE in found else own
             self._known[key] = found
         return self._known[key]
 
-    def _rotation(self, block: RotorBlock) -> Floats | None:
+    def rotation(self, block: RotorBlock) -> Floats | None:
         """The derivative of the Hamiltonian of the rotation over the states of a block."""
         size = sum(part.basis.size for part in block.parts)
         total = np.zeros((size, size))
