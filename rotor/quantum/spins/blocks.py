@@ -123,6 +123,15 @@ class Plan:
         return _by_pairs(self.contracted or []) if self.given is None else self.given
 
     @cached_property
+    def families_at(self) -> dict[tuple[int, int], dict[int, list[tuple[int, int]]]]:
+        """By N and class, and by the number of a family, the places in it and the blocks of its members there."""
+        found: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
+        for number, family in enumerate(self.families):
+            for at, (i, own) in enumerate(family):
+                found.setdefault((self.blocks[i].n, own), {}).setdefault(number, []).append((at, i))
+        return found
+
+    @cached_property
     def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
         """Each matrix between two blocks once, with the channels that share it."""
         return {pair: _by_operator(found) for pair, found in self.operators.items()}
@@ -207,12 +216,20 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
 
 
 def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
-    """Pairs (i, k), i ≥ k, whose N differ by `reach` at most."""
-    by_n: dict[int, list[int]] = {}
+    """Pairs (i, k), i ≥ k, whose N differ by `reach` at most, of an axial top those of one K."""
+    by_n: dict[tuple[int, int], list[int]] = {}
+    axial = [_axial_k(block) for block in blocks]
     for i, block in enumerate(blocks):
-        by_n.setdefault(block.n, []).append(i)
+        by_n.setdefault((block.n, axial[i]), []).append(i)
     for i, block in enumerate(blocks):
-        yield from ((i, k) for n in range(block.n - reach, block.n + 1) for k in by_n.get(n, ()) if k <= i)
+        for n in range(block.n - reach, block.n + 1):
+            yield from ((i, k) for k in by_n.get((n, axial[i]), ()) if k <= i)
+
+
+def _axial_k(block: RotorBlock) -> int:
+    """K of a block of an axial top, which every operator conserves; 0 for other tops."""
+    basis = block.parts[0].basis
+    return basis.axial_k if isinstance(basis, AxialState) else 0
 
 
 def operators_between(
@@ -265,10 +282,9 @@ def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
     n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
     bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
     rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}
-    for family in plan.families:
-        members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
-        if members:
-            yield _parts(plan, members)
+    for number in sorted({number for place in rows for number in plan.families_at.get(place, ())}):
+        members = [(at, i, rows[place]) for place in rows for at, i in plan.families_at.get(place, {}).get(number, ())]
+        yield _parts(plan, [(i, own) for _, i, own in sorted(members, key=lambda member: member[0])])
 
 
 def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:

@@ -15,14 +15,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import Shared, SpinBlock, couplings_of
+from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import by_numbers, operators_of_stacks
 from rotor.quantum.spins.lines import ALONE, ParameterOperator, parameter_operators
-from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.operators import AxialState, Scalar
 from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Channel, Piece, RotorBlock
+from rotor.quantum.spins.scheme import Scheme
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -38,14 +41,20 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared, out = levels.blocks[0].shared, np.zeros((len(levels), len(names)))
     operators = parameter_operators(top, levels.effects, names, shared)
-    tables = {block.twice_f: block.patterns for block in levels.blocks}
+    every_f = distinct(np.array([block.twice_f for block in levels.blocks]))
     for channel, elements in _elements(operators, levels.blocks, shared):
-        coefficients = couplings_of(shared.scheme, channel, tables)
+        coefficients = _coefficients(shared.scheme, channel, int(every_f[0]), int(every_f[-1]))
         stacked = {pair: _stacked(found) for pair, found in elements.items()}
         for block in levels.blocks:
             states = slice(block.start, block.start + len(block.energies_mhz))
             _add(out[states], block, coefficients[block.twice_f], stacked)
     return np.asarray(out[rows])
+
+
+def _coefficients(scheme: Scheme, channel: Channel, first: int, last: int) -> dict[int, Floats]:
+    """c(p', p) of a channel by the doubled F, which levels of many F have made already."""
+    table, found = pattern_table(scheme, first, last), couplings_by_f(scheme, channel, first, last)
+    return {f: found[(f - min(table.patterns)) // 2][np.ix_(places, places)] for f, places in table.places.items()}
 
 
 def _stacked(found: Sequence[tuple[int, Floats]]) -> tuple[list[int], Floats]:
@@ -122,9 +131,37 @@ def _pair_by_pair(
         for a, up in enumerate(block.parts):
             parts |= {(up.number, low.number): (up, low) for low in block.parts[: a + 1]}
     by_channel: dict[Channel, Elements] = {}
+    diagonal = [pair for pair in parts if pair[0] == pair[1]]
     for column, operator in enumerate(operators):
+        if not operator.channels and operator.powers is not None:
+            values = _of_powers(operator.powers, [parts[pair][0].rotor for pair in diagonal])
+            if values is not None:
+                alone = by_channel.setdefault(ALONE, {})
+                for pair, value in zip(diagonal, values, strict=True):
+                    alone.setdefault(pair, []).append((column, value))
+                continue
         for pair, (up, low) in parts.items():
             if operator.connects(up, low):
                 for channel, element in operator.elements(up, low).items():
                     by_channel.setdefault(channel, {}).setdefault(pair, []).append((column, element))
     yield from by_channel.items()
+
+
+def _of_powers(powers: Sequence[tuple[int, Operators]], rotors: Sequence[RotorBlock]) -> Floats | None:
+    """Powers of N over blocks of one axial function each, (blocks, 1, 1); None where a block has others.
+
+    N^2p Nz^2q is (N (N + 1))^p K^2q; those that change K do not act.
+    """
+    if any(len(rotor.parts) != 1 or not isinstance(rotor.parts[0].basis, AxialState) for rotor in rotors):
+        return None
+    parts = [rotor.parts[0] for rotor in rotors]
+    v, n, k = (
+        np.array([float(value) for value in column])
+        for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True)
+    )
+    total = np.zeros(len(parts))
+    for state, operators in powers:
+        for (p, q, order), factor in operators.items():
+            if order == 0:
+                total += np.where(v == state, factor * (n * (n + 1)) ** p * k ** (2 * q), 0.0)
+    return total[:, None, None]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -253,13 +254,25 @@ def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], represe
             for right in low.parts:
                 if not acts(piece, left.v, right.v):
                     continue
-                found = piece.rotor.elements(left.basis, right.basis, representation)
+                found = _elements(piece.rotor, left.basis, right.basis, representation)
                 if found is None or not found.any():
                     continue
                 scaled = _powers(piece, left, right) * found
                 moved = up.vectors[left.place].T @ scaled @ low.vectors[right.place]
                 total = moved if total is None else total + moved
     return total
+
+
+def _elements(rotor: Rotor, up: Basis, low: Basis, representation: str) -> Floats | None:
+    """The elements of an operator; those between single functions of axial tops are made once for all parameters that have them."""
+    if isinstance(up, AxialState) and isinstance(low, AxialState):
+        return _axial_elements(rotor, up, low, representation)
+    return rotor.elements(up, low, representation)
+
+
+@lru_cache(maxsize=1 << 16)
+def _axial_elements(rotor: Rotor, up: AxialState, low: AxialState, representation: str) -> Floats | None:
+    return rotor.elements(up, low, representation)
 
 
 def acts(piece: Piece, left: int, right: int) -> bool:
