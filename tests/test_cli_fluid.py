@@ -9,7 +9,9 @@ from ase.io import read
 
 from rotor.fluids.record import FluidRecord
 
-VAPOUR = ("fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff", "4", "--step", "1fs")
+VAPOUR = (
+    "fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff", "4", "--equilibration", "0", "--step", "1fs",
+)  # fmt: skip
 
 
 def test_a_box_is_made_and_run(call, folder):

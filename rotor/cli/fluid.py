@@ -59,6 +59,9 @@ class Options:
     model: str = option("spce", metavar="NAME", help="Rigid model; several joined by commas.")
     molecules: int | None = option(None, metavar="N", help="Make a box of N molecules on a lattice, relaxed.")
     density: str | None = option(None, metavar="D", help="Of the box that is made (g/cm³; by default 0.997).")
+    equilibration: str = option(
+        "auto", metavar="T", help="Thermostat before the run of a box that is made: auto until stationary, 0 none (ps)."
+    )
     ensemble: str = option("nve", metavar="NAME", help="nve, langevin or nose-hoover.")
     temperature: str = option("298.15", metavar="T", help="Of thermostat and starting velocities (K).")
     step: str = option("2", metavar="T", help="Length of a step (fs).")
@@ -230,7 +233,15 @@ def _new_box(options: Options, settings: Settings) -> NewBox:
     if source == "water" and model.symbols != ("O", "H", "H"):
         raise ValueError(f"{source!r}: --model {model.name} is no model of water; write {model.name!r}")
     grams = WATER_G_CM3 if options.density is None else inputs.positive("--density", options.density, "")
-    return NewBox(options.molecules or 0, grams)
+    return NewBox(options.molecules or 0, grams, _equilibration(options.equilibration))
+
+
+def _equilibration(text: str) -> float | None:
+    """Picoseconds; None for auto."""
+    if text == "auto":
+        return None
+    value = inputs.quantity("--equilibration", text, "ps")
+    return value if value == 0 else inputs.positive("--equilibration", text, "ps")
 
 
 def _answer(
@@ -290,6 +301,8 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
     if content["density_g_cm3"] is not None:
         edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
         facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
+    if content["motion_reason"]:
+        facts.append(("no motion", content["motion_reason"]))
     show_facts(facts)
     rows = [
         [
@@ -302,4 +315,5 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
     ]
     print()
     columns = ["quantity", "unit", "mean", "error", "samples"]
-    show_table(Table("second half of the rows", columns, rows, frozenset({"quantity", "unit"})))
+    rows_meant = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
+    show_table(Table(rows_meant, columns, rows, frozenset({"quantity", "unit"})))

@@ -11,12 +11,14 @@ import numpy as np
 
 from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.fluids.engines.results import ENGINES
+from rotor.fluids.equilibration import Equilibration, equilibrate
 from rotor.fluids.forces.models import model_of, models_of, shapes_of
 from rotor.fluids.initial_box import RELAXING_STEPS, lattice_box, relax
+from rotor.fluids.liquid_motion import MotionFrames, axes_of, motion_means
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, run_fluid
+from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, progress_bar, run_fluid
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import conserved, means
+from rotor.fluids.summary import Mean, conserved, means
 from rotor.table import TextOf
 from rotor.units import ATOMIC_MASS_KG
 
@@ -32,14 +34,20 @@ DEFAULT = Settings()
 
 @dataclass(frozen=True)
 class NewBox:
-    """A box to make: so many molecules of one model on a lattice at a density, turned at random and relaxed."""
+    """A box to make: so many molecules of one model on a lattice at a density, turned at random, relaxed and equilibrated.
+
+    equilibration_ps: how long the thermostat acts before the run; None until the box is stationary, 0 not at all.
+    """
 
     molecules: int
     density_g_cm3: float = WATER_G_CM3
+    equilibration_ps: float | None = None
 
     def __post_init__(self) -> None:
         require_whole("molecules", self.molecules, 1)
         require_positive("density_g_cm3", self.density_g_cm3, "g/cm³")
+        if self.equilibration_ps:
+            require_positive("equilibration_ps", self.equilibration_ps, "ps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +84,10 @@ class FluidRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FluidAnswer(TextOf):
-    """A run: the table, the atoms where it ended, and how it started."""
+    """A run: the table, the atoms where it ended, and how it started.
+
+    equilibration: of a box that was made. motion: reorientation and diffusion of the run; motion_reason: why some of it is missing.
+    """
 
     shown = "record"
 
@@ -84,6 +95,14 @@ class FluidAnswer(TextOf):
     record: FluidRecord
     atoms: Atoms
     start: str
+    equilibration: Equilibration | None = None
+    motion: tuple[Mean, ...] = ()
+    motion_reason: str = ""
+
+    @property
+    def averaged_share(self) -> float:
+        """Share of the rows, the last ones, that means are taken over: all after an equilibration, else half."""
+        return 0.5 if self.equilibration is None else 1.0
 
     @cached_property
     def _count(self) -> tuple[Bodies, Degrees, str]:
@@ -120,7 +139,11 @@ class FluidAnswer(TextOf):
             "molecules": _species(bodies),
             "degrees": {name: getattr(degrees, name) for name in ("translation", "rotation", "removed", "total")},
             "thermometer": self.thermometer,
-            "means": [asdict(mean) for mean in means(self.record, len(bodies))],
+            "equilibration_ps": None if self.equilibration is None else self.equilibration.time_ps,
+            "stationary": None if self.equilibration is None else self.equilibration.stationary,
+            "averaged_share": self.averaged_share,
+            "means": [asdict(mean) for mean in (*means(self.record, len(bodies), self.averaged_share), *self.motion)],
+            "motion_reason": self.motion_reason or None,
             "conserved_rms_ev": rms,
             "conserved_drift_ev_per_ns": drift,
             "notes": list(self.notes),
@@ -168,15 +191,29 @@ def answer_fluid(
     settings = request.settings
     speeds = "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{request.start}; velocities {speeds}"
-    if own:
-        if atoms.calc is None:
-            atoms.calc = calculator_of(settings, request.threads)
-        record = run_fluid(atoms, settings, outputs, resume=resume, progress=progress, on_start=on_start)
-    else:
+    equilibration = None
+    if isinstance(request.box, NewBox) and not resume and request.box.equilibration_ps != 0:
+        with progress_bar(0, progress) as shown:
+            equilibration = equilibrate(atoms, settings, request.box.equilibration_ps, shown)
+        start += f"; {equilibration.text}"
+    if not own:
         from rotor.fluids.engines.follow import follow_engine
 
         record = follow_engine(request.engine, atoms, settings, outputs, request.threads, on_start)
-    return FluidAnswer(request, record, atoms, start)
+        return FluidAnswer(request, record, atoms, start, equilibration)
+    if atoms.calc is None:
+        atoms.calc = calculator_of(settings, request.threads)
+    frames = MotionFrames()
+    record = run_fluid(atoms, settings, outputs, resume=resume, progress=progress, on_start=on_start, frames=frames)
+    motion, reason = _motion(atoms, settings, frames)
+    return FluidAnswer(request, record, atoms, start, equilibration, tuple(motion), reason)
+
+
+def _motion(atoms: Atoms, settings: Settings, frames: MotionFrames) -> tuple[list[Mean], str]:
+    """Reorientation and diffusion of a run."""
+    bodies, _, _ = bodies_and_degrees(atoms, settings)
+    interval_ps = settings.every * settings.step_fs * 1e-3
+    return motion_means(frames, interval_ps, axes_of(bodies, models_of(settings.model)))
 
 
 def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:

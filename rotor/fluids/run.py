@@ -40,6 +40,7 @@ from rotor.units import EV_PER_ANGSTROM3_BAR
 if TYPE_CHECKING:
     from ase import Atoms
 
+    from rotor.fluids.liquid_motion import MotionFrames
     from rotor.fluids.motion.bodies import Bodies
     from rotor.fluids.motion.dynamics import RigidDynamics
     from rotor.fluids.motion.thermostats import Thermostat
@@ -85,6 +86,7 @@ def run_fluid(
     resume: bool = False,
     progress: Progress | None = None,
     on_start: Callable[[], None] = lambda: None,
+    frames: MotionFrames | None = None,
 ) -> FluidRecord:
     """Run a box of rigid molecules and return its table; the atoms end where the run does.
 
@@ -104,6 +106,8 @@ def run_fluid(
         Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
     on_start : callable, optional
         Called once everything is found to be in order and the files are open.
+    frames : MotionFrames, optional
+        Takes centres and attitudes with every row.
 
     Returns
     -------
@@ -123,7 +127,7 @@ def run_fluid(
     if not resume and outputs.checkpoint is not None and os.path.exists(outputs.checkpoint):
         raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to begin anew")
     dynamics = dynamics_of(atoms, settings, begin=not resume)
-    run = _Run(dynamics, settings, outputs)
+    run = _Run(dynamics, settings, outputs, frames)
     if resume:
         assert outputs.checkpoint is not None
         run.restore_from(outputs.checkpoint)
@@ -221,8 +225,10 @@ def pressure_bar(dynamics: RigidDynamics) -> float:
 class _Run:
     """A run under way: its rows, its files, where its last checkpoint is."""
 
-    def __init__(self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs) -> None:
-        self.dynamics, self.settings, self.outputs = dynamics, settings, outputs
+    def __init__(
+        self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs, motion: MotionFrames | None = None
+    ) -> None:
+        self.dynamics, self.settings, self.outputs, self._motion = dynamics, settings, outputs, motion
         self.rows: list[list[float]] = []
         self._csv: TextFile | None = None
         self._frames: list[ExtendedXyz | AseTrajectory] = []
@@ -313,6 +319,8 @@ class _Run:
             self.rows.append(self._row(time_ps))
             if self._csv is not None:
                 self._csv.add(csv_line(self.rows[-1]))
+            if self._motion is not None:
+                self._motion.add(dynamics.state.centres, dynamics.state.attitude)
         if dynamics.nsteps % (self.outputs.frames_every or every) == 0:
             for file in self._frames:
                 file.add(dynamics.atoms, time_ps)

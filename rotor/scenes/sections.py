@@ -88,6 +88,9 @@ class FluidConditions(Section, frozen=True):
     model: Annotated[str, said("rigid model, such as spce, tip4p2005, argon")] = "spce"
     molecules: Annotated[int | None, said("make a box of so many", 216)] = None
     density: Annotated[float, said("of the box that is made (g/cm³)")] = 0.997
+    equilibration: Annotated[
+        str, said("thermostat before the run of such a box: auto until stationary, 0 none (ps)")
+    ] = "auto"
     box: Annotated[str | None, said("or a file with a box, counted from the scene's folder", "liquid.traj")] = None
     ensemble: Annotated[str, said("nve, langevin or nose-hoover")] = "nve"
     temperature: Annotated[Quantity, said("of the thermostat and of starting velocities (K)")] = "298.15 K"

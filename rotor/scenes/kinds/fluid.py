@@ -54,7 +54,8 @@ def _box(of: FluidConditions, folder: Where) -> NewBox | Atoms:
     if (of.molecules is None) == (of.box is None):
         raise ValueError("conditions: give either molecules, to make a box of, or a box")
     if of.molecules is not None:
-        return NewBox(of.molecules, of.density)
+        time = None if of.equilibration == "auto" else kind.quantity("conditions.equilibration", of.equilibration, "ps")
+        return NewBox(of.molecules, of.density, time)
     from rotor.formats.boxes import read_box
 
     path = within(folder, str(of.box))
@@ -107,6 +108,7 @@ def saved(asked: FluidRequest, molecule: MoleculeSection | None) -> FluidScene:
             model=run.model,
             molecules=None if made is None else made.molecules,
             density=NewBox(1).density_g_cm3 if made is None else made.density_g_cm3,
+            equilibration="auto" if made is None or made.equilibration_ps is None else f"{made.equilibration_ps!r} ps",
             box=None if made is not None else asked.box_source,
             ensemble=run.ensemble,
             temperature=f"{run.temperature_k!r} K",

@@ -1,0 +1,162 @@
+"""Equilibration of a box that starts from a lattice: a thermostat until energy and temperatures are stationary.
+
+The box is run under Langevin's thermostat. After 1, 1.5, 2.25, ... times `SHORTEST_PS` the last half of the time is judged: potential
+energy and both temperatures have no trend when the means of its two quarters differ by less than `LIMIT` standard errors (of
+correlated data, `rotor.statistics.equipartition.statistical_inefficiency`), and both temperatures must agree with the thermostat's
+within as many. For a run at constant energy the momenta are then scaled once, so that the energy is the mean of that half: its
+temperature is the thermostat's within the error of that mean, not within the scatter of a single moment.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fluids.initial_box import at_rest
+from rotor.fluids.run import Progress, RunStopped, dynamics_of, ns_per_day
+from rotor.fluids.settings import Settings
+from rotor.fluids.summary import mean_of
+from rotor.units import EV_PER_K
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+    from rotor.fluids.motion.dynamics import RigidDynamics
+
+SHORTEST_PS, GROWTH, LONGEST_PS = 10.0, 1.5, 100.0
+FRICTION_PER_PS = 5.0
+ROW_FS = 20.0
+LIMIT = 2.5  # standard errors
+LEAST_SAMPLES = 5.0  # independent ones in a quarter
+_NEW_STREAM = 20  # of random numbers, apart from those of the run
+
+
+@dataclass(frozen=True)
+class Equilibration:
+    """How a box was equilibrated.
+
+    time_ps: length. stationary: whether the test was passed; False after `LONGEST_PS` at the most. temperature_k,
+    rotation_over_translation: means of the last half.
+    """
+
+    time_ps: float
+    stationary: bool
+    temperature_k: float
+    rotation_over_translation: float
+
+    @property
+    def text(self) -> str:
+        """The equilibration in words."""
+        judged = "then stationary" if self.stationary else "not stationary yet: run longer before averages are taken"
+        return f"equilibrated for {self.time_ps:.4g} ps under langevin ({FRICTION_PER_PS:g}/ps), {judged}"
+
+
+def equilibrate(
+    atoms: Atoms, settings: Settings, time_ps: float | None = None, progress: Progress = lambda *_: None
+) -> Equilibration:
+    """Bring a box to the temperature of its settings, in place.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        Molecules with a calculator; momenta are drawn where there are none.
+    settings : Settings
+        Model, temperature, step and ensemble of the run that follows.
+    time_ps : float, optional
+        Length; by default until the box is stationary.
+    progress : callable, optional
+        As of `run_fluid`.
+
+    Returns
+    -------
+    Equilibration
+    """
+    bath = replace(
+        settings, ensemble="langevin", friction_per_ps=FRICTION_PER_PS, seed=_other_seed(settings.seed), steps=0
+    )
+    dynamics = dynamics_of(atoms, bath)
+    longest = LONGEST_PS if time_ps is None else time_ps
+    rows: list[list[float]] = []
+    aim = min(SHORTEST_PS, longest)
+    dynamics.wrench()  # a state that cannot begin is a mistake of the box
+    while True:
+        try:
+            _advance(dynamics, bath, aim, rows, progress, longest)
+        except (ValueError, FloatingPointError) as error:
+            raise RunStopped(f"{error} (step {dynamics.nsteps + 1} of the equilibration)") from error
+        stationary = is_stationary(np.array(rows), settings.temperature_k)
+        if aim >= longest or (stationary and time_ps is None):
+            break
+        aim = min(aim * GROWTH, longest)
+    half = np.array(rows)[len(rows) // 2 :]
+    if settings.ensemble == "nve":
+        _set_energy(atoms, dynamics, float(half[:, 3].mean()), settings.temperature_k)
+    temperature = float(half[:, 1].mean()), float(half[:, 2].mean())
+    count = dynamics.degrees.translation, dynamics.degrees.rotation
+    return Equilibration(
+        dynamics.nsteps * settings.step_fs * 1e-3,
+        stationary,
+        float(np.average(temperature, weights=count)) if count[1] else temperature[0],
+        temperature[1] / temperature[0] if count[1] else math.nan,
+    )
+
+
+def is_stationary(rows: Floats, temperature_k: float) -> bool:
+    """Whether potential energy and temperatures of translation and rotation, columns of (n, 3 or more), have settled in the last half."""
+    half = rows[len(rows) // 2 :]
+    first, second = half[: len(half) // 2], half[len(half) // 2 :]
+    for k, target in enumerate((None, temperature_k, temperature_k)):
+        if not np.isfinite(half[:, k]).all():
+            continue  # rotations of atoms
+        early, late = (mean_of("", "", part[:, k]) for part in (first, second))
+        if not min(early.effective_samples, late.effective_samples) >= LEAST_SAMPLES:
+            return False
+        spread = math.hypot(early.error, late.error)
+        if abs(early.mean - late.mean) > LIMIT * spread:
+            return False
+        if target is not None and abs((early.mean + late.mean) / 2 - target) > LIMIT * spread / 2:
+            return False
+    return True
+
+
+def _advance(
+    dynamics: RigidDynamics,
+    settings: Settings,
+    time_ps: float,
+    rows: list[list[float]],
+    progress: Progress,
+    longest_ps: float,
+) -> None:
+    """Step on to a time, with a row every `ROW_FS`: potential energy, both temperatures, total energy."""
+    import time
+
+    every = max(round(ROW_FS / settings.step_fs), 1)
+    steps, started, before = round(time_ps * 1e3 / settings.step_fs), time.perf_counter(), dynamics.nsteps
+    while dynamics.nsteps < steps:
+        dynamics.step()
+        dynamics.nsteps += 1
+        if dynamics.nsteps % every == 0:
+            heat, energy = dynamics.temperatures(), float(dynamics.atoms.get_potential_energy())
+            rows.append([energy, heat.translation_k, heat.rotation_k, energy + dynamics.kinetic().total_ev])
+            seconds = time.perf_counter() - started
+            most = round(longest_ps * 1e3 / settings.step_fs)
+            progress(dynamics.nsteps, most, ns_per_day(settings, dynamics.nsteps - before, seconds))
+
+
+def _set_energy(atoms: Atoms, dynamics: RigidDynamics, energy_ev: float, temperature_k: float) -> None:
+    """Take out the total momentum and scale the momenta to an energy, that of the momentum (3/2 kT) taken off."""
+    bodies, state = dynamics.bodies, dynamics.state
+    atoms.set_momenta(bodies.momenta(at_rest(bodies, state.momentum), state.angular, state.attitude))
+    wanted = energy_ev - 1.5 * EV_PER_K * temperature_k - float(atoms.get_potential_energy())
+    kinetic = float(atoms.get_kinetic_energy())
+    if wanted > 0 and kinetic > 0:
+        atoms.set_momenta(atoms.get_momenta() * math.sqrt(wanted / kinetic))
+
+
+def _other_seed(seed: int) -> int:
+    """A seed whose noise is not that of the run."""
+    return int(np.random.SeedSequence([seed, _NEW_STREAM]).generate_state(1)[0])

@@ -1,0 +1,169 @@
+"""Reorientation and diffusion of the molecules of a run, with the errors of that run.
+
+    C_l(t) = ⟨P_l(u(0)·u(t))⟩,  τ_l = ∫₀^∞ C_l dt,  l = 1, 2           u along the dipole of the model, else along its first bond
+    ⟨|r(t) - r(0)|²⟩ = 6 D t                                           at times where it is a straight line
+
+(M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, chapter 2). C_l is integrated to `WINDOW` of a block and continued by the
+exponential of its last half. The run is cut into `BLOCKS` successive blocks, which give means and standard errors; a run whose blocks
+are short against τ, or shorter than `LEAST_BLOCK_PS`, has no answer, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fluids.analysis import diffusion
+from rotor.fluids.summary import Mean
+from rotor.geometry import rotations
+
+if TYPE_CHECKING:
+    from rotor.fluids.forces.models import RigidModel
+    from rotor.fluids.motion.bodies import Bodies
+
+BLOCKS = 5
+WINDOW = 0.5  # of a block, to which correlations are integrated
+LEAST_BLOCK_PS = 4.0
+FELL_TO = math.exp(-1)  # a correlation that is larger at the end of the window is not integrated
+MOST_FRAMES = 4096
+DIFFUSION_FROM_PS = 1.0
+CM2_PER_S = 1e4  # 1 m²/s
+SMALL_DIPOLE = 1e-6  # e Å
+
+
+class MotionFrames:
+    """Centres (n, 3) and attitudes (n, 4) of a run at even times, every second one dropped where they grow too many."""
+
+    def __init__(self) -> None:
+        self.centres: list[Floats] = []
+        self.attitudes: list[Floats] = []
+        self.stride, self._seen = 1, 0
+
+    def add(self, centres: Floats, attitude: Floats) -> None:
+        """Take a frame, if it is its turn."""
+        if self._seen % self.stride == 0:
+            self.centres.append(centres.copy())
+            self.attitudes.append(attitude.copy())
+        self._seen += 1
+        if len(self.centres) > MOST_FRAMES:
+            self.centres, self.attitudes, self.stride = self.centres[::2], self.attitudes[::2], 2 * self.stride
+
+
+def axis_of(model: RigidModel, sites: Floats) -> Floats | None:
+    """The unit vector of a model's dipole, that of its first bond without a dipole, in the axes of `sites` (atoms, 3); None of an atom.
+
+    The dipole is a sum over the vectors from the first atom to the others, whose coefficients do not depend on the axes.
+    """
+    atoms = len(model.symbols)
+    if atoms < 2:
+        return None
+    positions = model.positions_angstrom
+    bonds = positions[1:atoms] - positions[0]
+    dipole = np.array([site.charge_e for site in model.sites]) @ positions
+    if np.linalg.norm(dipole) < SMALL_DIPOLE:
+        dipole = bonds[0]
+    axis = np.linalg.lstsq(bonds.T, dipole, rcond=None)[0] @ (sites[1:] - sites[0])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
+    """The axis of every body in its principal axes (n, 3); None where one has none."""
+    axes = np.zeros((len(bodies), 3))
+    for species in range(len(bodies.names)):
+        members = np.flatnonzero(bodies.species == species)
+        rows = slice(bodies.starts[members[0]], bodies.starts[members[0] + 1])
+        sites = bodies.sites[rows]
+        model = next((one for one in models if len(one.symbols) == len(sites)), None)
+        axis = None if model is None else axis_of(model, sites)
+        if axis is None:
+            return None
+        axes[members] = axis
+    return axes
+
+
+def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) -> tuple[list[Mean], str]:
+    """τ1, τ2 and D of a run's frames with standard errors, and why they are missing where they are.
+
+    Parameters
+    ----------
+    frames : MotionFrames
+    interval_ps : float
+        Between rows of the run.
+    axes : (n, 3) array or None
+        The axis of every molecule in its body axes; None where a molecule has none.
+    """
+    step = interval_ps * frames.stride
+    length = (len(frames.centres) - 1) * step
+    if length < BLOCKS * LEAST_BLOCK_PS:
+        return [], f"{length:.3g} ps are too short for {BLOCKS} blocks: run {BLOCKS * LEAST_BLOCK_PS:g} ps or more"
+    table: list[Mean] = []
+    missing = ""
+    if axes is not None:
+        turned = rotations.rotate(np.array(frames.attitudes), axes)
+        blocks = np.array_split(turned, BLOCKS)
+        for order in (1, 2):
+            values = [correlation_time(block, step, order) for block in blocks]
+            if any(math.isnan(value) for value in values):
+                missing = (
+                    f"C_{order} has not fallen to 1/e in {WINDOW:g} of a block of {length / BLOCKS:.3g} ps: run longer"
+                )
+            else:
+                table.append(_mean(f"τ{order} of reorientation", "ps", values))
+    window = (DIFFUSION_FROM_PS, WINDOW * length / BLOCKS)
+    found = diffusion(np.array(frames.centres), step, window, BLOCKS)
+    table.append(
+        Mean(
+            "self-diffusion, in this box",
+            "1e-5 cm²/s",
+            found.value * CM2_PER_S * 1e5,
+            found.error * CM2_PER_S * 1e5,
+            BLOCKS,
+        )
+    )
+    return table, missing
+
+
+def _mean(quantity: str, unit: str, values: Sequence[float]) -> Mean:
+    return Mean(
+        quantity, unit, float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values))), len(values)
+    )
+
+
+def correlation_time(vectors: Floats, interval: float, order: int) -> float:
+    """τ_l of unit vectors (frames, n, 3); nan where C_l stays above 1/e in the window.
+
+    >>> turning = np.array([[[math.cos(t), math.sin(t), 0.0]] for t in np.linspace(0, 40, 2001)])
+    >>> math.isnan(correlation_time(np.ones((50, 1, 3)) / math.sqrt(3), 0.1, 1))
+    True
+    """
+    c = reorientation(vectors, order)[: max(int(WINDOW * len(vectors)), 2)]
+    if c.min() > FELL_TO:
+        return math.nan
+    # beyond where the correlation is lost in its noise there is nothing to add
+    last = int(np.argmax(c < 0.05)) or len(c)
+    inner = float(np.trapezoid(c[:last], dx=interval))
+    tail = c[last // 2 : last]
+    slope = (
+        -np.polyfit(interval * np.arange(len(tail)), np.log(np.clip(tail, 1e-3, None)), 1)[0] if len(tail) > 2 else 0.0
+    )
+    return inner + (float(c[last - 1]) / slope if slope > 0 else 0.0)
+
+
+def reorientation(vectors: Floats, order: int) -> Floats:
+    """C_l(t) (frames,) of unit vectors (frames, n, 3), averaged over vectors and starts; P_2(u·u') = 3/2 Σ Q Q', Q = uu - 1/3."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    if order == 1:
+        series, scale = vectors, 1.0
+    else:
+        series = (vectors[..., :, None] * vectors[..., None, :] - np.eye(3) / 3).reshape(*vectors.shape[:2], 9)
+        scale = 1.5
+    frames, bodies = series.shape[:2]
+    size = next_fast_len(2 * frames)
+    power = sum(np.sum(np.abs(rfft(series[..., k], size, axis=0)) ** 2, axis=1) for k in range(series.shape[-1]))
+    sums = irfft(power, size)[:frames]
+    return np.asarray(scale * sums / ((frames - np.arange(frames)) * bodies))
