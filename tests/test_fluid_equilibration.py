@@ -30,7 +30,7 @@ def test_stationary_rows_are_told_from_drifting_and_from_cold_ones():
     )  # five comparisons at 2.5 standard errors: 94 % of good ones
     assert not any(is_stationary(rows + np.linspace(12, 0, 500)[:, None] * [1, 0, 0], 300.0) for rows in settled)
     assert not any(
-        is_stationary([*rows, 0, 0, -15.0], 300.0) for rows in settled
+        is_stationary(rows + np.array([0, 0, -15.0]), 300.0) for rows in settled
     )  # rotation colder than the thermostat
     assert not is_stationary(settled[0][:40], 300.0)  # too few independent rows
     atoms = [np.column_stack([rows[:, :2], np.full(500, np.nan)]) for rows in settled]
