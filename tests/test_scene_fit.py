@@ -85,7 +85,7 @@ BAD = [
     ),
     (EmissionScene(molecules=[]), "molecules: expected one molecule or more"),
     (EmissionScene(molecules=[EmittingMolecule(source="nonesuch")]), "molecules[0]: molecule.source: 'nonesuch'"),
-    (EmissionScene(molecules=[EmittingMolecule(source="CO")]), "conditions.range, conditions.band: give one of them"),
+    (EmissionScene(molecules=[EmittingMolecule(source="CO")]), "conditions.range: expected a range or a band"),
     (
         EmissionScene(molecules=[EmittingMolecule(source="CO")], conditions=EmissionConditions(band="ALMA3", filling=2.0)),
         "conditions.filling = 2.0",

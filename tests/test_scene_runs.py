@@ -381,7 +381,7 @@ LOADED = {  # of HEAVY, what a kind has a use for
     "gas": {"rotor.classical", "rotor.classical.gas", "numba"},
     "align": {"rotor.alignment", "numba"},
     "emission": {"rotor.spectra", "rotor.spectra.emission"},
-    "fit": {"rotor.fitting"},
+    "fit": {"rotor.fitting", "rotor.spectra"},
     "fluid": {"rotor.fluids", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
 }  # fmt: skip
 OCS = 'molecule = "OCS"\n'

@@ -73,7 +73,7 @@ OPTIONS = [
     (["stark", "OCS", "--field", "1kV/cm", "--states", "101"], "--states: states up to J = 101"),
     (["stark", "OCS", "--field", "1kV/cm", "--intensity", "-1 W/cm2"], "--intensity: -1 W/cm²"),
     (["stark", "OCS", "--field", "1e9kV/cm"], "--field: a field of 1e+09 kV/cm"),
-    (["zeeman", "HC3N", "--field", "1T", "--g", "nan"], "--g: nan: expected finite numbers"),
+    (["zeeman", "HC3N", "--field", "1T", "--g", "nan"], "--g: 'nan' is not a number"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--m", "3"], "--m: 3 belongs to one state"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--state", "k=1"], "--state: {'k': 1}"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--until", "1e300"], "--until: 1e+300 ps"),

@@ -18,13 +18,15 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.requests.field import REQUIRED, declared
+from rotor.requests.readers import Custom, Numbers, Quantity
 
 Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]
@@ -39,6 +41,44 @@ RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
 RAD_PER_PS_MHZ = 2 * math.pi * 1e-6
 GAUSSIAN_REACH = 3.5  # widths on either side of the middle; the intensity there is 2e-15 of the peak
 FIELD_REACH = 3.0  # of a field, not an intensity: exp(-4 ln2 · 9) = 1.5e-11
+
+
+_AXES = {"z": (0, 0, 1), "x": (1, 0, 0), "y": (0, 1, 0), "circular": (1, 1j, 0)}
+
+
+def read_axis(given: Any) -> Axis:
+    """The unit vector of polarization that a word, or real and imaginary parts of its components, mean.
+
+    >>> read_axis("circular")[0].real == 2**-0.5
+    True
+    """
+    if isinstance(given, str):
+        word, _, ratio = given.strip().lower().partition(":")
+        if word in _AXES and not ratio:
+            return polarization(_AXES[word])
+        if word == "elliptical":
+            try:
+                return elliptical(float(ratio))
+            except ValueError:
+                pass
+        raise ValueError(f"{given!r}: expected z, x, y, circular, or elliptical:R with R of 0 or more")
+    if len(given) != 3 or any(len(parts) != 2 for parts in given):
+        raise ValueError(f"{given}: expected real and imaginary parts of three components")
+    x, y, z = (complex(*parts) for parts in given)
+    if abs(abs(x) ** 2 + abs(y) ** 2 + abs(z) ** 2 - 1.0) > 1e-12:
+        raise ValueError(f"{given}: expected a unit vector")
+    return x, y, z
+
+
+def write_axis(axis: Axis) -> str | list[list[float]]:
+    """What `read_axis` makes the same vector of."""
+    return "z" if axis == Z_AXIS else [[complex(x).real, complex(x).imag] for x in axis]
+
+
+def axis_field() -> Any:
+    """The field of the polarization of a pulse of light."""
+    reader = Custom(read_axis, write_axis, "NAME", str | list[list[float]])
+    return declared(Z_AXIS, reader, "z, x, y, circular, elliptical:R, or parts of a unit vector", "axis", typed="z")
 
 
 class Pulse(ABC):
@@ -129,10 +169,14 @@ class GaussianPulse(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    peak_w_per_cm2: float
-    fwhm_ps: float
-    centre_ps: float = 0.0
-    axis: Axis = Z_AXIS
+    peak_w_per_cm2: float = declared(
+        REQUIRED, Quantity("W/cm2"), "Peak intensity (W/cm2)", "peak", example="1e13 W/cm2"
+    )
+    fwhm_ps: float = declared(
+        REQUIRED, Quantity("ps"), "Full width at half maximum of the intensity (ps)", "fwhm", example="1 ps"
+    )
+    centre_ps: float = declared(0.0, Quantity("ps"), "Time of the peak (ps)", "centre")
+    axis: Axis = axis_field()
 
     def __post_init__(self) -> None:
         checked_intensity(self.peak_w_per_cm2)
@@ -160,12 +204,14 @@ class SwitchedPulse(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    peak_w_per_cm2: float
-    rise_ps: float
-    plateau_ps: float
-    fall_ps: float
-    start_ps: float = 0.0
-    axis: Axis = Z_AXIS
+    peak_w_per_cm2: float = declared(
+        REQUIRED, Quantity("W/cm2"), "Peak intensity (W/cm2)", "peak", example="1e12 W/cm2"
+    )
+    rise_ps: float = declared(REQUIRED, Quantity("ps"), "Rise (ps)", "rise", example="1 ps")
+    plateau_ps: float = declared(REQUIRED, Quantity("ps"), "Plateau (ps)", "plateau", example="10 ps")
+    fall_ps: float = declared(REQUIRED, Quantity("ps"), "Fall (ps)", "fall", example="1 ps")
+    start_ps: float = declared(0.0, Quantity("ps"), "Where it begins (ps)", "start")
+    axis: Axis = axis_field()
 
     def __post_init__(self) -> None:
         checked_intensity(self.peak_w_per_cm2)
@@ -202,9 +248,11 @@ class TabulatedPulse(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    times_ps: ArrayLike
-    intensities_w_per_cm2: ArrayLike
-    axis: Axis = Z_AXIS
+    times_ps: ArrayLike = declared(REQUIRED, Numbers("ps"), "Times (ps)", "times", example=[0.0, 1.0])
+    intensities_w_per_cm2: ArrayLike = declared(
+        REQUIRED, Numbers("W/cm2"), "Intensities (W/cm2)", "intensities", example=[0.0, 1e12]
+    )
+    axis: Axis = axis_field()
 
     def __post_init__(self) -> None:
         times, values = (np.array(a, dtype=np.float64) for a in (self.times_ps, self.intensities_w_per_cm2))
@@ -253,9 +301,9 @@ class Kick(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    fluence_j_per_cm2: float
-    time_ps: float = 0.0
-    axis: Axis = Z_AXIS
+    fluence_j_per_cm2: float = declared(REQUIRED, Quantity("J/cm2"), "Fluence (J/cm2)", "fluence", example="0.1 J/cm2")
+    time_ps: float = declared(0.0, Quantity("ps"), "Time (ps)", "time")
+    axis: Axis = axis_field()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fluence_j_per_cm2) and self.fluence_j_per_cm2 >= 0):
@@ -293,11 +341,11 @@ class DipolePulse(Pulse):
 
     acts_on: ClassVar[str] = "dipole"
 
-    peak_kv_per_cm: float
-    fwhm_ps: float
-    frequency_thz: float = 0.0
-    phase_rad: float = 0.0
-    centre_ps: float = 0.0
+    peak_kv_per_cm: float = declared(REQUIRED, Quantity("kV/cm"), "Peak field (kV/cm)", "peak", example="100 kV/cm")
+    fwhm_ps: float = declared(REQUIRED, Quantity("ps"), "Full width of the envelope (ps)", "fwhm", example="1 ps")
+    frequency_thz: float = declared(0.0, Quantity("THz"), "Frequency (THz)", "frequency")
+    phase_rad: float = declared(0.0, Quantity(), "Phase (rad)", "phase")
+    centre_ps: float = declared(0.0, Quantity("ps"), "Middle of the envelope (ps)", "centre")
     axis: Axis = Z_AXIS
     shape: Callable[[Floats], Floats] | None = None
 
@@ -330,3 +378,12 @@ class DipolePulse(Pulse):
         envelope = np.exp(-4 * math.log(2) * (late / self.fwhm_ps) ** 2)
         field = self.peak_kv_per_cm * envelope * np.cos(2 * math.pi * self.frequency_thz * late + self.phase_rad)
         return np.asarray(RAD_PER_PS_MHZ * units.MHZ_PER_DEBYE_KV_PER_CM * field)
+
+
+SHAPES: dict[str, type[Pulse]] = {
+    "gaussian": GaussianPulse,
+    "switched": SwitchedPulse,
+    "kick": Kick,
+    "table": TabulatedPulse,
+    "thz": DipolePulse,
+}  # by the word that names them in scenes

@@ -13,9 +13,10 @@ from rotor.alignment.acting import acted_on, revival_period_ps
 from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
 from rotor.alignment.pulse import Pulse
 from rotor.arrays import Floats
-from rotor.checks import require_between, require_whole
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Names, Pairs, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 from rotor.units import MOST_POINTS
@@ -40,28 +41,48 @@ class AlignRequest:
 
     top: Top
     pulses: tuple[Pulse, ...]
-    temperature_k: float = 1.0
-    state: Mapping[str, int] | None = None
-    m: int | None = None
-    from_ps: float | None = None
-    until_ps: float | None = None
-    points: int = DEFAULT_POINTS
-    observables: tuple[str, ...] = ("cos2theta",)
-    tolerance: float = DEFAULT_TOLERANCE
-    jmax: int | None = None
-    classical_molecules: int = 0
-    seed: int = 1
+    temperature_k: float = declared(
+        1.0,
+        Quantity("K", least=0, metavar="T"),
+        "Temperature (K); 0 is the lowest level",
+        "conditions.temperature",
+        common=True,
+    )
+    state: Mapping[str, int] | None = declared(
+        None, Pairs(int, "name", "j=1,ka=0,kc=1", lower=True), "One level instead of a temperature, such as j=0 or j=1,ka=0,kc=1",
+        "conditions.state", common=True, example={"j": 1, "ka": 0, "kc": 1},
+    )  # fmt: skip
+    m: int | None = declared(None, Whole(), "|M| of that level; by default all alike", "conditions.m", example=0)
+    from_ps: float | None = declared(
+        None, Quantity("ps", metavar="T"), "First time (ps); by default where the pulses begin", "conditions.first_time", option="--from",
+        example="-1 ps",
+    )  # fmt: skip
+    until_ps: float | None = declared(
+        None, Quantity("ps", metavar="T"), "Last time (ps); by default one revival after the pulses, or 100 ps", "conditions.last_time",
+        option="--until", common=True, example="100 ps",
+    )  # fmt: skip
+    points: int = declared(DEFAULT_POINTS, Whole(2, MOST_POINTS), "How many times", "conditions.points")
+    observables: tuple[str, ...] = declared(
+        ("cos2theta",), Names(), "cos2theta, costheta, cos2theta_2d, cos2_aZ, cos_bX, ...; repeatable", "observables.cosines",
+        option="--observable", common=True, example=["cos2theta"],
+    )  # fmt: skip
+    tolerance: float = declared(
+        DEFAULT_TOLERANCE, Quantity(above=1e-12, below=0.1), "Of the cosines: steps, J max and populations follow from it",
+        "numerics.tolerance",
+    )  # fmt: skip
+    jmax: int | None = declared(
+        None, Whole(2), "Highest J of the basis; by default what the tolerance needs", "numerics.jmax", example=30
+    )
+    classical_molecules: int = declared(
+        0, Whole(0), "Also a classical gas of so many molecules under the same pulses", "observables.classical_molecules",
+        option="--classical",
+    )  # fmt: skip
+    seed: int = declared(1, Whole(0), "Of the classical gas", "numerics.seed")
 
     def __post_init__(self) -> None:
         if not self.pulses:
             raise ValueError("no pulse: give at least one")
-        if not (np.isfinite(self.temperature_k) and self.temperature_k >= 0):
-            raise ValueError(f"temperature_k: {self.temperature_k}: expected a finite number of 0 or more")
-        require_whole("points", self.points, 2, MOST_POINTS)
-        require_whole("jmax", self.jmax, 2)
-        require_whole("classical_molecules", self.classical_molecules, 0)
-        require_whole("seed", self.seed, 0)
-        require_between("tolerance", self.tolerance, 1e-12, 0.1)
+        check_fields(self)
         for pulse in self.pulses:
             acted_on(self.top, pulse.acts_on)
         first, last = self.ends_ps

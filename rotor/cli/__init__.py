@@ -50,6 +50,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "accuracy": "What accuracy costs in a scene: errors and times.",
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
+OTHERWISE = {"emission": "rotor.cli.shared.observed_verb"}  # verbs with options of the command line alone
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -112,6 +113,9 @@ def _command(name: str) -> tuple[Any, Any, str]:
     from rotor.cli.shared.runner import run_verb
     from rotor.verbs.verb import verb_of
 
+    if name in OTHERWISE:
+        module = import_module(OTHERWISE[name])
+        return command_of(module.VERB, module.run), PanelCommand, module.VERB.examples
     verb = verb_of(name)
     return command_of(verb, run_verb), PanelCommand, verb.examples
 

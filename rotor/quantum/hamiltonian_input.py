@@ -76,16 +76,29 @@ def _refuse_method_alone(given: HamiltonianInput, subject: Any) -> None:
 
 
 def effects_of_each(given: HamiltonianInput, subject: Any) -> Any:
-    """The Hamiltonian of each of several tops: those with constants of spins are split, and a note names the others."""
+    """The Hamiltonian of each of several molecules: tops with constants of spins are split, and a note names the others.
+
+    What is no top, such as the lines of a catalogue, has none.
+    """
+    from rotor.tops.top import Top
+
     _refuse_method_alone(given, subject)
-    tops: Sequence[Top] = subject.values["tops"]
-    known, asked = [top.spin_constants is not None for top in tops], takes_spins(given.hyperfine, subject)
-    if not asked or not any(known) or all(known):
-        return tuple(effects_of_top(given, top, asked) for top in tops)
-    unsplit = ", ".join(top.name or f"molecule {number}" for number, top in enumerate(tops, 1) if not known[number - 1])
-    subject.note(f"hyperfine: no constants of spins are known of {unsplit}, whose lines are not split")
+    molecules: Sequence[Any] = subject.values["molecules"]
+    tops = [one for one in molecules if isinstance(one, Top)]
+    known, wanted = [one for one in tops if one.spin_constants is not None], takes_spins(given.hyperfine, subject)
+    mixed = wanted and 0 < len(known) < len(tops)
+    if mixed:
+        unsplit = ", ".join(one.name or "a molecule" for one in tops if one.spin_constants is None)
+        subject.note(f"--hyperfine: no constants of spins are known of {unsplit}, whose lines are not split")
     plain = HamiltonianInput(distortion=given.distortion)
-    return tuple(effects_of_top(given if split else plain, top, split) for top, split in zip(tops, known, strict=True))
+
+    def effects(one: Any) -> tuple[QuantumEffect, ...]:
+        if not isinstance(one, Top):
+            return ()
+        split = wanted and not (mixed and one.spin_constants is None)
+        return effects_of_top(given if split else plain, one, split)
+
+    return tuple(map(effects, molecules))
 
 
 def saved_effects(effects: Iterable[QuantumEffect], request: Any) -> HamiltonianInput:
@@ -94,6 +107,20 @@ def saved_effects(effects: Iterable[QuantumEffect], request: Any) -> Hamiltonian
     Raises ValueError for effects that have no name here.
     """
     return saved_of_top(effects, request.top)
+
+
+def saved_of_each(effects: Sequence[Iterable[QuantumEffect]], request: Any) -> HamiltonianInput:
+    """What asks for the effects of several molecules again."""
+    from rotor.tops.top import Top
+
+    pairs = [(each, one) for each, one in zip(effects, request.molecules, strict=False) if isinstance(one, Top)]
+    saved = [saved_of_top(each, one) for each, one in pairs]
+    return next((one for one in saved if one.hyperfine is not None), HamiltonianInput())
+
+
+def effects_of_each_field() -> Any:
+    """The field `effects` of a request of several molecules."""
+    return part(HamiltonianInput, effects_of_each, saved_of_each, ())
 
 
 def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput:

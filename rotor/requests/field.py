@@ -12,7 +12,7 @@ of the request, the names in errors, and the reference page. A field that severa
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from dataclasses import field as dataclass_field
 from functools import cache
 from typing import Any
@@ -27,6 +27,7 @@ _PANEL_OF_TABLE = {
     "numerics": NUMERICS, "outputs": OUTPUT,
 }  # fmt: skip
 _DECLARED, _PART = "declared", "part"
+REQUIRED: Any = MISSING  # the default of a field that must be given
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +136,8 @@ class Part:
 def declared(default: Any, reader: Reader, help: str, key: str = "", **more: Any) -> Any:
     """A field of a dataclass with its declaration."""
     metadata = {_DECLARED: Field(reader, help, key, default=default, **more)}
+    if default is REQUIRED:
+        return dataclass_field(metadata=metadata)
     if isinstance(default, list | dict):
         return dataclass_field(default_factory=lambda: default, metadata=metadata)
     return dataclass_field(default=default, metadata=metadata)
@@ -144,7 +147,12 @@ def part(
     inputs: type, make: Callable[[Any, Any], Any], split: Callable[[Any, Any], Any], default: Any = None, **more: Any
 ) -> Any:
     """A field of a dataclass that several declared values make; default: of the field."""
-    return dataclass_field(default=default, metadata={_PART: Part(inputs, make, split, **more)})
+    metadata = {_PART: Part(inputs, make, split, **more)}
+    return (
+        dataclass_field(metadata=metadata)
+        if default is REQUIRED
+        else dataclass_field(default=default, metadata=metadata)
+    )
 
 
 def identical(value: Any, _: Any) -> Any:

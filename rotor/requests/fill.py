@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from rotor.requests.field import Field, Part, all_fields, names_of, own_fields, parts_of
+from rotor.requests.field import REQUIRED, Field, Part, all_fields, names_of, own_fields, parts_of
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,9 @@ def _make(part: Part, given: Given, subject: Any) -> Any:
 
 def read_instance(structure: Any, given: Given, subject: Any = None) -> Any:
     """An instance of a dataclass whose fields are all declared."""
+    missing = [one for one in own_fields(structure).values() if one.default is REQUIRED and not given.has(one)]
+    if missing:
+        raise ValueError(f"the key {missing[0].called(given.style)!r} is missing")
     with called(structure, given.style):
         return structure(**read_fields(structure, given, subject))
 

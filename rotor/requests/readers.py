@@ -355,3 +355,28 @@ def whole_range(text: str) -> tuple[int, int]:
     if first > last:
         raise ValueError(f"{text!r}: expected a range that rises, but {first} is above {last}")
     return first, last
+
+
+@dataclass(frozen=True)
+class Each(Quantity):
+    """Numbers with a unit, one for all or one for each of several things, between commas; a scene holds one for all."""
+
+    def read(self, given: Any) -> Any:
+        """The numbers in `unit`."""
+        if isinstance(given, list | tuple):
+            return tuple(super(Each, self).read(one) for one in given)
+        parts = given.split(",") if isinstance(given, str) else [given]
+        return tuple(super(Each, self).read(one) for one in parts)
+
+    def check(self, value: Any, given: Any = None) -> None:
+        """ValueError for a number out of bounds."""
+        for one in value if isinstance(value, tuple) else (value,):
+            super().check(one, given)
+
+    def write(self, value: Any) -> Any:
+        """The first of them with its unit."""
+        return super().write(value[0])
+
+    def show(self, value: Any) -> str:
+        """The first of them with its unit."""
+        return super().show(value[0])

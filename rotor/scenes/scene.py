@@ -17,20 +17,11 @@ from msgspec import Struct, field
 from rotor.scenes.effect_sections import EffectSection
 from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import (
-    AlignConditions,
-    AlignNumerics,
-    AlignObservables,
     BodySection,
-    EmissionConditions,
-    EmissionObservables,
-    EmissionOutputs,
-    EmittingMolecule,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
     MoleculeSection,
-    PulseSection,
-    QuantumEffects,
     TableOutputs,
     TumbleConditions,
     TumbleNumerics,
@@ -116,18 +107,6 @@ class FluidScene(Scene, frozen=True, tag="fluid"):
     outputs: FluidOutputs = FluidOutputs()
 
 
-class AlignScene(Scene, frozen=True, tag="align"):
-    """Molecules aligned or oriented by pulses."""
-
-    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
-    pulses: Annotated[list[PulseSection], said("one or more; shape is gaussian, switched, kick, table or thz")]
-    accuracy: Annotated[str | float | None, said("of the cosines", 1e-4)] = None
-    conditions: AlignConditions = AlignConditions()
-    observables: AlignObservables = AlignObservables()
-    numerics: AlignNumerics = AlignNumerics()
-    outputs: TableOutputs = TableOutputs()
-
-
 class FitScene(Scene, frozen=True, tag="fit"):
     """Constants fitted to measured lines."""
 
@@ -140,22 +119,10 @@ class FitScene(Scene, frozen=True, tag="fit"):
     outputs: FitOutputs = FitOutputs()
 
 
-class EmissionScene(Scene, frozen=True, tag="emission"):
-    """Lines of a source of several molecules, as a radio telescope sees them."""
-
-    molecules: Annotated[list[EmittingMolecule], said("one or more")]
-    effects: QuantumEffects = QuantumEffects()
-    conditions: EmissionConditions = EmissionConditions()
-    observables: EmissionObservables = EmissionObservables()
-    outputs: EmissionOutputs = EmissionOutputs()
-
-
 _WRITTEN: Mapping[str, type[Scene]] = {
     "tumble": TumbleScene,
     "fluid": FluidScene,
-    "align": AlignScene,
     "fit": FitScene,
-    "emission": EmissionScene,
 }
 
 

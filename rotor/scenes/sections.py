@@ -132,128 +132,16 @@ class FieldEffects(Section, frozen=True):
     hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
 
 
-class GaussianSection(Section, frozen=True, tag="gaussian", tag_field="shape"):
-    """A Gaussian pulse."""
-
-    peak: Annotated[Quantity, said("peak intensity (W/cm2)")]
-    fwhm: Annotated[Quantity, said("full width at half maximum of the intensity (ps)")]
-    centre: Annotated[Quantity, said("time of the peak (ps)")] = 0.0
-    axis: Annotated[str | list[list[float]], said("z, x, y, circular, elliptical:R, or parts of a unit vector")] = "z"
-
-
-class SwitchedSection(Section, frozen=True, tag="switched", tag_field="shape"):
-    """A pulse that is switched on and off."""
-
-    peak: Annotated[Quantity, said("peak intensity (W/cm2)")]
-    rise: Annotated[Quantity, said("(ps)")]
-    plateau: Annotated[Quantity, said("(ps)")]
-    fall: Annotated[Quantity, said("(ps)")]
-    start: Annotated[Quantity, said("(ps)")] = 0.0
-    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
-
-
-class KickSection(Section, frozen=True, tag="kick", tag_field="shape"):
-    """A pulse without duration."""
-
-    fluence: Annotated[Quantity, said("(J/cm2)")]
-    time: Annotated[Quantity, said("(ps)")] = 0.0
-    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
-
-
-class TableSection(Section, frozen=True, tag="table", tag_field="shape"):
-    """A pulse given by points."""
-
-    times: Annotated[list[float], said("(ps)")]
-    intensities: Annotated[list[float], said("(W/cm2)")]
-    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
-
-
-class FieldPulseSection(Section, frozen=True, tag="thz", tag_field="shape"):
-    """A field on the permanent dipole."""
-
-    peak: Annotated[Quantity, said("(kV/cm)")]
-    fwhm: Annotated[Quantity, said("of the envelope (ps)")]
-    frequency: Annotated[Quantity, said("(THz)")] = 0.0
-    phase: Annotated[float, said("(rad)")] = 0.0
-    centre: Annotated[Quantity, said("(ps)")] = 0.0
-
-
-PulseSection = GaussianSection | SwitchedSection | KickSection | TableSection | FieldPulseSection
-
-
-class AlignConditions(Section, frozen=True):
-    """The gas, or one level, and the times."""
-
-    temperature: Annotated[Quantity, said("of the gas, 0 for its lowest level (K)")] = "1 K"
-    state: Annotated[dict[str, int] | None, said("one level instead", {"j": 1, "ka": 0, "kc": 1})] = None
-    m: Annotated[int | None, said("|M| of that level; by default all alike", 0)] = None
-    first_time: Annotated[Quantity | None, said("by default where the pulses begin (ps)", "-1 ps")] = None
-    last_time: Annotated[Quantity | None, said("by default one revival after the pulses, or 100 ps (ps)", "100 ps")] = (
-        None
-    )
-    points: Annotated[int, said("how many times")] = 2001
-
-
-class AlignObservables(Section, frozen=True):
-    """Which cosines."""
-
-    cosines: Annotated[list[str], said("costheta, cos2theta, cos2theta_2d, cos_aZ, cos2_bX, ...")] = field(
-        default_factory=lambda: ["cos2theta"]
-    )
-    classical_molecules: Annotated[int, said("also a classical gas of so many under the same pulses")] = 0
-
-
-class AlignNumerics(Section, frozen=True):
-    """Knobs."""
-
-    tolerance: Annotated[float, said("of the cosines: steps, J max and populations follow from it")] = 1e-6
-    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
-    seed: Annotated[int, said("of the classical gas")] = 1
-
-
-class EmittingMolecule(MoleculeSection, frozen=True):  # type: ignore[misc,call-arg]
-    """A molecule of the source; either `source` or `constants`."""
-
-    column: Annotated[float, said("molecules in the line of sight (1/cm²)")] = 1e14
-    excitation: Annotated[Quantity | None, said("instead of that of the conditions (K)", "50 K")] = None
-    velocity: Annotated[float | None, said("likewise (km/s)", 5.6)] = None
-    width: Annotated[float | None, said("likewise (km/s)", 2.0)] = None
-    partition: Annotated[str | None, said("Q(T) of a .cat file: a catdir.cat or T=Q pairs", "300=108.87,75=27.46")] = (
-        None
-    )
-
-
-class EmissionConditions(Section, frozen=True):
-    """The source, and what of it is observed; range or band."""
-
-    excitation: Annotated[Quantity, said("excitation temperature of rotation (K)")] = "100 K"
-    background: Annotated[Quantity, said("temperature behind the source, as observed (K)")] = "2.725 K"
-    filling: Annotated[float, said("part of the beam that the source fills")] = 1.0
-    velocity: Annotated[float, said("receding positive, radio convention (km/s)")] = 0.0
-    redshift: Annotated[float, said("of the source; velocities count from there")] = 0.0
-    width: Annotated[float, said("full width of the lines at half maximum (km/s)")] = 1.0
-    range: Annotated[str | None, said("first and last frequency observed (MHz)", "86:116GHz")] = None
-    band: Annotated[str | None, said("a receiver's band instead: ALMA1 to ALMA10", "ALMA6")] = None
-
-
-class EmissionObservables(Section, frozen=True):
-    """Which lines."""
-
-    least_depth: Annotated[float, said("optical depth at the centre below which a line is left out")] = 1e-6
-
-
-class EmissionOutputs(Section, frozen=True):
-    """Files to write."""
-
-    csv: Annotated[str | None, said("the lines", "lines.csv")] = None
-    parquet: Annotated[str | None, said("the lines", "lines.parquet")] = None
-    json: Annotated[str | None, said("the lines", "lines.json")] = None
-    profile_csv: Annotated[str | None, said("T_B and optical depth on a grid", "profile.csv")] = None
-    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "emission.png")] = None
-
-
 def __getattr__(name: str) -> Any:
     """The structure of a table of a kind: `RamanConditions` is that of [conditions] of raman."""
+    if name == "EmittingMolecule":
+        from rotor.verbs.emission import emitting_molecule
+
+        return emitting_molecule()
+    if (shape := name.removesuffix("Section").lower()) in ("gaussian", "switched", "kick", "thz"):
+        from rotor.verbs.align import PULSES
+
+        return PULSES.structures[shape]
     from rotor.scenes.structures import tables_of
     from rotor.verbs.verb import SCENE_VERBS, verb_of
 

@@ -44,7 +44,7 @@ def scene_class(kind: str) -> Any:
 def tables_of(verb: Verb) -> dict[str, Any]:
     """The tables of a verb's scene, outputs last."""
     grouped: dict[str, list[Field]] = {}
-    taken = {name for name, _, _ in verb.subject.scene_fields()}
+    taken = {"molecule", *(name for name, _, _ in verb.subject.scene_fields())}
     for one in keyed(verb).values():
         if one.table.partition(".")[0] not in taken and one.table:
             grouped.setdefault(one.table, []).append(one)

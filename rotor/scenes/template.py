@@ -18,17 +18,9 @@ STARTS: dict[str, dict[str, Any]] = {
         "conditions.model": "spce", "conditions.molecules": 216, "conditions.ensemble": "langevin",
         "conditions.steps": 20_000, "outputs.csv": "fluid.csv", "outputs.checkpoint": "fluid.npz",
     },
-    "align": {
-        "molecule.source": "OCS", "pulses.shape": "gaussian", "pulses.peak": "1e13 W/cm2", "pulses.fwhm": "1 ps",
-        "conditions.temperature": "1 K", "outputs.csv": "align.csv",
-    },
     "fit": {
         "lines.source": "lines.csv", "molecule.source": "water", "parameters.free": ["A", "B", "C"],
         "outputs.csv": "fit.csv", "outputs.report": "out.fit",
-    },
-    "emission": {
-        "molecules.source": "CO", "molecules.column": 1e16, "conditions.excitation": "20 K",
-        "conditions.range": "115:116GHz", "outputs.csv": "emission.csv",
     },
 }  # fmt: skip  # what a template has switched on, by dotted name
 

@@ -16,13 +16,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.hamiltonian_input import effects_of_each_field
+from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, part
+from rotor.requests.readers import Custom, Each, Quantity, Range
 from rotor.spectra.emission import (
+    BACKGROUND_K,
     KM_PER_S,
     Emission,
     Source,
+    band_mhz,
     contrast_k,
     emission,
     peak_depth,
@@ -42,6 +46,88 @@ _ACROSS = np.linspace(-3.0, 3.0, 241)  # widths at half maximum: a Gaussian has 
 
 
 @dataclass(frozen=True)
+class LayerInput:
+    """The gas of a source, and what is behind it; what has several numbers is one for all molecules or one for each."""
+
+    column_per_cm2: tuple[float, ...] = declared(
+        (1e14,), Each("1/cm2", above=0, metavar="N"), "Column density, one for all or one each: 1e14,3e13 (1/cm²)", option="--column",
+        panel=CONDITIONS, common=True,
+    )  # fmt: skip
+    excitation_k: tuple[float, ...] = declared(
+        (100.0,), Each("K", above=0, metavar="T"), "Excitation temperature of rotation, one for all or one each (K)",
+        "conditions.excitation", common=True,
+    )  # fmt: skip
+    background_k: float = declared(
+        BACKGROUND_K, Quantity("K", least=0, metavar="T"), "Temperature behind the source, as observed (K)", "conditions.background",
+        common=True,
+    )  # fmt: skip
+    filling: float = declared(
+        1.0, Quantity(metavar="F"), "Part of the beam that the source fills", "conditions.filling"
+    )
+    velocity_km_s: tuple[float, ...] = declared(
+        (0.0,), Each("km/s", metavar="V"), "Velocity, one for all or one each; receding positive, radio convention (km/s)",
+        "conditions.velocity", common=True,
+    )  # fmt: skip
+    redshift: float = declared(
+        0.0, Quantity(metavar="Z"), "Redshift of the source; velocities count from there", "conditions.redshift"
+    )
+    fwhm_km_s: tuple[float, ...] = declared(
+        (1.0,), Each("km/s", metavar="W"), "Full width of the lines at half maximum, one for all or one each (km/s)", "conditions.width",
+        common=True,
+    )  # fmt: skip
+
+
+_OF_EACH = ("column_per_cm2", "excitation_k", "fwhm_km_s", "velocity_km_s")
+
+
+def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
+    """The source of each molecule of a subject, which has what some of them have otherwise in `values`."""
+    count, own = len(subject.values["molecules"]), subject.own
+    for name in _OF_EACH:
+        values = getattr(layer, name)
+        if len(values) not in (1, count):
+            raise ValueError(f"{name}: {len(values)} given for {count} molecules; expected one for all or one for each")
+
+    def value(name: str, number: int) -> float:
+        values = getattr(layer, name)
+        return float(own[number].get(name, values[number if len(values) > 1 else 0]))
+
+    shared = {"background_k": layer.background_k, "filling": layer.filling, "redshift": layer.redshift}
+    return tuple(Source(**{name: value(name, number) for name in _OF_EACH}, **shared) for number in range(count))
+
+
+def _saved_layer(sources: tuple[Source, ...], _: Any) -> LayerInput:
+    first = sources[0]
+    several = {name: (getattr(first, name),) for name in _OF_EACH}
+    return LayerInput(**several, background_k=first.background_k, filling=first.filling, redshift=first.redshift)
+
+
+@dataclass(frozen=True)
+class WindowInput:
+    """What is looked at: range or band."""
+
+    range_mhz: tuple[float, float] | None = declared(
+        None,
+        Range("MHz"),
+        "First and last frequency observed (MHz)",
+        "conditions.range",
+        common=True,
+        example="86:116GHz",
+    )
+    band: tuple[float, float] | None = declared(
+        None, Custom(band_mhz, metavar="NAME"), "A receiver's band instead of a range: ALMA1 to ALMA10", "conditions.band", common=True,
+        example="ALMA6",
+    )  # fmt: skip
+
+
+def _window(given: WindowInput, subject: Any) -> tuple[float, float]:
+    found = given.range_mhz or given.band
+    if found is None:
+        raise ValueError("range_mhz: expected a range or a band, such as 86:116GHz or ALMA3")
+    return found
+
+
+@dataclass(frozen=True)
 class EmissionRequest:
     """What is looked at; every field is checked when the request is made.
 
@@ -52,14 +138,18 @@ class EmissionRequest:
     """
 
     molecules: tuple[Top | CatalogueLines, ...]
-    sources: tuple[Source, ...]
-    range_mhz: tuple[float, float]
-    least_depth: float = LEAST_DEPTH
-    effects: tuple[tuple[QuantumEffect, ...], ...] = ()
+    sources: tuple[Source, ...] = part(LayerInput, _sources, _saved_layer, REQUIRED)
+    range_mhz: tuple[float, float] = part(
+        WindowInput, _window, lambda value, _: WindowInput(value), REQUIRED, single=True, why="give one of them"
+    )
+    least_depth: float = declared(
+        LEAST_DEPTH, Quantity(above=0), "Leave out lines of less optical depth", "observables.least_depth"
+    )
+    effects: tuple[tuple[QuantumEffect, ...], ...] = effects_of_each_field()
 
     def __post_init__(self) -> None:
         require_layer(self.sources, len(self.molecules))
-        require_positive("least_depth", self.least_depth)
+        check_fields(self)
         if self.effects and len(self.effects) != len(self.molecules):
             raise ValueError(
                 f"effects: {len(self.effects)} given for {len(self.molecules)} molecules; expected those of each"

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta, Struct
 
-from rotor.requests.field import Field
-from rotor.requests.readers import Flag, Names, Quantity, Text
+from rotor.requests.field import REQUIRED, Field
+from rotor.requests.readers import Each, Flag, Names, Quantity, Text
 from rotor.verbs.verb import Output
 
 
@@ -41,8 +41,13 @@ def section_class(table: str, inputs: tuple[Field, ...], owner: str = "") -> Any
     """The structure of a table; the same inputs have the same structure. owner: the kind of scene, for the name."""
     key = (table, inputs)
     if key not in _MADE:
-        _MADE[key] = _structure(table, [_entry(one) for one in inputs], owner)
+        _MADE[key] = _structure(table, entries_of(inputs), owner)
     return _MADE[key]
+
+
+def entries_of(inputs: tuple[Field, ...]) -> list[Any]:
+    """Name, type and default of every key of a table; keys that must be given have no default."""
+    return [_entry(one)[:2] if one.default is REQUIRED else _entry(one) for one in inputs]
 
 
 def _structure(table: str, entries: list[Any], owner: str) -> Any:
@@ -78,9 +83,11 @@ def _default(one: Field) -> Any:
         return one.typed
     if isinstance(one.reader, Names):
         return list(one.default)
+    if one.default is REQUIRED:
+        return one.example
     if one.default is None or isinstance(one.reader, Flag | Text):
         return one.default
-    if isinstance(one.default, tuple):  # a file that says nothing means the same
+    if isinstance(one.default, tuple) and not isinstance(one.reader, Each):  # a file that says nothing means the same
         return None
     if isinstance(one.reader, Quantity) and one.reader.unit:
         return one.reader.show(one.default)

@@ -38,12 +38,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks."""
+    """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks.
+    own: of several molecules, what each has otherwise than the others.
+    """
 
     values: Mapping[str, Any] = field(default_factory=dict)
     molecules: tuple[Any, ...] = ()
     text: str = ""
     note: Note = silent
+    own: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def top(self) -> Any:

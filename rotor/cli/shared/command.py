@@ -179,7 +179,7 @@ class PanelCommand(PlainCommand):
             )
             if record is not None and (every or not panel.startswith("+")):
                 panels.setdefault(panel.lstrip("+"), []).append(record)
-        for panel in ("Arguments", *PANELS, "Help"):
+        for panel in ("Arguments", *PANELS, *sorted(panels.keys() - {"Arguments", *PANELS, "Help"}), "Help"):
             if panel in panels:
                 with formatter.section(panel):
                     formatter.write_dl(panels[panel])

@@ -118,7 +118,7 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
 
         def flat(context: typer.Context, **values: Any) -> None:
             made = {
-                name: group(**{one.name: _value(one, types[name][one.name], values[one.name]) for one in chosen[name]})
+                name: group(**{one.name: value_of(one, types[name][one.name], values[one.name]) for one in chosen[name]})
                 for name, group in groups.items()
             }
             refuse_overwriting(list(made.values()))
@@ -178,7 +178,7 @@ def _folded_line(line: str, width: int) -> str:
     return "\n".join([*rows, row])
 
 
-def _value(one: Field[Any], kind: Any, given: Any) -> Any:
+def value_of(one: Field[Any], kind: Any, given: Any) -> Any:
     """The value of a field from what stands on the command line: text, whole or decimal number, truth, or texts."""
     kinds = get_args(kind) or (kind,)
     if given is None and kinds == (str,):

@@ -1,0 +1,300 @@
+"""`align`: molecules aligned or oriented by pulses, quantum and classical."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+
+from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
+from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
+from rotor.reports import top_facts
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
+from rotor.requests.fill import Given, read_fields
+from rotor.table import counted
+from rotor.verbs.choices import Choices
+from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.tables import said
+from rotor.verbs.verb import PICTURES, Extra, Output, Place, Report, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace
+    from rotor.tops.top import Top
+
+PULSES = Choices("pulses", "shape", SHAPES)
+_TEXTS = {
+    "--pulse": ("gaussian", ("peak", "fwhm", "centre")),
+    "--switched": ("switched", ("peak", "rise", "plateau", "fall", "start")),
+    "--kick": ("kick", ("fluence", "time")),
+    "--thz": ("thz", ("peak", "fwhm", "frequency", "centre")),
+}  # by option, the shape and its keys in order
+
+EXAMPLES = """\b
+Examples:
+  rotor align OCS --pulse "1e13 W/cm2, 1 ps" --temperature 1 --until 200ps --plot ocs.png --csv ocs.csv
+  rotor align --constants "B=6081.492 MHz" --anisotropy 4.04 --pulse "1e13 W/cm2, 50 fs"
+  rotor align N2 --pulse "3e13 W/cm2, 0.1 ps" --pulse "3e13 W/cm2, 0.1 ps, 8.38 ps" --temperature 300 --classical 20000
+  rotor align OCS --thz "500 kV/cm, 1 ps, 0.3 THz" --observable costheta"""
+
+
+class PulsedMolecule(OneMolecule):
+    """A molecule and the pulses that act on it."""
+
+    tables_read = ("pulses",)
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """The molecule and the list of pulses."""
+        about = said("one or more; shape is gaussian, switched, kick, table or thz")
+        one: Any = PULSES.scene_type
+        return [*super().scene_fields(), ("pulses", Annotated[list[one], about], msgspec.NODEFAULT)]
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The top with what the pulses act on, and the pulses."""
+        pulses = given.values.get("pulses", ())
+        if given.style == "key":
+            pulses = PULSES.read(pulses)
+        with_pulses = Given({**given.values, "pulses": pulses}, given.style)
+        subject = super().read(with_pulses, place, verb)
+        return Subject({**subject.values, "pulses": pulses}, subject.molecules, subject.text, subject.note)
+
+    def saved(self, request: AlignRequest, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The molecule and the tables of the pulses."""
+        return {**super().saved(request, subject, folder), "pulses": saved_pulses(request.pulses)}
+
+
+def saved_pulses(pulses: tuple[Pulse, ...]) -> list[dict[str, Any]]:
+    """The tables of pulses; ValueError for one whose shape is a function, or whose field is not along Z."""
+    for pulse in pulses:
+        if getattr(pulse, "shape", None) is not None or (pulse.acts_on == "dipole" and pulse.axis != (0, 0, 1)):
+            raise ValueError(f"a scene holds no {type(pulse).__name__} of this form")
+    return PULSES.write(pulses)
+
+
+def prepare(top: Top, reading: Reading, given: Given) -> Top:
+    """The top with what the pulses act on."""
+    acts_on = {pulse.acts_on for pulse in given.values["pulses"]}
+    if "dipole" in acts_on:
+        top = with_some_dipole(top, reading)
+    return with_known_polarizability(top, reading) if "polarizability" in acts_on else top
+
+
+def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
+    """All pulses of the options.
+
+    Raises ValueError, which names the option, for a text that is none, and where there is none at all.
+    """
+    axis = _named("--polarization", lambda: read_axis(typed.get("--polarization", "z")))
+    pulses = [
+        _named(option, lambda t=text, o=option: _of_text(t, o, axis))
+        for option in _TEXTS
+        for text in typed.get(option, ())
+    ]
+    if "--pulse-table" in typed:
+        pulses.append(_named("--pulse-table", lambda: _of_table(typed["--pulse-table"], axis)))
+    if not pulses:
+        raise ValueError('no pulse: give --pulse "1e13 W/cm2, 1 ps", --switched, --kick, --pulse-table or --thz')
+    return {"pulses": tuple(pulses)}
+
+
+def _named(option: str, make: Any) -> Any:
+    try:
+        return make()
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def _of_text(text: str, option: str, axis: Axis) -> Pulse:
+    """A pulse of numbers between commas."""
+    shape, keys = _TEXTS[option]
+    fields: dict[str, Any] = {one.key: one for one in all_fields(SHAPES[shape]).values()}
+    parts = [part.strip() for part in text.split(",")]
+    least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
+    if not least <= len(parts) <= len(keys):
+        count = f"{least}" if least == len(keys) else f"{least} to {len(keys)}"
+        raise ValueError(
+            f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
+        )
+    values = {fields[key].name: fields[key].reader.read(part) for key, part in zip(keys, parts, strict=False)}
+    made: Any = SHAPES[shape]
+    pulse: Pulse = made(**values) if shape == "thz" else made(**values, axis=axis)
+    return pulse
+
+
+def _of_table(path: str, axis: Axis) -> Pulse:
+    import numpy as np
+
+    from rotor.alignment.pulse import TabulatedPulse
+
+    names, rows = _rows(path)
+    columns = ("t_ps", "intensity_w_per_cm2")
+    if not set(columns) <= set(names):
+        raise ValueError(f"{path}: expected the columns {', '.join(columns)}; found {', '.join(names)}")
+    table = np.array(rows).reshape(len(rows), len(names))
+    return TabulatedPulse(table[:, names.index(columns[0])], table[:, names.index(columns[1])], axis)
+
+
+def _rows(path: str) -> tuple[list[str], list[list[float]]]:
+    import csv
+
+    with open(path, newline="", encoding="utf-8-sig") as handle:
+        lines = [line for line in csv.reader(handle) if line and not line[0].startswith("#")]
+    if not lines:
+        raise ValueError(f"{path}: the file is empty; expected the columns t_ps and intensity_w_per_cm2")
+    names = [name.strip() for name in lines[0]]
+    try:
+        rows = [[float(cell) for cell in line] for line in lines[1:]]
+    except ValueError as error:
+        raise ValueError(f"{path}: expected numbers in every row after the first ({error})") from None
+    if any(len(row) != len(names) for row in rows):
+        raise ValueError(f"{path}: expected {len(names)} numbers in every row, as many as there are columns")
+    return names, rows
+
+
+def build(verb: Verb, given: Given, subject: Subject) -> AlignRequest:
+    """The request of a top and its pulses."""
+    values = read_fields(AlignRequest, given, subject)
+    if values.get("state") is not None and values.get("classical_molecules"):
+        subject.note("the classical gas is at the temperature of --temperature, not in the level of --state")
+    return AlignRequest(**subject.values, **values)
+
+
+def draw(answer: AlignAnswer, path: Path, report: Report) -> None:
+    """The picture of the cosines as a file."""
+    from rotor.plots.alignment import plot_alignment
+    from rotor.plots.picture import name_of_top
+
+    trace, view = answer.trace, report.view
+    title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
+    plot_alignment(trace, path, classical=answer.classical, title=title, view=view, provenance=report.command)
+
+
+def _ensemble_text(trace: AlignmentTrace) -> str:
+    ensemble = trace.ensemble
+    if ensemble.chosen is None:
+        return f"{ensemble.temperature_k:g} K, {trace.states} states up to J = {ensemble.jmax}"
+    level = ", ".join(f"{name} = {value}" for name, value in ensemble.chosen.items())
+    return f"level {level}, " + ("all M" if ensemble.m is None else f"|M| = {ensemble.m}")
+
+
+def show(answer: AlignAnswer, report: Report) -> None:
+    """Print the conditions and the extremes of the cosines."""
+    trace, content = answer.trace, report.content
+    print(top_facts.heading(trace.top))
+    show_facts(_facts(trace, content))
+    print()
+    rows = []
+    for one in content["extremes"]:
+        mean = trace.permanent.get(one["name"])
+        numbers = f"{one['max']:.6f}", f"{one['max_at_ps']:.3f}", f"{one['min']:.6f}", f"{one['min_at_ps']:.3f}"
+        rows.append([one["name"], *numbers, "" if mean is None else f"{mean:.6f}"])
+    columns = ("cosine", "max", "at (ps)", "min", "at (ps)", "mean after")
+    show_table(Table("", columns, rows, frozenset({"cosine"})))
+    sources = source_facts(trace.top, ("constants", "dipole", "polarizability"), report.sources)
+    show_facts([*sources, *top_facts.model_facts(content)])
+
+
+def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top = trace.top
+    acts_on = {pulse.acts_on for pulse in trace.pulses}
+    facts = [("constants", top_facts.constants_text(top))]
+    if "dipole" in acts_on:
+        facts.append(("dipole", top_facts.dipole_text(top)))
+    if "polarizability" in acts_on:
+        facts.append(("polarizability", top_facts.tensor_text(top)))
+    accuracy = (
+        f"{content['error_estimate']:.1e} estimated: steps {trace.step_error:.1e}, leakage {trace.edge_population:.1e}, "
+        f"left out {trace.ensemble.left_out:.1e} of the population"
+    )
+    return [
+        *facts,
+        ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
+        ("gas", _ensemble_text(trace)),
+        ("J max", str(trace.jmax)),
+        ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
+        ("accuracy", accuracy),
+    ]
+
+
+def _pulse_text(pulse: Pulse) -> str:
+    first, last = pulse.window_ps
+    return f"{type(pulse).__name__} on the {pulse.acts_on}, {first:g} to {last:g} ps"
+
+
+VERB = Verb(
+    name="align",
+    about="Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet.",
+    examples=EXAMPLES,
+    request=AlignRequest,
+    answer=lambda request, work: answer_align(request, work.executor),
+    table=lambda answer: answer.table,
+    rows="trace",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the cosines as CSV", example="out.csv"),
+        Output("parquet", (".parquet",), "Write the cosines as Parquet", example="out.parquet"),
+        Output("plot", PICTURES, "Draw the cosines (.png, .pdf, .svg)", draw, "out.png"),
+    ),
+    subject=PulsedMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),
+    drawn="ps",
+    scaled=False,
+    workers="blocks of initial states",
+    extras=(
+        Extra(
+            "--pulse",
+            "TEXT",
+            'Gaussian pulse: peak intensity, full width at half maximum[, time]: "1e13 W/cm2, 1 ps"; repeatable',
+            panel=CONDITIONS,
+            common=True,
+            many=True,
+        ),
+        Extra(
+            "--switched",
+            "TEXT",
+            'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable',
+            panel=CONDITIONS,
+            common=True,
+            many=True,
+        ),
+        Extra(
+            "--kick",
+            "TEXT",
+            'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable',
+            panel=CONDITIONS,
+            common=True,
+            many=True,
+        ),
+        Extra("--pulse-table", "FILE", "Pulse from a CSV with columns t_ps and intensity_w_per_cm2", panel=CONDITIONS),
+        Extra(
+            "--thz",
+            "TEXT",
+            'Field on the dipole: "100 kV/cm, 1 ps[, 0.3 THz[, TIME]]": peak, width of its envelope, frequency; repeatable',
+            panel=CONDITIONS,
+            common=True,
+            many=True,
+        ),
+        Extra(
+            "--polarization",
+            "NAME",
+            "Of all light: z, x, y, circular (in XY) or elliptical:R (I_X : I_Z = R : 1) [z]",
+            panel=CONDITIONS,
+        ),
+    ),
+    read_extras=read_pulses,
+    build=build,
+    sound=False,
+    accuracy="of the cosines",
+    accuracy_example=1e-4,
+    start={
+        "molecule": "OCS",
+        "pulses.shape": "gaussian",
+        "pulses.peak": "1e13 W/cm2",
+        "pulses.fwhm": "1 ps",
+        "conditions.temperature": "1 K",
+        "outputs.csv": "align.csv",
+    },
+)

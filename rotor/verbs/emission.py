@@ -1,0 +1,355 @@
+"""`emission`: lines as a radio telescope sees them, of one or several molecules in one source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+
+from rotor.reports.line_tables import the_first
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.sources import short_source
+from rotor.reports.spins import hyperfine_lines
+from rotor.reports.top_facts import with_option
+from rotor.requests.field import CONDITIONS, OUTPUT, Field, all_fields, declared
+from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.readers import Names, Quantity, Text, Whole
+from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
+from rotor.tops.top import Top
+from rotor.verbs.molecule import FIELDS, STATES, MoleculeInput, Reading, read_molecule, top_of, with_some_dipole
+from rotor.verbs.subjects import beside, saved_molecule
+from rotor.verbs.tables import Section, entries_of, said
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb
+
+if TYPE_CHECKING:
+    from rotor.spectra.emitters import CatalogueLines
+
+EXAMPLES = """\b
+Examples:
+  rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2
+  rotor emission CH3CN HC3N SO2 --band ALMA6 --column 1e15,3e14,1e15 --excitation 100 --width 5 --plot core.png
+  rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10
+  rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv
+  rotor emission CO HCN --band ALMA3 --column 1e18,1e15 --excitation 40,10 --width 300 --redshift 2.3
+  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16"""
+
+EXAMPLES_OBSERVED = (
+    EXAMPLES
+    + """
+  rotor emission CH3OH HCN --over spectrum.fits --column 1e16,1e14 --velocity 4 --plot pages.pdf
+  rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width"""
+)
+_OF_ONE = ("isotopes", "spin_constants", "spins", *STATES)  # what belongs to a single molecule
+_OWN = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+_PROVENANCE = ("molecules", "source", "range_mhz")
+
+
+@dataclass(frozen=True)
+class EmitterInput:
+    """What a molecule of a source has of its own."""
+
+    column_per_cm2: float = declared(
+        1e14, Quantity("1/cm2", above=0), "Molecules in the line of sight (1/cm²)", "column"
+    )
+    excitation_k: float | None = declared(
+        None, Quantity("K", above=0), "Instead of that of the conditions (K)", "excitation", example="50 K"
+    )
+    velocity_km_s: float | None = declared(None, Quantity("km/s"), "Likewise (km/s)", "velocity", example=5.6)
+    fwhm_km_s: float | None = declared(None, Quantity("km/s"), "Likewise (km/s)", "width", example=2.0)
+    partition: str | None = declared(
+        None, Text(metavar="FILE"), "Q(T) of a .cat file: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", "partition",
+        example="300=108.87,75=27.46",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SeveralInput:
+    """Which molecules, on the command line."""
+
+    names: tuple[str, ...] = declared(
+        (), Names(), "Molecules: names, files, SMILES:..., .cat files of JPL and CDMS", option="SOURCE"
+    )
+    partition: str | None = declared(
+        None, Text(metavar="FILE"), "Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", option="--partition",
+        panel=CONDITIONS,
+    )  # fmt: skip
+
+
+class SeveralMolecules(SubjectKind):
+    """Several molecules, or one with inputs of its own; .cat files with Q(T) among them."""
+
+    fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _OF_ONE}}  # noqa: RUF012
+    tables_read = ("molecules",)
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The molecules that were given."""
+        tables = self._tables(given)
+        molecules: list[Top | CatalogueLines] = []
+        inputs, own = [], []
+        for number, (molecule, emitter) in enumerate(tables):
+            try:
+                molecules.append(_molecule(Reading(molecule, given.style, place.folder, place.note), emitter.partition))
+            except ValueError as error:
+                raise ValueError(f"molecules[{number}]: {error}" if given.style == "key" else str(error)) from None
+            inputs.append(molecule)
+            values = {
+                name: getattr(emitter, name)
+                for name in ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+            }
+            mine = {name: value for name, value in values.items() if value is not None} if given.style == "key" else {}
+            own.append(mine if emitter.partition is None else {**mine, "partition": emitter.partition})
+        text = " ".join(str(one.source or one.constants) for one in inputs)
+        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(own))
+
+    def _tables(self, given: Given) -> list[tuple[MoleculeInput, EmitterInput]]:
+        """The inputs of each molecule."""
+        if given.style == "key":
+            tables = given.values.get("molecules", ())
+            if not tables:
+                raise ValueError("molecules: expected one molecule or more")
+            return [_of_table(table) for table in tables]
+        several: SeveralInput = read_instance(SeveralInput, given)
+        if not several.names:
+            raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
+        for one in (FIELDS[name] for name in _OF_ONE):
+            if given.has(one) and (len(several.names) > 1 or is_catalogue(several.names[0])):
+                raise ValueError(f"{one.called(given.style)}: expected with a single molecule that is no catalogue")
+        if several.partition is not None and not any(map(is_catalogue, several.names)):
+            raise ValueError("--partition: is Q(T) of .cat files, and none is among the molecules")
+        values = {name: value for name, value in given.values.items() if name.startswith("molecule.")}
+        return [
+            (
+                read_molecule(Given({**values, "molecule.source": source}, given.style)),
+                EmitterInput(partition=several.partition if is_catalogue(source) else None),
+            )
+            for source in several.names
+        ]
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """The list of molecules."""
+        one: Any = emitting_molecule()
+        return [("molecules", Annotated[list[one], said("one or more")], msgspec.NODEFAULT)]
+
+    def saved(self, request: EmissionRequest, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The tables of the molecules."""
+        first = request.sources[0]
+        tables = []
+        for molecule, source, own in zip(subject.molecules, request.sources, subject.own, strict=True):
+            flat = saved_molecule(molecule, folder)
+            content = (
+                {"source": flat["molecule"]}
+                if "molecule" in flat
+                else {name.partition(".")[2]: value for name, value in flat.items()}
+            )
+            departures = {
+                name: getattr(source, name)
+                for name in ("excitation_k", "velocity_km_s", "fwhm_km_s")
+                if getattr(source, name) != getattr(first, name)
+            }
+            partition = own.get("partition")
+            emitter = EmitterInput(
+                source.column_per_cm2, **departures, partition=None if partition is None else beside(partition, folder)
+            )
+            tables.append({**content, **written_fields(emitter)})
+        return {"molecules": tables}
+
+
+def emitting_molecule() -> Any:
+    """The structure of a molecule of a source."""
+    fields: tuple[Field, ...] = (*FIELDS.values(), *all_fields(EmitterInput).values())
+    if not _STRUCTURE:
+        _STRUCTURE.append(
+            msgspec.defstruct(
+                "EmittingMolecule", entries_of(fields), bases=(Section,), frozen=True, kw_only=True, forbid_unknown_fields=True,
+                omit_defaults=True, module=__name__,
+            )
+        )  # fmt: skip
+    return _STRUCTURE[0]
+
+
+_STRUCTURE: list[Any] = []
+
+
+def _of_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
+    names = {one.key for one in all_fields(EmitterInput).values()}
+    values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
+    emitter: EmitterInput = read_instance(
+        EmitterInput, Given({name: table[name] for name in names & table.keys()}, "key")
+    )
+    return read_molecule(Given(values, "key")), emitter
+
+
+def is_catalogue(source: Any) -> bool:
+    """Whether a source is a catalogue of lines."""
+    return isinstance(source, str) and source.lower().endswith((".cat", ".cat.gz"))
+
+
+def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
+    """A top with a dipole, or the lines of a .cat file with Q(T)."""
+    source = reading.given.source
+    if not is_catalogue(source):
+        if partition is not None:
+            raise ValueError("partition: is Q(T) of a .cat file, and the source is none")
+        return with_some_dipole(top_of(reading), reading)
+    from rotor.formats.catalogue.cat_species import read_cat_with
+
+    path = Path(reading.path(source))
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file")
+    species = read_cat_with(path, partition if partition is None or "=" in partition else reading.path(partition))
+    if "note" in species.identity:
+        reading.note(f"{path}: {species.identity['note']}; --partition states another")
+    return species
+
+
+@dataclass(frozen=True)
+class EmissionShown(Shown):
+    """How much is shown."""
+
+    top_lines: int = declared(20, Whole(0), "How many of the brightest lines are shown", option="--top", panel=OUTPUT)
+
+
+def write_table(answer: EmissionAnswer, path: Path, report: Report) -> None:
+    """The lines as a file."""
+    from rotor.formats import write
+
+    write(answer.lines, path, settings=_provenance(report))
+
+
+def write_profile(answer: EmissionAnswer, path: Path, report: Report) -> None:
+    """The spectrum as a file."""
+    from rotor.formats import write
+
+    write(answer.spectrum, path, settings=_provenance(report))
+
+
+def draw(answer: EmissionAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.emission import plot_emission
+
+    plot_emission(answer, path, provenance=_provenance(report), **report.view)
+
+
+def _provenance(report: Report) -> dict[str, Any]:
+    return {**report.provenance, **{name: report.content[name] for name in _PROVENANCE}}
+
+
+def show(answer: EmissionAnswer, report: Report) -> None:
+    """Print the source, the molecules and the brightest lines."""
+    from rotor.quantum.quanta import headings
+
+    request, layer = answer.request, answer.request.sources[0]
+    print(
+        f"{', '.join(request.names)}: brightness temperature, from {request.range_mhz[0]:.10g} to {request.range_mhz[1]:.10g} MHz"
+    )
+    behind = f"background {layer.background_k:g} K as observed, filling {layer.filling:g}"
+    facts = [
+        ("source", behind + (f", redshift {layer.redshift:g}" if layer.redshift else "")),
+        ("lines", f"{len(answer.lines)}; velocities in the radio convention, v = c (1 - ν/ν_rest)"),
+    ]
+    for name, source, lines in zip(request.names, request.sources, answer.emitted, strict=True):
+        gas = f"N = {source.column_per_cm2:.4g} /cm², T_ex = {source.excitation_k:g} K"
+        motion = f"width {source.fwhm_km_s:g} km/s at {source.velocity_km_s:g} km/s"
+        quanta = f"; upper, lower: {headings(lines.quanta)}" if lines.quanta else ""
+        facts.append((name, f"{gas}, {motion}, Q = {lines.q:.6g}{quanta}"))
+    for name, lines in zip(request.names, answer.emitted, strict=True):
+        of_which = f"{name}: " if len(request.names) > 1 else ""
+        facts += [(title, of_which + text) for title, text in hyperfine_lines(lines.hyperfine)]
+    if (peak := answer.peak) is not None:
+        line = f"{request.names[int(answer.lines.molecule[peak.row])]} {answer.lines.upper[peak.row]} – {answer.lines.lower[peak.row]}"
+        facts.append(
+            (
+                "brightest" if peak.brightness_k >= 0 else "deepest",
+                f"{peak.brightness_k:.4g} K at {peak.observed_mhz:.4f} MHz, {line}, τ = {peak.optical_depth:.3g}",
+            )
+        )
+    show_facts(facts)
+    if not len(answer.lines):
+        print("\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth")
+    elif report.shown.top_lines:
+        print()
+        show_table(_table(answer, report.shown.top_lines))
+    print()
+    cited = "; ".join(
+        f"{name}: {short_source(molecule.source)}" + ("" if lines.quanta else f", Q {lines.q_source}")
+        for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
+    )
+    show_facts([("sources", cited), *_limits(answer)])
+
+
+def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
+    """What is left out: of the source, and the largest of each molecule."""
+    from rotor.quantum.estimates.limits import model_limits, populated_j
+
+    request = answer.request
+    facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]
+    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
+        if not isinstance(top, Top):
+            continue
+        limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects)
+        facts += [("", f"{name}: {with_option(limit.sentence, 'rotor emission')}") for limit in limits[:1]]
+    return facts
+
+
+def _table(answer: EmissionAnswer, shown: int) -> Table:
+    """The brightest lines, in order of frequency."""
+    import numpy as np
+
+    lines, names = answer.lines, answer.request.names
+    rows = np.sort(np.argsort(-lines.brightness_k, kind="stable")[:shown]).tolist()
+    cells = [
+        (
+            names[lines.molecule[i]],
+            f"{lines.frequency_mhz[i]:.4f}",
+            f"{lines.observed_mhz[i]:.4f}",
+            lines.upper[i],
+            lines.lower[i],
+            f"{lines.energy_upper_k[i]:.2f}",
+            f"{lines.einstein_a_per_s[i]:.2e}",
+            str(lines.g_upper[i]),
+            f"{lines.optical_depth[i]:.3g}",
+            f"{lines.brightness_k[i]:.4g}",
+            f"{lines.integrated_k_km_s[i]:.4g}",
+        )
+        for i in rows
+    ]
+    title = the_first(len(rows), "brightest line") if len(rows) < len(lines) else "all lines"
+    columns = (
+        "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
+    )  # fmt: skip
+    return Table(f"{title}, in order of frequency; each by itself", columns, cells, frozenset({"molecule"}))
+
+
+VERB = Verb(
+    name="emission",
+    about="Lines of a source as a radio telescope sees them: brightness temperature in local thermodynamic equilibrium.",
+    examples=EXAMPLES,
+    request=EmissionRequest,
+    answer=lambda request, work: answer_emission(request),
+    table=lambda answer: answer.lines,
+    rows="lines",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the lines as CSV", write_table, "lines.csv"),
+        Output("parquet", (".parquet",), "Write the lines as Parquet", write_table, "lines.parquet"),
+        Output(
+            "profile_csv", (".csv",), "Write T_B and optical depth on the grid as CSV", write_profile, "profile.csv"
+        ),
+        Output("plot", PICTURES, "Draw T_B of every molecule (.png, .pdf, .svg)", draw, "emission.png"),
+    ),
+    subject=SeveralMolecules(),
+    shown=EmissionShown,
+    notes=lambda answer: answer.notes,
+    drawn="MHz",
+    spectral=True,
+    start={
+        "molecules.source": "CO",
+        "molecules.column": 1e16,
+        "conditions.excitation": "20 K",
+        "conditions.range": "115:116GHz",
+        "outputs.csv": "emission.csv",
+    },
+)
