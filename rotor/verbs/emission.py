@@ -274,7 +274,8 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         show_table(_table(answer, report.shown.top_lines))
     print()
     cited = "; ".join(
-        f"{name}: {short_source(molecule.source)}" + ("" if lines.quanta else f", Q {lines.q_source}")
+        f"{name}: {molecule.source if report.sources else short_source(molecule.source)}"
+        + ("" if lines.quanta else f", Q {lines.q_source}")
         for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
     )
     show_facts([("sources", cited), *_limits(answer)])
