@@ -187,7 +187,6 @@ def test_wrong_input_is_one_line(call, folder, arguments, said):
 
 def test_every_option_and_key_is_documented(call):
     part = CONTRACT.read_text(encoding="utf-8").split("## rotor emission")[1].split("## rotor raman")[0]
-    out = call("emission", "--help")[1]
     options = set(re.findall(r"--[a-z][a-z-]+", call("emission", "--help-all")[1].split("Examples:")[0])) - {
         "--help",
         "--help-all",

@@ -27,7 +27,9 @@ def _extra(one: Field[Any]) -> Extra:
 
 
 VERB = replace(
-    emission.VERB, extras=tuple(_extra(one) for group in GROUPS for one in fields(group)), examples=emission.EXAMPLES_OBSERVED
+    emission.VERB,
+    extras=tuple(_extra(one) for group in GROUPS for one in fields(group)),
+    examples=emission.EXAMPLES_OBSERVED,
 )
 
 
@@ -52,11 +54,18 @@ def _group(group: Any, typed: Mapping[str, Any]) -> Any:
 def _wanted(verb: Verb, typed: Mapping[str, Any]) -> Wanted:
     """What was typed of the source; a fit estimates the rest."""
     given = Given(typed, "option")
-    window = [verb.fields[name].read(given.values.get(name), "option") for name in ("conditions.range", "conditions.band")]
+    window = [
+        verb.fields[name].read(given.values.get(name), "option") for name in ("conditions.range", "conditions.band")
+    ]
     if all(window):
         raise ValueError("--range and --band: give one of them")
     range_mhz = next((one for one in window if one is not None and one != INFINITE), None)
-    names = {"column": "column_per_cm2", "excitation": "conditions.excitation", "velocity": "conditions.velocity", "width": "conditions.width"}
+    names = {
+        "column": "column_per_cm2",
+        "excitation": "conditions.excitation",
+        "velocity": "conditions.velocity",
+        "width": "conditions.width",
+    }
     if not typed.get("names"):
         raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
     redshift = verb.fields["conditions.redshift"].read(typed.get("conditions.redshift"), "option")

@@ -118,7 +118,9 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
 
         def flat(context: typer.Context, **values: Any) -> None:
             made = {
-                name: group(**{one.name: value_of(one, types[name][one.name], values[one.name]) for one in chosen[name]})
+                name: group(
+                    **{one.name: value_of(one, types[name][one.name], values[one.name]) for one in chosen[name]}
+                )
                 for name, group in groups.items()
             }
             refuse_overwriting(list(made.values()))
