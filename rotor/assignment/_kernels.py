@@ -1,0 +1,264 @@
+"""Compiled loops of the search. Their plain forms are `rotor.line_list` (lines of a top) and the tests' own loops."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+MHZ_PER_KELVIN = 20836.61912  # k/h, CODATA 2018
+
+
+@njit(cache=True, nogil=True)
+def place(theta: Floats, kappa: float) -> tuple[int, float]:
+    """Grid interval of κ and the position within it, from 0 to 1, for cubic interpolation between four points."""
+    angle = np.arccos(min(1.0, max(-1.0, -kappa)))
+    x = (angle - theta[0]) / (theta[1] - theta[0])
+    i = int(min(max(np.floor(x), 1), len(theta) - 3))
+    return i, x - i
+
+
+@njit(cache=True, nogil=True)
+def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats, energy: Floats) -> tuple[int, float]:
+    """Energies (MHz) of all levels to first order in the quartic constants; returns the place on the grid."""
+    mean, half = 0.5 * (constants[0] + constants[2]), 0.5 * (constants[0] - constants[2])
+    kappa = (constants[1] - mean) / half
+    i, w = place(theta, kappa)
+    w0, w1 = -w * (w - 1) * (w - 2) / 6, (w + 1) * (w - 1) * (w - 2) / 2
+    w2, w3 = -(w + 1) * w * (w - 2) / 2, (w + 1) * w * (w - 1) / 6
+    for n in range(len(jj)):
+        reduced = w0 * levels[i - 1, n, 0] + w1 * levels[i, n, 0] + w2 * levels[i + 1, n, 0] + w3 * levels[i + 2, n, 0]
+        total = mean * jj[n] + half * reduced
+        for q in range(4, 9):
+            if constants[q - 1] != 0.0:
+                total += constants[q - 1] * ((1 - w) * levels[i, n, q] + w * levels[i + 1, n, q])
+        energy[n] = total
+    return i, w
+
+
+@njit(cache=True, nogil=True)
+def lines_in_band(
+    levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, strength: NDArray[np.float32],
+    constants: Floats, low: float, high: float, energy: Floats, row: Ints, frequency: Floats, s_nu: Floats,
+) -> int:  # fmt: skip
+    """Lines between two frequencies: their rows in the table, frequencies and S ν²; returns how many."""
+    level_energies(levels, theta, jj, constants, energy)
+    kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
+    points = strength.shape[0]
+    x = (np.arccos(min(1.0, max(-1.0, -kappa))) - theta[0]) / (theta[-1] - theta[0]) * (points - 1)
+    k = int(min(max(x, 0.0), points - 2))
+    w = min(max(x - k, 0.0), 1.0)
+    count = 0
+    for n in range(len(upper)):
+        f = energy[upper[n]] - energy[lower[n]]
+        if low < f < high and count < len(row):
+            s = (1 - w) * strength[k, n] + w * strength[k + 1, n]
+            if s > 1e-3:
+                row[count], frequency[count], s_nu[count] = n, f, s * f * f
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: Ints, constants: Floats) -> Floats:
+    """∂ν/∂(A, B, C, DJ, DJK, DK, d1, d2) of lines (rows, 8)."""
+    kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
+    i, w = place(theta, kappa)
+    out = np.empty((len(rows), 8))
+    for n in range(len(rows)):
+        u, l = upper[rows[n]], lower[rows[n]]
+        for q in range(8):
+            out[n, q] = (1 - w) * (levels[i, u, q + 1] - levels[i, l, q + 1]) + w * (
+                levels[i + 1, u, q + 1] - levels[i + 1, l, q + 1]
+            )
+    return out
+
+
+@njit(cache=True, nogil=True)
+def strongest_lines(
+    levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
+    tops: Floats, temperatures: Floats, low: float, high: float, count: int,
+) -> tuple[Ints, Floats, Floats]:  # fmt: skip
+    """The strongest lines in the band of each top (tops, 3, count) per type, with frequency and ln intensity; -1 where none."""
+    rows = np.full((len(tops), 3, count), -1)
+    frequency = np.zeros((len(tops), 3, count))
+    log_intensity = np.full((len(tops), 3, count), -np.inf)
+    energy, constants = np.empty(len(jj)), np.zeros(8)
+    row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
+    for t in range(len(tops)):
+        constants[:3] = tops[t]
+        found = lines_in_band(
+            levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu
+        )
+        for n in range(found):
+            value = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_KELVIN * temperatures[t])
+            q = kind[row[n]]
+            if value <= log_intensity[t, q, count - 1]:
+                continue
+            at = count - 1
+            while at > 0 and log_intensity[t, q, at - 1] < value:
+                rows[t, q, at], frequency[t, q, at] = rows[t, q, at - 1], frequency[t, q, at - 1]
+                log_intensity[t, q, at] = log_intensity[t, q, at - 1]
+                at -= 1
+            rows[t, q, at], frequency[t, q, at], log_intensity[t, q, at] = row[n], f[n], value
+    return rows, frequency, log_intensity
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def sweep(
+    difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
+    near: NDArray[np.float32], low: float, high: float, bin_width: float, tolerance: float, ratio: float,
+    bounds: Floats, need: int, out: Floats,
+) -> tuple[int, int]:  # fmt: skip
+    """Roots of a family: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
+
+    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (n, κ), companion_jj (n,) alike
+    near : distance from each bin's centre to the nearest peak. bounds (6,) : of A, B, C. out (m, 5) : hits, misses, A, B, C
+    """
+    n, points, found, roots = len(seeds), len(kappa), 0, 0
+    determinant = jj[0] * difference[1] - jj[1] * difference[0]
+    total = len(companion_jj)
+    rises, falls = bool((determinant > 0).all()), bool((determinant < 0).all())
+    for a in range(n):
+        for b in range(n):
+            if a == b or abs(log_seeds[a] - log_seeds[b]) > ratio:
+                continue
+            above = jj[0] * seeds[b] - jj[1] * seeds[a]
+            if (rises and above <= 0) or (falls and above >= 0):  # ½(A-C) below 0 at every κ
+                continue
+            before, before_sum, before_half = -1.0, 0.0, 0.0
+            for k in range(points):
+                if abs(determinant[k]) < 1e-6:
+                    before = -1.0
+                    continue
+                mean = (seeds[a] * difference[1, k] - seeds[b] * difference[0, k]) / determinant[k]
+                half = above / determinant[k]
+                top_a, top_b, top_c = mean + half, mean + kappa[k] * half, mean - half
+                if (
+                    half <= 0.0 or top_a > bounds[1] or top_a < bounds[0] or top_b < bounds[2] or top_b > bounds[3]
+                    or top_c < bounds[4] or top_c > bounds[5] or top_c * (top_a + top_b) < 0.985 * top_a * top_b
+                ):  # fmt: skip
+                    before = -1.0
+                    continue
+                third = jj[2] * mean + difference[2, k] * half
+                if before > 0.0:
+                    first, last = min(before, third), max(before, third)
+                    if last > low and first < high:
+                        p = np.searchsorted(seeds, first)
+                        while p < n and seeds[p] <= last:
+                            if p != a and p != b and abs(log_seeds[p] - log_seeds[a]) < ratio and abs(log_seeds[p] - log_seeds[b]) < ratio:
+                                w = (seeds[p] - before) / (third - before) if third != before else 0.0
+                                s, d = before_sum + w * (mean - before_sum), before_half + w * (half - before_half)
+                                hits, misses = 0, 0
+                                roots += 1
+                                for q in range(total):
+                                    f = companion_jj[q] * s + d * (
+                                        companions[q, k - 1] + w * (companions[q, k] - companions[q, k - 1])
+                                    )
+                                    if f < low or f >= high:
+                                        continue
+                                    if near[int((f - low) / bin_width)] < tolerance:
+                                        hits += 1
+                                    else:
+                                        misses += 1
+                                        if misses >= 3 and misses > hits + 1:
+                                            break
+                                if hits >= need and hits >= misses and found < len(out):
+                                    at = kappa[k - 1] + w * (kappa[k] - kappa[k - 1])
+                                    out[found, 0], out[found, 1] = hits, misses
+                                    out[found, 2], out[found, 3], out[found, 4] = s + d, s + at * d, s - d
+                                    found += 1
+                            p += 1
+                before, before_sum, before_half = third, mean, half
+    return found, roots
+
+
+@njit(cache=True, nogil=True)
+def _type_ratio(
+    f: Floats, expected: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
+    scale: float, spread: float, detected: float,
+) -> float:  # fmt: skip
+    """ln of the likelihood ratio of lines of a type with intensities e^(expected + scale), against a random background of peaks."""
+    total = 0.0
+    for n in range(len(f)):
+        level = expected[n] + scale
+        seen = detected / (1.0 + np.exp(-(level - log_threshold) / (0.4 * spread)))
+        width = 4.0 * sigma[n]
+        p = np.searchsorted(peaks, f[n] - width)
+        ratio = 0.0
+        while p < len(peaks) and peaks[p] <= f[n] + width:
+            x, y = (peaks[p] - f[n]) / sigma[n], (log_peaks[p] - level) / spread
+            if y < 6.0:
+                ratio += np.exp(-0.5 * (x * x + y * y) - log_density[p])
+            p += 1
+        total += np.log(1.0 - seen + seen * ratio / (2 * np.pi * sigma[n] * spread))
+    return total
+
+
+@njit(cache=True, nogil=True)
+def best_scales(
+    f: Floats, expected: Floats, kind: Ints, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats,
+    log_threshold: float, spread: float, detected: float, most: int, proposals: int,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """For each type ln of the best likelihood ratio (3,), 0 where no line is above chance, and ln of the scale of its intensities.
+
+    Scales are proposed by peaks near the strongest lines. `expected` is ln of the relative intensity.
+    """
+    ratios, scales = np.zeros(3), np.full(3, -np.inf)
+    for q in range(3):
+        rows = np.flatnonzero(kind == q)
+        if len(rows) == 0:
+            continue
+        rows = rows[np.argsort(-expected[rows])][:most]
+        g, e, s = f[rows], expected[rows], sigma[rows]
+        tried = np.empty(8 * proposals)
+        count = 0
+        for n in range(min(proposals, len(rows))):
+            p = np.searchsorted(peaks, g[n] - 3 * s[n])
+            while p < len(peaks) and peaks[p] <= g[n] + 3 * s[n] and count < len(tried):
+                scale = log_peaks[p] - e[n]
+                p += 1
+                known = False
+                for m in range(count):
+                    if abs(tried[m] - scale) < 0.25 * spread:
+                        known = True
+                        break
+                if known:
+                    continue
+                tried[count] = scale
+                count += 1
+                value = _type_ratio(g, e, s, peaks, log_peaks, log_density, log_threshold, scale, spread, detected)
+                if value > ratios[q]:
+                    ratios[q], scales[q] = value, scale
+    return ratios, scales
+
+
+@njit(cache=True, nogil=True)
+def quick_ratios(
+    levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
+    tops: Floats, kinds: Ints, temperatures: Floats, low: float, high: float, sigma_mhz: float,
+    peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """ln of the likelihood ratio of each rigid top (tops,), lines of its family's type alone, and the temperature it is best at."""
+    out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
+    energy, constants = np.empty(len(jj)), np.zeros(8)
+    row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
+    for t in range(len(tops)):
+        constants[:3] = tops[t]
+        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu)
+        of_type = np.flatnonzero(kind[row[:found]] == kinds[t])
+        if len(of_type) == 0:
+            continue
+        for temperature in temperatures:
+            expected = np.log(s_nu[of_type]) - energy[lower[row[of_type]]] / (MHZ_PER_KELVIN * temperature)
+            strongest = np.argsort(-expected)[:most]
+            chosen = of_type[strongest]
+            ratios, _ = best_scales(
+                f[chosen], expected[strongest], np.full(len(chosen), kinds[t]), np.full(len(chosen), sigma_mhz),
+                peaks, log_peaks, log_density, log_threshold, spread, detected, most, 8,
+            )  # fmt: skip
+            if ratios[kinds[t]] > out[t]:
+                out[t], best[t] = ratios[kinds[t]], temperature
+    return out, best

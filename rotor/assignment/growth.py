@@ -1,0 +1,302 @@
+"""From a root to a species: lines are added in the order in which they can be predicted, until none is left.
+
+Constants c = (A, B, C, quartic) have a Gaussian state of knowledge: a-priori errors of the quartic ones, then least squares with the
+matched lines. A predicted line has the standard error √(gᵀCg + σ²), g = ∂ν/∂c; it takes the peak within 3.5 of them whose intensity
+fits, where chance would seldom put one. Each round refits; errors fall, and further lines come into reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
+
+SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrations from which a priori sizes of quartic constants follow
+ROUNDS = 24
+WINDOW = 3.5  # standard errors
+FEW, CHANCE_OF_FEW = 12, 0.25  # chance peaks in a window above which a line is not taken, while few lines are assigned
+FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # later on, rising from round to round: safe lines first
+SMALLEST_MHZ = 0.003  # standard error of a peak, at least
+BLENDED_MHZ = 0.08  # predicted lines nearer than this are one peak
+TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
+MOST_LINES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Lines of all types in the band at some constants: row in the table, frequency, ln of relative intensity, type."""
+
+    row: Ints
+    frequency: Floats
+    expected: Floats
+    kind: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A species as far as lines could be added.
+
+    constants (8,), covariance (8, 8) in MHz: A, B, C, DJ, DJK, DK, d1, d2. temperature_k. ratios (3,), scales (3,) by type: ln of
+    likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks, obs - calc in MHz, share in
+    the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
+    """
+
+    constants: Floats
+    covariance: Floats
+    temperature_k: float
+    ratios: Floats
+    scales: Floats
+    rows: Ints
+    peak: Ints
+    residual: Floats
+    share: Floats
+    weight: Floats
+    rms_mhz: float
+    evidence: float
+    start: Candidate | None = None
+
+    @property
+    def lines(self) -> int:
+        """Number of peaks assigned."""
+        return len(set(self.peak.tolist()))
+
+
+def quartic_sizes(constants: Floats) -> Floats:
+    """A-priori standard errors of DJ, DJK, DK, d1, d2 (5,), MHz: 4B³/ω² with ω = 100 cm⁻¹ and like products.
+
+    A. Kratzer, Z. Phys. 3, 289 (1920): D = 4B³/ω² for a diatomic molecule.
+    """
+    a, b, c = constants[:3]
+    mean = (b + c) / 2
+    return 4 / SOFTEST_MHZ**2 * np.array([mean**3, a * mean**2, a**3, mean**3 / 2, mean**3 / 6])
+
+
+def predict(field: Field, constants: Floats, temperature_k: float, most: int = MOST_LINES) -> Predicted:
+    """The strongest lines of each type in the band."""
+    table = field.table
+    size = len(table.upper)
+    energy, row, f, s_nu = np.empty(len(field.jj)), np.empty(size, np.int64), np.empty(size), np.empty(size)
+    count = _kernels.lines_in_band(
+        table.levels, table.theta, field.jj, table.upper, table.lower, table.strength, constants, *field.peaks.band_mhz,
+        energy, row, f, s_nu,
+    )  # fmt: skip
+    row, f = row[:count], f[:count]
+    expected = np.log(s_nu[:count]) - energy[table.lower[row]] / (_kernels.MHZ_PER_KELVIN * temperature_k)
+    kind = table.kind[row]
+    kept = np.zeros(count, dtype=bool)
+    for q in range(3):
+        rows = np.flatnonzero(kind == q)
+        kept[rows[np.argsort(-expected[rows], kind="stable")[:most]]] = True
+    return Predicted(row[kept], f[kept], expected[kept], kind[kept])
+
+
+def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
+    """∂ν/∂c of lines (rows, 8)."""
+    table = field.table
+    return _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
+
+
+def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
+    """The species that a candidate leads to; None where its constants run out of order."""
+    constants = np.concatenate([start.constants, np.zeros(5)])
+    prior = np.diag(1 / np.concatenate([0.05 * constants[:3], quartic_sizes(constants)]) ** 2)
+    slopes = slopes_of(field, start.family.lines, constants)
+    covariance = np.linalg.inv(slopes.T @ slopes / 0.05**2 + prior)
+    temperature, last, before = start.temperature_k, -1, -1
+    found: Grown | None = None
+    sigma0 = 0.05
+    for turn in range(rounds):
+        if turn in (1, 3, 6, 9, 12, 15, 18, 21):
+            temperature = best_temperature(field, constants, covariance, sigma0)
+        chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else CHANCE_OF_FEW
+        matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
+        if matched is None or len(matched.peak) < 5:
+            return None
+        constants, covariance, sigma0, found = _refitted(field, constants, prior, temperature, matched, sigma0, start)
+        if not (constants[0] > constants[1] > constants[2] > 0):
+            return None
+        if turn > 7 and turn % 3 == 2 and found.lines <= before:
+            break
+        if turn % 3 == 2:
+            before = found.lines
+        last = found.lines
+    return None if found is None else with_evidence(field, found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Matched:
+    rows: Ints
+    peak: Ints
+    share: Floats
+    ratios: Floats
+    scales: Floats
+
+
+def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0: float) -> float:
+    """The temperature with the greatest likelihood ratio, of the fixed ones or of a grid."""
+    grid = field.temperatures if len(field.temperatures) == 1 else np.array(TEMPERATURES)
+    values = [_ratios(field, constants, covariance, t, sigma0)[1].sum() for t in grid]
+    return float(grid[int(np.argmax(values))])
+
+
+def _ratios(
+    field: Field, constants: Floats, covariance: Floats, temperature_k: float, sigma0: float, most: int = 60
+) -> tuple[Predicted, Floats, Floats, Floats, Floats]:
+    """Predicted lines, ratios and scales by type, errors of lines (lines,), and their derivatives."""
+    lines = predict(field, constants, temperature_k, most)
+    slopes = slopes_of(field, lines.row, constants)
+    errors = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes, optimize=True), 0.0) + sigma0**2)
+    errors = np.minimum(errors, 2.0)
+    peaks = field.peaks
+    ratios, scales = _kernels.best_scales(
+        lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
+        peaks.log_threshold, SPREAD, DETECTED, most, 16,
+    )  # fmt: skip
+    return lines, ratios, scales, errors, slopes
+
+
+def _matched(
+    field: Field, constants: Floats, covariance: Floats, temperature_k: float, sigma0: float, most_chance: float,
+    before: Grown | None,
+) -> _Matched | None:
+    """Lines that take a peak."""
+    _, ratios, scales, _, _ = _ratios(field, constants, covariance, temperature_k, sigma0)
+    active = ratios > 3.0
+    if not active.any():
+        return None
+    lines = predict(field, constants, temperature_k)
+    level = lines.expected + np.where(active, scales, -np.inf)[lines.kind]
+    kept = level > field.peaks.log_threshold - 1.0
+    row, f, level = lines.row[kept], lines.frequency[kept], level[kept]
+    order = np.argsort(f, kind="stable")
+    row, f, level = row[order], f[order], level[order]
+    if not len(f):
+        return None
+    slopes = slopes_of(field, row, constants)
+    blend = np.concatenate([[0], np.cumsum(np.diff(f) > BLENDED_MHZ)])
+    starts = np.flatnonzero(np.diff(np.concatenate([[-1], blend])))
+    weight = np.exp(level - level.max())
+    total = np.add.reduceat(weight, starts)
+    share = weight / total[blend]
+    centre = np.add.reduceat(share * f, starts)
+    slope = np.add.reduceat(share[:, None] * slopes, starts, axis=0)
+    height = np.log(total) + level.max()
+    variance = np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope, optimize=True), 0.0)
+    main = starts + np.array([np.argmax(part) for part in np.split(share, starts[1:])])
+    centre, variance = _predicted_by_others(field, before, row[main], centre, variance)
+    errors = np.sqrt(variance + sigma0**2)
+    chosen = _nearest(field, centre, height, errors, most_chance)
+    taken = _without_doubles(chosen, centre, height, field)
+    peak = taken[blend]
+    mask = (peak >= 0) & (share > 0.02)
+    return _Matched(row[mask], peak[mask], share[mask], ratios, scales)
+
+
+def _predicted_by_others(
+    field: Field, before: Grown | None, rows: Ints, centre: Floats, variance: Floats
+) -> tuple[Floats, Floats]:
+    """Predictions of lines and their variances without what the lines themselves added in the last round.
+
+    An observation of weight w has leverage h = w g C gᵀ; without it the variance is g C gᵀ/(1-h) and the prediction moves by
+    -r h/(1-h) (R. D. Cook and S. Weisberg, Residuals and Influence in Regression (1982), section 2.2).
+    """
+    if before is None:
+        return centre, variance
+    weight, residual = np.zeros(len(field.table.upper)), np.zeros(len(field.table.upper))
+    weight[before.rows], residual[before.rows] = before.weight, before.residual
+    leverage = np.minimum(weight[rows] * variance, 0.9999)
+    return centre - residual[rows] * leverage / (1 - leverage), variance / (1 - leverage)
+
+
+def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_chance: float) -> Ints:
+    """The peak that each line takes (lines,), -1 for none."""
+    peaks = field.peaks
+    f = peaks.frequency_mhz
+    window = WINDOW * errors
+    first, last = np.searchsorted(f, centre - window), np.searchsorted(f, centre + window)
+    out = np.full(len(centre), -1)
+    for n in np.flatnonzero((last > first) & (last - first < 12)).tolist():
+        near = np.arange(first[n], last[n])
+        apart = (f[near] - centre[n]) / errors[n]
+        higher = (peaks.log_intensity[near] - height[n]) / SPREAD
+        cost = apart**2 + higher**2
+        best = int(np.argmin(cost))
+        chance = 2 * window[n] * np.exp(peaks.log_density[near[best]]) * 4 * SPREAD
+        if abs(higher[best]) < 3.0 and chance < most_chance:
+            out[n] = near[best]
+    return out
+
+
+def _without_doubles(chosen: Ints, centre: Floats, height: Floats, field: Field) -> Ints:
+    """Each peak by one line only: the strongest that takes it."""
+    out = chosen.copy()
+    for peak in np.flatnonzero(np.bincount(chosen[chosen >= 0], minlength=1) > 1).tolist():
+        rivals = np.flatnonzero(chosen == peak)
+        out[rivals] = -1
+        out[rivals[np.argmax(height[rivals])]] = peak
+    return out
+
+
+def _refitted(
+    field: Field, constants: Floats, prior: Floats, temperature: float, matched: _Matched, sigma0: float, start: Candidate
+) -> tuple[Floats, Floats, float, Grown]:
+    """One step of weighted least squares, with weights that fall for far lines."""
+    peaks = field.peaks
+    energy = np.empty(len(field.jj))
+    _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
+    calculated = energy[field.table.upper[matched.rows]] - energy[field.table.lower[matched.rows]]
+    slopes = slopes_of(field, matched.rows, constants)
+    peak, group = np.unique(matched.peak, return_inverse=True)
+    total = np.bincount(group, matched.share)
+    share = matched.share / total[group]
+    centre = np.bincount(group, share * calculated)
+    slope = np.zeros((len(peak), slopes.shape[1]))
+    np.add.at(slope, group, share[:, None] * slopes)
+    residual = peaks.frequency_mhz[peak] - centre
+    known = np.maximum(peaks.uncertainty_mhz[peak], SMALLEST_MHZ)
+    sigma = np.maximum(known, sigma0 / 1.5)
+    weight = 1 / (sigma**2 * (1 + (residual / (2.4 * sigma)) ** 2))
+    normal = slope.T @ (weight[:, None] * slope) + prior
+    pull = slope.T @ (weight * residual)
+    pull[3:] -= np.diag(prior)[3:] * constants[3:]
+    covariance = np.linalg.inv(normal)
+    new = constants + covariance @ pull
+    after = residual - slope @ (new - constants)
+    scatter = 1.4826 * float(np.median(np.abs(after))) * np.sqrt(len(peak) / max(len(peak) - 4, 1.0))
+    sigma0 = float(np.clip(max(scatter, np.median(known)), SMALLEST_MHZ, sigma0))
+    grown = Grown(
+        new, covariance, temperature, matched.ratios, matched.scales, matched.rows, matched.peak, after[group], matched.share,
+        weight[group],
+        float(np.sqrt(np.mean(after**2))), 0.0, start,
+    )  # fmt: skip
+    return new, covariance, sigma0, grown
+
+
+def with_evidence(field: Field, grown: Grown) -> Grown:
+    """The species with its evidence against chance.
+
+    ln Z = ln L/L₀ - ½ Σ (c/σ_prior)² + ½ ln det(C/σ_prior²) of the quartic constants, and of A, B, C in place of a Gaussian prior
+    the volume of the bounds: - ln V + ½ ln det(2π C) (Laplace's approximation; D. J. C. MacKay, Information Theory,
+    Inference, and Learning Algorithms (2003), eq. 28.10).
+    """
+    sigma0 = max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
+    lines = predict(field, grown.constants, grown.temperature_k, 120)
+    peaks = field.peaks
+    errors = np.full(len(lines.row), 1.3 * sigma0)
+    ratios, scales = _kernels.best_scales(
+        lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
+        peaks.log_threshold, SPREAD, DETECTED, 120, 16,
+    )  # fmt: skip
+    sizes = quartic_sizes(grown.constants)
+    volume = float(np.log(field.bounds.high - field.bounds.low).sum())
+    scaled = grown.covariance.copy()
+    scaled[3:] /= sizes[:, None]
+    scaled[:, 3:] /= sizes[None, :]
+    _, determinant = np.linalg.slogdet(scaled)
+    occam = 0.5 * determinant + 1.5 * np.log(2 * np.pi) - volume - 0.5 * float(np.sum((grown.constants[3:] / sizes) ** 2))
+    return replace(grown, ratios=ratios, scales=scales, evidence=float(ratios[ratios > 3].sum() + occam))

@@ -1,0 +1,59 @@
+"""Constants with errors: the assigned lines of a species fitted with the full Hamiltonian by `rotor.fitting`.
+
+Quartic constants that the lines do not determine are held near 0 by a-priori errors of the size they can have
+(`rotor.assignment.growth.quartic_sizes`), so that the errors of A, B, C contain what they may shift.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.assignment.growth import SMALLEST_MHZ, Grown, quartic_sizes
+from rotor.assignment.rigid_table import PARAMETERS, RigidTable
+from rotor.assignment.peaks import PeakList
+from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.parameters import parameters
+from rotor.tops.constants import Constants
+
+REJECTED = 5.0  # standard errors beyond which a line does not count
+OPEN = 1e-3  # relative standard error above which a constant is said to be open
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A fit of a species: constants and scaled standard errors (8,) in MHz in the order of `PARAMETERS`."""
+
+    fit: Fit
+    values: Floats
+    errors: Floats
+
+    @property
+    def open_constants(self) -> tuple[str, ...]:
+        """Which of A, B, C the lines leave open: known to no better than 0.1 %."""
+        return tuple(name for name, value, error in zip("ABC", self.values, self.errors, strict=False) if error > OPEN * value)
+
+
+def assigned_lines(grown: Grown, peaks: PeakList, table: RigidTable) -> Assignments:
+    """The lines of a species with labels; lines of one peak are a blend."""
+    rows = grown.rows
+    _, blend = np.unique(grown.peak, return_inverse=True)
+    error = np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)
+    return assignments(
+        ("j", "ka", "kc"), table.quanta[table.upper[rows]], table.quanta[table.lower[rows]], peaks.frequency_mhz[grown.peak],
+        error, weight=grown.share, blend=blend, source=peaks.source or "the spectrum",
+    )  # fmt: skip
+
+
+def refine(grown: Grown, peaks: PeakList, table: RigidTable) -> Refined:
+    """The species fitted."""
+    lines = assigned_lines(grown, peaks, table)
+    start = Constants(**dict(zip(PARAMETERS, grown.constants.tolist(), strict=True)), reduction="S", representation="Ir")
+    sizes = quartic_sizes(grown.constants)
+    free = parameters(start, PARAMETERS, priors_mhz=dict(zip(PARAMETERS[3:], sizes.tolist(), strict=True)))
+    free = type(free)(**{**free.__dict__, "centre": np.concatenate([free.start[:3], np.zeros(5)])})
+    fit = fit_lines(lines, start, free, FitOptions(reject_above=REJECTED, poor_rms=100.0, most_iterations=30))
+    return Refined(fit, fit.values, fit.errors * max(1.0, fit.reduced_chi if np.isfinite(fit.reduced_chi) else 1.0))

@@ -1,0 +1,117 @@
+"""The search: families of lines laid on the strongest peaks, roots ranked by a likelihood ratio.
+
+At a fixed κ the three lines of a family are linear in ½(A+C) and ½(A-C): two peaks give both, and the third line as a function of κ
+crosses a third peak at isolated roots. A root whose further lines lie near peaks is ranked by the likelihood ratio of its
+strongest lines (`rotor.assignment.evidence`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.families import Bounds, Family
+from rotor.assignment.peaks import PeakList
+from rotor.assignment.rigid_table import RigidTable
+
+BIN_MHZ = 0.1
+NEAR_MHZ = 0.5  # a peak this near to a predicted line counts as a hit: what distortion and the family's own errors make
+CHANCE = 0.025  # share of the band near a peak: so many of the strongest peaks are matched
+RATIO = np.log(10.0)  # of the intensities of a family's lines
+ROUGH_MHZ = 0.25  # standard error of rigid lines when roots are ranked
+SPREAD = 0.6  # of ln intensity about the model: response of the instrument, saturation
+DETECTED = 0.95  # probability that a line above the threshold is in the list
+SAME = 3e-4  # relative difference of constants of roots that are the same
+
+
+class Candidate(NamedTuple):
+    """A root: A, B, C in MHz, the family it comes from, ln of its likelihood ratio, the temperature this is best at."""
+
+    constants: Floats
+    family: Family
+    ratio: float
+    temperature_k: float
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """What a search sees: peaks, the table, bounds of constants, temperatures to try."""
+
+    peaks: PeakList
+    table: RigidTable
+    bounds: Bounds
+    temperatures: Floats
+
+    @cached_property
+    def jj(self) -> Floats:
+        """J(J+1) of the levels."""
+        j = self.table.quanta[:, 0].astype(np.float64)
+        return j * (j + 1)
+
+    @cached_property
+    def order(self) -> Ints:
+        """Peaks by falling intensity."""
+        return np.argsort(-self.peaks.intensity, kind="stable")
+
+    @cached_property
+    def near(self) -> np.ndarray:
+        """Distance (MHz) from the centres of bins of the band to the nearest of the strongest peaks."""
+        low, high = self.peaks.band_mhz
+        most = max(30, int(CHANCE * (high - low) / (2 * NEAR_MHZ)))
+        strongest = np.sort(self.peaks.frequency_mhz[self.order[:most]])
+        centres = low + BIN_MHZ * (np.arange(int((high - low) / BIN_MHZ) + 2) + 0.5)
+        right = np.clip(np.searchsorted(strongest, centres), 0, len(strongest) - 1)
+        left = np.maximum(right - 1, 0)
+        return np.minimum(np.abs(centres - strongest[left]), np.abs(centres - strongest[right])).astype(np.float32)
+
+    def seeds(self, count: int) -> Ints:
+        """The strongest peaks, rising in frequency."""
+        return np.sort(self.order[:count])
+
+
+def roots_of(field: Field, family: Family, seeds: Ints, need: int = 4) -> Floats:
+    """Roots of a family (n, 5): hits, misses, A, B, C."""
+    table = field.table
+    upper, lower = table.upper[family.lines], table.lower[family.lines]
+    further, below = table.upper[family.companions], table.lower[family.companions]
+    energies = table.levels[:, :, 0]
+    out = np.empty((4000, 5))
+    low, high = field.peaks.band_mhz
+    found, _ = _kernels.sweep(
+        np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa,
+        np.ascontiguousarray((energies[:, further] - energies[:, below]).T), field.jj[further] - field.jj[below],
+        field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, RATIO,
+        field.bounds.array, need, out,
+    )  # fmt: skip
+    return out[:found]
+
+
+def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Candidate]:
+    """Candidates of the best roots of a family with a ratio above `least`, each constants once, the best first."""
+    if not len(roots):
+        return []
+    order = np.argsort(roots[:, 1] - 2 * roots[:, 0], kind="stable")[:300]
+    tops = np.ascontiguousarray(roots[order, 2:])
+    ratios, temperatures = quick_ratios(field, tops, np.full(len(tops), family.kind))
+    out = list[Candidate]()
+    for i in np.argsort(-ratios).tolist():
+        if ratios[i] < least:
+            break
+        if all(np.abs(np.log(tops[i] / other.constants)).max() > SAME for other in out):
+            out.append(Candidate(tops[i], family, float(ratios[i]), float(temperatures[i])))
+    return out
+
+
+def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Floats]:
+    """ln likelihood ratios of rigid tops (n, 3), each by lines of one type, and the best temperatures."""
+    table, peaks = field.table, field.peaks
+    return _kernels.quick_ratios(
+        table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
+        field.temperatures, *peaks.band_mhz, ROUGH_MHZ, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
+        peaks.log_threshold, SPREAD, DETECTED, 40,
+    )  # fmt: skip

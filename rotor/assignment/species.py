@@ -1,0 +1,179 @@
+"""Species after species: the next best one among the peaks that are left, until no further one stands above chance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.assignment.families import Family
+from rotor.assignment.growth import Grown, grow, predict
+from rotor.assignment.peaks import PeakList
+from rotor.assignment.search import Candidate, Field, quick_ratios, ranked, roots_of
+
+CLEAR = 120.0  # evidence at which a search ends at once
+FAINT = 10.0  # ln likelihood ratio below which a root is not grown
+CHUNK = 12  # families between two looks at the candidates
+PER_FAMILY, PER_CHUNK = 4, 4
+NEAR = 2e-3  # relative difference of constants of candidates of which one is enough
+MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
+
+Stop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """So many of the strongest peaks laid on families from one place in their order to another."""
+
+    seeds: int
+    first: int
+    last: int
+
+
+FIRST_STAGES = (Stage(60, 0, 120), Stage(60, 120, 400), Stage(110, 0, 220))
+NEXT_STAGES = (Stage(60, 0, 120),)
+
+
+@dataclass(eq=False)
+class Clock:
+    """Time of a search: seconds allowed, and whether they are over."""
+
+    seconds: float
+    started: float = field(default_factory=time.monotonic)
+
+    def over(self) -> bool:
+        """Whether the seconds are over."""
+        return time.monotonic() - self.started > self.seconds
+
+
+def next_species(
+    seen: Field, families: Sequence[Family], stages: Sequence[Stage], clock: Clock, clear: float = CLEAR
+) -> list[Grown]:
+    """The species with the most evidence among the peaks, and rivals with other constants, the best first.
+
+    The search ends when a species is clear, when all stages are done, or when the time is over.
+    """
+    grown, tried = list[Grown](), list[Floats]()
+    for stage in stages:
+        seeds = seen.seeds(stage.seeds)
+        if len(seeds) < 5:
+            break
+        chosen = families[stage.first : stage.last]
+        for at in range(0, len(chosen), CHUNK):
+            if clock.over():
+                return _best(grown)
+            candidates = list[Candidate]()
+            for family in chosen[at : at + CHUNK]:
+                candidates += ranked(seen, family, roots_of(seen, family, seeds), FAINT)[:PER_FAMILY]
+            grown += _grown(seen, candidates, tried, PER_CHUNK)
+            if grown and max(one.evidence for one in grown) > clear:
+                best = _best(grown)
+                return _best(best + _grown(seen, aliases(seen, best[0]), [], 3))
+        if grown and max(one.evidence for one in grown) > clear / 3:
+            break
+    best = _best(grown)
+    return _best(best + _grown(seen, aliases(seen, best[0]), [], 3)) if best else []
+
+
+def _grown(seen: Field, candidates: list[Candidate], tried: list[Floats], most: int) -> list[Grown]:
+    """The best of the candidates grown, without those near to what was tried."""
+    out = list[Grown]()
+    for candidate in sorted(candidates, key=lambda one: -one.ratio):
+        if len(out) >= most:
+            break
+        if any(np.abs(np.log(candidate.constants / other)).max() < NEAR for other in tried):
+            continue
+        tried.append(candidate.constants)
+        species = grow(seen, candidate)
+        if species is not None and np.isfinite(species.evidence):
+            out.append(species)
+            tried.append(species.constants[:3])
+    return out
+
+
+def _best(grown: Sequence[Grown]) -> list[Grown]:
+    """Each species once, by falling evidence."""
+    out = list[Grown]()
+    for one in sorted(grown, key=lambda one: -one.evidence):
+        if all(np.abs(np.log(one.constants[:3] / other.constants[:3])).max() > 1e-4 for other in out):
+            out.append(one)
+    return out
+
+
+def aliases(seen: Field, grown: Grown) -> list[Candidate]:
+    """Candidates whose a-type R branches fall on the same peaks with J multiplied by a ratio r.
+
+    With B' = B/r, C' = C/r and A' - ½(B'+C') = r (A - ½(B+C)) both the splitting of K = 1, (B-C) J, and the shift of K = 0,
+    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)), stay.
+    """
+    start = grown.start
+    if start is None or not grown.ratios[0] > 3.0:
+        return []
+    a, b, c = grown.constants[:3]
+    tops, families = list[Floats](), list[Family]()
+    for ratio in MULTIPLES:
+        mean = (b + c) / 2
+        top = np.array([ratio * (a - mean) + mean / ratio, b / ratio, c / ratio])
+        if not (seen.bounds.low <= top).all() or not (top <= seen.bounds.high).all() or top[0] <= top[1]:
+            continue
+        for j in _strong_j(seen, top):
+            family = _lowest_a_lines(seen, j)
+            if family is not None:
+                tops.append(top)
+                families.append(family)
+    if not tops:
+        return []
+    ratios, temperatures = quick_ratios(seen, np.array(tops), np.zeros(len(tops), dtype=np.int64))
+    return [
+        Candidate(top, family, float(ratio), float(temperature))
+        for top, family, ratio, temperature in zip(tops, families, ratios, temperatures, strict=True)
+        if ratio > FAINT
+    ]
+
+
+def _strong_j(seen: Field, top: Floats) -> list[int]:
+    """J of the a-type R branch in the middle of the band."""
+    low, high = seen.peaks.band_mhz
+    return [round((low + high) / 2 / (top[1] + top[2]))]
+
+
+def _lowest_a_lines(seen: Field, j: int) -> Family | None:
+    """J ← J-1 of Ka = 0 and both of Ka = 1."""
+    table = seen.table
+    upper, lower = table.quanta[table.upper], table.quanta[table.lower]
+    chosen = (table.kind == 0) & (upper[:, 0] == j) & (lower[:, 0] == j - 1) & (upper[:, 1] <= 1) & (upper[:, 1] == lower[:, 1])
+    rows = np.flatnonzero(chosen)
+    return Family(0, rows, np.zeros(0, dtype=np.int64), 0.0) if len(rows) == 3 else None
+
+
+def explained(seen: Field, grown: Grown, width_mhz: float) -> NDArray[np.bool_]:
+    """Which peaks a species explains: those assigned, and those at a predicted line that are not far stronger than it."""
+    out = np.zeros(len(seen.peaks), dtype=bool)
+    out[grown.peak] = True
+    lines = predict(seen, grown.constants, grown.temperature_k, 4000)
+    level = lines.expected + np.where(grown.ratios > 3.0, grown.scales, -np.inf)[lines.kind]
+    strong = level > seen.peaks.log_threshold - 2.0
+    f, height = lines.frequency[strong], level[strong]
+    peaks = seen.peaks
+    first, last = np.searchsorted(peaks.frequency_mhz, f - width_mhz), np.searchsorted(peaks.frequency_mhz, f + width_mhz)
+    for n in np.flatnonzero(last > first).tolist():
+        near = slice(first[n], last[n])
+        out[near] |= peaks.log_intensity[near] < height[n] + 1.5
+    return out
+
+
+def strength(seen: Field, grown: Grown) -> float:
+    """Height of the strongest line of a species in the units of the intensities, from the fitted scales."""
+    lines = predict(seen, grown.constants, grown.temperature_k, 20)
+    level = lines.expected + np.where(grown.ratios > 3.0, grown.scales, -np.inf)[lines.kind]
+    return float(np.exp(level.max()))
+
+
+def without(seen: Field, mask: NDArray[np.bool_]) -> Field:
+    """The same search without some peaks."""
+    rest: PeakList = seen.peaks.where(~mask)
+    return replace(seen, peaks=rest)
