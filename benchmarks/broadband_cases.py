@@ -1,7 +1,7 @@
 """Synthetic peak lists of cold gas with their truth, for `bench_assign.py` and the tests: rotor's own lines, any seed.
 
 A case has one to three molecules of random geometry, their singly substituted ¹³C species where the signal shows them, split lines of
-some species, foreign peaks with intensities of a power law, spurs of a clock, a response with ripple and roll-off, saturation, noise.
+some weaker species, foreign peaks with intensities of a power law, spurs of a clock, a response with ripple and roll-off, saturation, noise.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def make_case(seed: int, signal_to_noise: float | None = None) -> Case:
             if not dipole.any():
                 continue
             try:
-                enough = len(lines_of(one, temperature, band, max(floor, 1e-3))[0]) >= 12
+                enough = len(lines_of(one, temperature, band, max(floor, 1e-3))[0]) >= 16
             except ValueError:
                 enough = False
             if enough:
@@ -174,10 +174,9 @@ def _peaks(
     saturation = rng.uniform(150, 2000)
     for place, one in enumerate(species):
         f, i = lines_of(one, temperature, band, floor / 3)
-        if one.parent is None and rng.random() < 0.2:
+        if one.parent is None and place > 0 and rng.random() < 0.25:
             split = True
-            apart = 10 ** rng.uniform(-5.0, -4.0)
-            f, i = np.concatenate([f * (1 - apart), f * (1 + apart)]), np.concatenate([i, 0.8 * i]) / 1.0
+            f, i = _split(f, i, float(rng.uniform(0.5, 1.5)), rng)
         i = i * response(f)
         i = i / (1 + i / saturation)
         if place == 0:
@@ -194,6 +193,13 @@ def _peaks(
     fwhm = float(rng.uniform(0.05, 0.15))
     peaks = _measured(np.concatenate(frequency), np.concatenate(intensity), fwhm, 100 / snr, floor, rng)
     return Case(seed, band, temperature, snr, peaks, tuple(species), main_lines, foreign, split)
+
+
+def _split(f: Floats, i: Floats, width_mhz: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Each line as two, at equal distance on either side."""
+    apart = width_mhz * rng.uniform(0.0, 1.0, len(f))
+    share = rng.uniform(0.4, 0.6, len(f))
+    return np.concatenate([f - apart, f + apart]), np.concatenate([i * share, i * (1 - share)])
 
 
 def _measured(f: Floats, i: Floats, fwhm: float, noise: float, floor: float, rng: np.random.Generator) -> Floats:

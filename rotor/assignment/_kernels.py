@@ -79,31 +79,37 @@ def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: I
 @njit(cache=True, nogil=True)
 def strongest_lines(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
-    tops: Floats, temperatures: Floats, low: float, high: float, count: int,
-) -> tuple[Ints, Floats, Floats]:  # fmt: skip
-    """The strongest lines in the band of each top (tops, 3, count) per type, with frequency and ln intensity; -1 where none."""
+    tops: Floats, temperatures: Floats, low: float, high: float, count: int, apart: float,
+) -> tuple[Ints, Floats]:  # fmt: skip
+    """Per top and type the strongest lines in the band, (tops, 3, count), -1 where none, and ∂ν/∂(A, B, C); of near ones the first."""
     rows = np.full((len(tops), 3, count), -1)
-    frequency = np.zeros((len(tops), 3, count))
-    log_intensity = np.full((len(tops), 3, count), -np.inf)
+    slopes = np.zeros((len(tops), 3, count, 3))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         constants[:3] = tops[t]
-        found = lines_in_band(
-            levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu
-        )
+        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu)
+        height = np.empty(found)
         for n in range(found):
-            value = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_KELVIN * temperatures[t])
-            q = kind[row[n]]
-            if value <= log_intensity[t, q, count - 1]:
-                continue
-            at = count - 1
-            while at > 0 and log_intensity[t, q, at - 1] < value:
-                rows[t, q, at], frequency[t, q, at] = rows[t, q, at - 1], frequency[t, q, at - 1]
-                log_intensity[t, q, at] = log_intensity[t, q, at - 1]
-                at -= 1
-            rows[t, q, at], frequency[t, q, at], log_intensity[t, q, at] = row[n], f[n], value
-    return rows, frequency, log_intensity
+            height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_KELVIN * temperatures[t])
+        for q in range(3):
+            taken = np.empty(count)
+            at = 0
+            of_type = np.flatnonzero(kind[row[:found]] == q)
+            for n in of_type[np.argsort(-height[of_type])]:
+                near = False
+                for m in range(at):
+                    if abs(taken[m] - f[n]) < apart:
+                        near = True
+                        break
+                if near:
+                    continue
+                taken[at], rows[t, q, at] = f[n], row[n]
+                at += 1
+                if at == count:
+                    break
+            slopes[t, q, :at] = derivatives(levels, theta, upper, lower, rows[t, q, :at], constants)[:, :3]
+    return rows, slopes
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -176,24 +182,31 @@ def sweep(
 
 
 @njit(cache=True, nogil=True)
-def _type_ratio(
-    f: Floats, expected: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
-    scale: float, spread: float, detected: float,
+def joint_ratio(
+    f: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
+    spread: float, detected: float, used: Ints, mark: int,
 ) -> float:  # fmt: skip
-    """ln of the likelihood ratio of lines of a type with intensities e^(expected + scale), against a random background of peaks."""
+    """ln of the likelihood ratio of lines, strong ones first, against a random background of peaks; a peak serves one line only.
+
+    height : ln of the expected intensities. used (peaks,) : work space, in which `mark` stands for a peak that is taken
+    """
     total = 0.0
     for n in range(len(f)):
-        level = expected[n] + scale
-        seen = detected / (1.0 + np.exp(-(level - log_threshold) / (0.4 * spread)))
-        width = 4.0 * sigma[n]
-        p = np.searchsorted(peaks, f[n] - width)
-        ratio = 0.0
-        while p < len(peaks) and peaks[p] <= f[n] + width:
-            x, y = (peaks[p] - f[n]) / sigma[n], (log_peaks[p] - level) / spread
-            if y < 6.0:
-                ratio += np.exp(-0.5 * (x * x + y * y) - log_density[p])
+        seen = detected / (1.0 + np.exp(-(height[n] - log_threshold) / (0.4 * spread)))
+        if seen < 0.02:
+            continue
+        p = np.searchsorted(peaks, f[n] - 4.0 * sigma[n])
+        best, at = 0.0, -1
+        while p < len(peaks) and peaks[p] <= f[n] + 4.0 * sigma[n]:
+            if used[p] != mark:
+                x, y = (peaks[p] - f[n]) / sigma[n], (log_peaks[p] - height[n]) / spread
+                ratio = np.exp(-0.5 * (x * x + y * y) - log_density[p])
+                if ratio > best:
+                    best, at = ratio, p
             p += 1
-        total += np.log(1.0 - seen + seen * ratio / (2 * np.pi * sigma[n] * spread))
+        if at >= 0:
+            used[at] = mark
+        total += np.log(1.0 - seen + seen * best / (2 * np.pi * sigma[n] * spread))
     return total
 
 
@@ -207,6 +220,7 @@ def best_scales(
     Scales are proposed by peaks near the strongest lines. `expected` is ln of the relative intensity.
     """
     ratios, scales = np.zeros(3), np.full(3, -np.inf)
+    used, mark = np.zeros(len(peaks), np.int64), 0
     for q in range(3):
         rows = np.flatnonzero(kind == q)
         if len(rows) == 0:
@@ -229,17 +243,39 @@ def best_scales(
                     continue
                 tried[count] = scale
                 count += 1
-                value = _type_ratio(g, e, s, peaks, log_peaks, log_density, log_threshold, scale, spread, detected)
+                mark += 1
+                value = joint_ratio(
+                    g, e + scale, s, peaks, log_peaks, log_density, log_threshold, spread, detected, used, mark
+                )
                 if value > ratios[q]:
                     ratios[q], scales[q] = value, scale
     return ratios, scales
 
 
 @njit(cache=True, nogil=True)
+def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
+    """The first lines of an order, without those nearer than `apart` to one before."""
+    out = np.empty(min(most, len(order)), np.int64)
+    count = 0
+    for n in order:
+        near = False
+        for m in range(count):
+            if abs(f[out[m]] - f[n]) < apart:
+                near = True
+                break
+        if not near:
+            out[count] = n
+            count += 1
+            if count == len(out):
+                break
+    return out[:count]
+
+
+@njit(cache=True, nogil=True)
 def quick_ratios(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
     tops: Floats, kinds: Ints, temperatures: Floats, low: float, high: float, sigma_mhz: float,
-    peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int,
+    peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int, apart: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """ln of the likelihood ratio of each rigid top (tops,), lines of its family's type alone, and the temperature it is best at."""
     out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
@@ -253,7 +289,7 @@ def quick_ratios(
             continue
         for temperature in temperatures:
             expected = np.log(s_nu[of_type]) - energy[lower[row[of_type]]] / (MHZ_PER_KELVIN * temperature)
-            strongest = np.argsort(-expected)[:most]
+            strongest = _apart(np.argsort(-expected), f[of_type], most, apart)
             chosen = of_type[strongest]
             ratios, _ = best_scales(
                 f[chosen], expected[strongest], np.full(len(chosen), kinds[t]), np.full(len(chosen), sigma_mhz),

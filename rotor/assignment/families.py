@@ -7,20 +7,24 @@ lines of as many tops as possible that the ones before do not serve (greedy cove
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment._kernels import derivatives, strongest_lines
+from rotor.assignment._kernels import strongest_lines
 from rotor.assignment.rigid_table import RigidTable
 
 STRONGEST = 7  # lines of a type from which families are chosen
 COMPANIONS = 16  # lines that a family predicts
 LARGEST_ERROR = 4.0  # of a predicted line, in errors of the family's lines
-FEWEST_COMPANIONS = 5
+FEWEST_COMPANIONS = 4
+SMALLEST_DETERMINANT = 1e-4  # of the derivatives of a family's lines by A, B, C
+SAME_PEAK_MHZ = 0.3  # nearer lines are one peak
+SAMPLES, MOST = 2000, 1500
+LEAST_GAIN = 0.3  # tops that the last family serves anew
 DECAY = 0.45  # what another family is worth for a top that a family serves already
 
 
@@ -74,89 +78,89 @@ def families(
     band_mhz: tuple[float, float],
     temperature_k: tuple[float, float],
     rng: np.random.Generator,
-    samples: int = 800,
-    most: int = 400,
+    samples: int = SAMPLES,
+    most: int = MOST,
 ) -> list[Family]:
-    """Families in the order in which to try them."""
+    """Families in the order in which to try them.
+
+    Parameters
+    ----------
+    table : RigidTable
+    bounds : Bounds
+        Of A, B, C.
+    band_mhz : (float, float)
+        First and last frequency of the spectrum.
+    temperature_k : (float, float)
+        Lowest and highest; log-uniform between them.
+    rng : numpy Generator
+        Draws the tops.
+    samples, most : int
+        Tops, and families at most.
+
+    Returns
+    -------
+    list of Family
+        Those that serve the most tops first.
+    """
     tops = sample_tops(bounds, samples, rng)
     temperatures = np.exp(rng.uniform(*np.log(temperature_k), size=len(tops)))
-    quanta_j = table.quanta[:, 0].astype(np.float64)
-    rows, frequency, _ = strongest_lines(
-        table.levels, table.theta, quanta_j * (quanta_j + 1), table.upper, table.lower, table.kind, table.strength,
-        tops, temperatures, *band_mhz, COMPANIONS,
+    j = table.quanta[:, 0].astype(np.float64)
+    rows, slopes = strongest_lines(
+        table.levels, table.theta, j * (j + 1), table.upper, table.lower, table.kind, table.strength, tops, temperatures,
+        *band_mhz, COMPANIONS, SAME_PEAK_MHZ,
     )  # fmt: skip
-    served, companions = _candidates(table, tops, rows)
-    return _cover(table, served, companions, len(tops), most)
+    return _cover(table, *_members(table, rows, slopes), len(tops), most)
 
 
-def _candidates(
-    table: RigidTable, tops: Floats, rows: Ints
-) -> tuple[dict[tuple[int, ...], list[int]], dict[tuple[int, ...], dict[int, float]]]:
-    """Sampled tops (with type) by family, and weights of companions by family."""
-    served: dict[tuple[int, ...], list[int]] = defaultdict(list)
-    companions: dict[tuple[int, ...], dict[int, float]] = defaultdict(lambda: defaultdict(float))
+def _members(table: RigidTable, rows: Ints, slopes: Floats) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
+    """Families of each sampled top and type: lines (members, 3), the place 3 top + type, all lines and which of them are predicted."""
+    lines, slopes = rows.reshape(-1, COMPANIONS), slopes.reshape(-1, COMPANIONS, 3)
+    enough = np.flatnonzero((lines >= 0).sum(axis=1) >= 3 + FEWEST_COMPANIONS)
     picks = np.array(list(combinations(range(STRONGEST), 3)))
-    constants = np.zeros(8)
-    for t in range(len(tops)):
-        constants[:3] = tops[t]
-        for kind in range(3):
-            lines = rows[t, kind][rows[t, kind] >= 0]
-            if len(lines) < 3 + FEWEST_COMPANIONS:
-                continue
-            slopes = derivatives(table.levels, table.theta, table.upper, table.lower, lines, constants)[:, :3]
-            chosen = picks[(picks < len(lines)).all(axis=1)]
-            matrix = slopes[chosen]
-            regular = np.abs(np.linalg.det(matrix)) > 1e-4
-            chosen, matrix = chosen[regular], matrix[regular]
-            if not len(chosen):
-                continue
-            # errors of all lines in units of the errors of the family's lines, (families, lines)
-            errors = np.abs(slopes @ np.linalg.inv(matrix)).sum(axis=2)
-            good = errors < LARGEST_ERROR
-            for pick, near in zip(chosen, good, strict=True):
-                if near.sum() < 3 + FEWEST_COMPANIONS:
-                    continue
-                key = tuple(sorted(lines[pick].tolist()))
-                served[key].append(3 * t + kind)
-                weights = companions[key]
-                for place, line in enumerate(lines.tolist()):
-                    if near[place] and line not in key:
-                        weights[line] += 1.0 / (4 + place)
-    return served, companions
+    place = np.repeat(enough, len(picks))
+    pick = np.tile(picks, (len(enough), 1))
+    chosen = lines[place[:, None], pick]
+    matrix = slopes[place[:, None], pick]
+    regular = (chosen >= 0).all(axis=1) & (np.abs(np.linalg.det(matrix)) > SMALLEST_DETERMINANT)
+    place, chosen, matrix = place[regular], chosen[regular], matrix[regular]
+    # errors of all lines in units of the errors of the family's lines
+    errors = np.abs(slopes[place] @ np.linalg.inv(matrix)).sum(axis=2)
+    good = (errors < LARGEST_ERROR) & (lines[place] >= 0)
+    kept = good.sum(axis=1) >= 3 + FEWEST_COMPANIONS
+    return np.sort(chosen[kept], axis=1), place[kept], lines[place[kept]], good[kept]
 
 
 def _cover(
-    table: RigidTable,
-    served: dict[tuple[int, ...], list[int]],
-    companions: dict[tuple[int, ...], dict[int, float]],
-    tops: int,
-    most: int,
+    table: RigidTable, chosen: Ints, place: Ints, lines: Ints, good: NDArray[np.bool_], tops: int, most: int
 ) -> list[Family]:
-    keys = list(served)
-    if not keys:
+    """Families by greedy cover of tops with types."""
+    if not len(chosen):
         return []
-    lengths = np.array([len(served[key]) for key in keys])
-    member = np.concatenate([np.array(served[key]) for key in keys])
-    family = np.repeat(np.arange(len(keys)), lengths)
-    order = np.argsort(member, kind="stable")
-    starts = np.searchsorted(member[order], np.arange(3 * tops + 1))
-    worth = np.ones(3 * tops)
-    gain = lengths.astype(float)
-    firsts = np.concatenate([[0], np.cumsum(lengths)])
+    size = len(table.upper)
+    keys, family = np.unique((chosen[:, 0] * size + chosen[:, 1]) * size + chosen[:, 2], return_inverse=True)
+    by_family, by_place = np.argsort(family, kind="stable"), np.argsort(place, kind="stable")
+    firsts = np.searchsorted(family[by_family], np.arange(len(keys) + 1))
+    starts = np.searchsorted(place[by_place], np.arange(3 * tops + 1))
+    worth, gain = np.ones(3 * tops), np.diff(firsts).astype(np.float64)
     out = []
     for _ in range(min(most, len(keys))):
         best = int(np.argmax(gain))
-        if gain[best] < 0.3:
+        if gain[best] < LEAST_GAIN:
             break
-        key = keys[best]
-        weights = companions[key]
-        chosen = sorted(weights, key=lambda line: -weights[line])[:COMPANIONS]
-        out.append(
-            Family(int(table.kind[key[0]]), np.array(key), np.array(chosen), float(gain[best] / tops))
-        )
-        for item in member[firsts[best] : firsts[best + 1]].tolist():
+        members = by_family[firsts[best] : firsts[best + 1]]
+        out.append(_family(table, chosen[members[0]], lines[members], good[members], float(gain[best] / tops)))
+        for item in place[members].tolist():
             lost = worth[item] * (1 - DECAY)
             worth[item] -= lost
-            gain[family[order[starts[item] : starts[item + 1]]]] -= lost
+            gain[family[by_place[starts[item] : starts[item + 1]]]] -= lost
         gain[best] = -1.0
     return out
+
+
+def _family(table: RigidTable, chosen: Ints, lines: Ints, good: NDArray[np.bool_], share: float) -> Family:
+    """A family with the lines that it predicts in most tops, strong ones before weak ones."""
+    weight = 1.0 / (4 + np.broadcast_to(np.arange(lines.shape[1]), lines.shape))
+    useful = good & ~np.isin(lines, chosen)
+    line, which = np.unique(lines[useful], return_inverse=True)
+    total = np.bincount(which, weight[useful])
+    return Family(int(table.kind[chosen[0]]), chosen, line[np.argsort(-total, kind="stable")][:COMPANIONS], share)

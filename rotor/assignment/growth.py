@@ -19,22 +19,25 @@ from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
 SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrations from which a priori sizes of quartic constants follow
 ROUNDS = 24
 WINDOW = 3.5  # standard errors
+LEAST_RATIO = 3.0  # ln of the likelihood ratio of a type from which it counts as present
 FEW, CHANCE_OF_FEW = 12, 0.25  # chance peaks in a window above which a line is not taken, while few lines are assigned
 FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # later on, rising from round to round: safe lines first
 SMALLEST_MHZ = 0.003  # standard error of a peak, at least
 BLENDED_MHZ = 0.08  # predicted lines nearer than this are one peak
 TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
 MOST_LINES = 400
+SHARP_MHZ = 0.03  # standard error of predicted lines that tell the temperature
 
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Lines of all types in the band at some constants: row in the table, frequency, ln of relative intensity, type."""
+    """Lines of all types in the band at some constants: row in the table, frequency, ln of relative intensity, type, lower energy."""
 
     row: Ints
     frequency: Floats
     expected: Floats
     kind: Ints
+    energy: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +89,14 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
         energy, row, f, s_nu,
     )  # fmt: skip
     row, f = row[:count], f[:count]
-    expected = np.log(s_nu[:count]) - energy[table.lower[row]] / (_kernels.MHZ_PER_KELVIN * temperature_k)
+    below = energy[table.lower[row]]
+    expected = np.log(s_nu[:count]) - below / (_kernels.MHZ_PER_KELVIN * temperature_k)
     kind = table.kind[row]
     kept = np.zeros(count, dtype=bool)
     for q in range(3):
         rows = np.flatnonzero(kind == q)
         kept[rows[np.argsort(-expected[rows], kind="stable")[:most]]] = True
-    return Predicted(row[kept], f[kept], expected[kept], kind[kept])
+    return Predicted(row[kept], f[kept], expected[kept], kind[kept], below[kept])
 
 
 def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
@@ -139,9 +143,29 @@ class _Matched:
 
 def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0: float) -> float:
     """The temperature with the greatest likelihood ratio, of the fixed ones or of a grid."""
-    grid = field.temperatures if len(field.temperatures) == 1 else np.array(TEMPERATURES)
-    values = [_ratios(field, constants, covariance, t, sigma0)[1].sum() for t in grid]
-    return float(grid[int(np.argmax(values))])
+    if len(field.temperatures) == 1:
+        return float(field.temperatures[0])
+    lines = predict(field, constants, TEMPERATURES[-1], 4000)
+    errors = _errors(slopes_of(field, lines.row, constants), covariance, sigma0)
+    sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
+    strength = lines.expected[sharp] + lines.energy[sharp] / (_kernels.MHZ_PER_KELVIN * TEMPERATURES[-1])
+    peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
+    for t in TEMPERATURES:
+        expected = strength - lines.energy[sharp] / (_kernels.MHZ_PER_KELVIN * t)
+        ratios, _ = _kernels.best_scales(
+            lines.frequency[sharp], expected, lines.kind[sharp], errors[sharp], peaks.frequency_mhz, peaks.log_intensity,
+            peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 300, 6,
+        )  # fmt: skip
+        if ratios.sum() > best:
+            best, temperature = float(ratios.sum()), t
+    return temperature
+
+
+def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
+    """Standard errors of predicted lines: of the constants and of a measurement."""
+    return np.asarray(
+        np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes, optimize=True), 0.0) + sigma0**2)
+    )
 
 
 def _ratios(
@@ -150,8 +174,7 @@ def _ratios(
     """Predicted lines, ratios and scales by type, errors of lines (lines,), and their derivatives."""
     lines = predict(field, constants, temperature_k, most)
     slopes = slopes_of(field, lines.row, constants)
-    errors = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes, optimize=True), 0.0) + sigma0**2)
-    errors = np.minimum(errors, 2.0)
+    errors = np.minimum(_errors(slopes, covariance, sigma0), 2.0)
     peaks = field.peaks
     ratios, scales = _kernels.best_scales(
         lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
@@ -166,35 +189,56 @@ def _matched(
 ) -> _Matched | None:
     """Lines that take a peak."""
     _, ratios, scales, _, _ = _ratios(field, constants, covariance, temperature_k, sigma0)
-    active = ratios > 3.0
-    if not active.any():
+    if not (ratios > LEAST_RATIO).any():
         return None
-    lines = predict(field, constants, temperature_k)
-    level = lines.expected + np.where(active, scales, -np.inf)[lines.kind]
-    kept = level > field.peaks.log_threshold - 1.0
+    merged = merged_lines(field, constants, temperature_k, np.where(ratios > LEAST_RATIO, scales, -np.inf))
+    if not len(merged.centre):
+        return None
+    variance = np.maximum(np.einsum("ij,jk,ik->i", merged.slope, covariance, merged.slope, optimize=True), 0.0)
+    centre, variance = _predicted_by_others(field, before, merged.main, merged.centre, variance)
+    chosen = _nearest(field, centre, merged.height, np.sqrt(variance + sigma0**2), most_chance)
+    peak = _without_doubles(chosen, merged.height)[merged.blend]
+    mask = (peak >= 0) & (merged.share > 0.02)
+    return _Matched(merged.row[mask], peak[mask], merged.share[mask], ratios, scales)
+
+
+@dataclass(frozen=True, eq=False)
+class Merged:
+    """Predicted lines of all types that are seen as peaks.
+
+    row, share, blend (lines,) : in the table, share in the peak, which peak. centre, height, main (peaks,), slope (peaks, 8) : frequency,
+    ln of the intensity, row of the strongest line, ∂ν/∂c
+    """
+
+    row: Ints
+    share: Floats
+    blend: Ints
+    centre: Floats
+    height: Floats
+    main: Ints
+    slope: Floats
+
+
+def merged_lines(field: Field, constants: Floats, temperature_k: float, scales: Floats, most: int = MOST_LINES) -> Merged:
+    """Lines above the threshold, those nearer than the width of a peak as one."""
+    lines = predict(field, constants, temperature_k, most)
+    level = lines.expected + scales[lines.kind]
+    kept = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
+    kept = kept[np.argsort(lines.frequency[kept], kind="stable")]
     row, f, level = lines.row[kept], lines.frequency[kept], level[kept]
-    order = np.argsort(f, kind="stable")
-    row, f, level = row[order], f[order], level[order]
-    if not len(f):
-        return None
-    slopes = slopes_of(field, row, constants)
+    if not len(kept):
+        none = np.zeros(0)
+        return Merged(row, none, row, none, none, row, np.zeros((0, 8)))
     blend = np.concatenate([[0], np.cumsum(np.diff(f) > BLENDED_MHZ)])
     starts = np.flatnonzero(np.diff(np.concatenate([[-1], blend])))
     weight = np.exp(level - level.max())
     total = np.add.reduceat(weight, starts)
     share = weight / total[blend]
-    centre = np.add.reduceat(share * f, starts)
-    slope = np.add.reduceat(share[:, None] * slopes, starts, axis=0)
-    height = np.log(total) + level.max()
-    variance = np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope, optimize=True), 0.0)
-    main = starts + np.array([np.argmax(part) for part in np.split(share, starts[1:])])
-    centre, variance = _predicted_by_others(field, before, row[main], centre, variance)
-    errors = np.sqrt(variance + sigma0**2)
-    chosen = _nearest(field, centre, height, errors, most_chance)
-    taken = _without_doubles(chosen, centre, height, field)
-    peak = taken[blend]
-    mask = (peak >= 0) & (share > 0.02)
-    return _Matched(row[mask], peak[mask], share[mask], ratios, scales)
+    strongest = np.lexsort((-share, blend))[starts]
+    slope = np.add.reduceat(share[:, None] * slopes_of(field, row, constants), starts, axis=0)
+    return Merged(
+        row, share, blend, np.add.reduceat(share * f, starts), np.log(total) + level.max(), row[strongest], slope
+    )
 
 
 def _predicted_by_others(
@@ -232,7 +276,7 @@ def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_
     return out
 
 
-def _without_doubles(chosen: Ints, centre: Floats, height: Floats, field: Field) -> Ints:
+def _without_doubles(chosen: Ints, height: Floats) -> Ints:
     """Each peak by one line only: the strongest that takes it."""
     out = chosen.copy()
     for peak in np.flatnonzero(np.bincount(chosen[chosen >= 0], minlength=1) > 1).tolist():
@@ -284,14 +328,21 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     the volume of the bounds: - ln V + ½ ln det(2π C) (Laplace's approximation; D. J. C. MacKay, Information Theory,
     Inference, and Learning Algorithms (2003), eq. 28.10).
     """
-    sigma0 = max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
+    sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
     lines = predict(field, grown.constants, grown.temperature_k, 120)
     peaks = field.peaks
-    errors = np.full(len(lines.row), 1.3 * sigma0)
     ratios, scales = _kernels.best_scales(
-        lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
-        peaks.log_threshold, SPREAD, DETECTED, 120, 16,
+        lines.frequency, lines.expected, lines.kind, np.full(len(lines.row), sigma0), peaks.frequency_mhz,
+        peaks.log_intensity, peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 120, 16,
     )  # fmt: skip
+    active = ratios > LEAST_RATIO
+    best = _joint_ratio(field, grown, np.where(active, scales, -np.inf), sigma0)
+    for q in np.flatnonzero(active).tolist():
+        fewer = active.copy()
+        fewer[q] = False
+        without = _joint_ratio(field, grown, np.where(fewer, scales, -np.inf), sigma0) if fewer.any() else 0.0
+        if without > best:
+            best, active = without, fewer
     sizes = quartic_sizes(grown.constants)
     volume = float(np.log(field.bounds.high - field.bounds.low).sum())
     scaled = grown.covariance.copy()
@@ -299,4 +350,18 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     scaled[:, 3:] /= sizes[None, :]
     _, determinant = np.linalg.slogdet(scaled)
     occam = 0.5 * determinant + 1.5 * np.log(2 * np.pi) - volume - 0.5 * float(np.sum((grown.constants[3:] / sizes) ** 2))
-    return replace(grown, ratios=ratios, scales=scales, evidence=float(ratios[ratios > 3].sum() + occam))
+    return replace(
+        grown, ratios=np.where(active, ratios, 0.0), scales=np.where(active, scales, -np.inf), evidence=best + occam
+    )
+
+
+def _joint_ratio(field: Field, grown: Grown, scales: Floats, sigma0: float) -> float:
+    """ln of the likelihood ratio of the lines of all types, those of a peak as one, each peak by one line only."""
+    merged = merged_lines(field, grown.constants, grown.temperature_k, scales)
+    order = np.argsort(-merged.height, kind="stable")
+    peaks = field.peaks
+    value = _kernels.joint_ratio(
+        merged.centre[order], merged.height[order], np.full(len(order), sigma0), peaks.frequency_mhz, peaks.log_intensity,
+        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, np.zeros(len(peaks), np.int64), 1,
+    )  # fmt: skip
+    return float(value)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
-from rotor.assignment.families import Bounds, Family
+from rotor.assignment.families import SAME_PEAK_MHZ, Bounds, Family
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
 
@@ -113,5 +113,5 @@ def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Float
     return _kernels.quick_ratios(
         table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
         field.temperatures, *peaks.band_mhz, ROUGH_MHZ, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
-        peaks.log_threshold, SPREAD, DETECTED, 40,
+        peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ,
     )  # fmt: skip

@@ -15,11 +15,11 @@ from rotor.assignment.growth import Grown, grow, predict
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.search import Candidate, Field, quick_ratios, ranked, roots_of
 
-CLEAR = 120.0  # evidence at which a search ends at once
+CLEAR = 300.0  # evidence at which a search ends at once
 FAINT = 10.0  # ln likelihood ratio below which a root is not grown
 CHUNK = 12  # families between two looks at the candidates
-PER_FAMILY, PER_CHUNK = 4, 4
-NEAR = 2e-3  # relative difference of constants of candidates of which one is enough
+PER_FAMILY, PER_CHUNK = 4, 5
+NEAR, GROWN_NEAR = 3e-4, 2e-3  # relative difference of constants of roots of which one is grown; of those near a species
 MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
 
 Stop = Callable[[], bool]
@@ -36,6 +36,7 @@ class Stage:
 
 FIRST_STAGES = (Stage(60, 0, 120), Stage(60, 120, 400), Stage(110, 0, 220))
 NEXT_STAGES = (Stage(60, 0, 120),)
+SCARCE = 45  # peaks up to which all families are tried: a family costs as the third power of their number
 
 
 @dataclass(eq=False)
@@ -57,7 +58,10 @@ def next_species(
 
     The search ends when a species is clear, when all stages are done, or when the time is over.
     """
-    grown, tried = list[Grown](), list[Floats]()
+    grown, tried = list[Grown](), list[tuple[Floats, float]]()
+    need = 3 if len(seen.peaks) <= SCARCE else 4
+    if len(seen.peaks) <= SCARCE:
+        stages = (Stage(SCARCE, 0, len(families)),)
     for stage in stages:
         seeds = seen.seeds(stage.seeds)
         if len(seeds) < 5:
@@ -68,30 +72,31 @@ def next_species(
                 return _best(grown)
             candidates = list[Candidate]()
             for family in chosen[at : at + CHUNK]:
-                candidates += ranked(seen, family, roots_of(seen, family, seeds), FAINT)[:PER_FAMILY]
+                candidates += ranked(seen, family, roots_of(seen, family, seeds, need), FAINT)[:PER_FAMILY]
             grown += _grown(seen, candidates, tried, PER_CHUNK)
             if grown and max(one.evidence for one in grown) > clear:
                 best = _best(grown)
                 return _best(best + _grown(seen, aliases(seen, best[0]), [], 3))
-        if grown and max(one.evidence for one in grown) > clear / 3:
+        if grown and max(one.evidence for one in grown) > clear / 8:
             break
     best = _best(grown)
     return _best(best + _grown(seen, aliases(seen, best[0]), [], 3)) if best else []
 
 
-def _grown(seen: Field, candidates: list[Candidate], tried: list[Floats], most: int) -> list[Grown]:
+def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, float]], most: int) -> list[Grown]:
     """The best of the candidates grown, without those near to what was tried."""
     out = list[Grown]()
     for candidate in sorted(candidates, key=lambda one: -one.ratio):
         if len(out) >= most:
             break
-        if any(np.abs(np.log(candidate.constants / other)).max() < NEAR for other in tried):
+        if any(np.abs(np.log(candidate.constants / other)).max() < near for other, near in tried):
             continue
-        tried.append(candidate.constants)
+        tried.append((candidate.constants, NEAR))
         species = grow(seen, candidate)
         if species is not None and np.isfinite(species.evidence):
             out.append(species)
-            tried.append(species.constants[:3])
+            if species.evidence > CLEAR / 8:
+                tried.append((species.constants[:3], GROWN_NEAR))
     return out
 
 
