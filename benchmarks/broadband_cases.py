@@ -1,7 +1,8 @@
 """Synthetic peak lists of cold gas with their truth, for `bench_assign.py` and the tests: rotor's own lines, any seed.
 
-A case has one to three molecules of random geometry, their singly substituted ¹³C species where the signal shows them, split lines of
-some weaker species, foreign peaks with intensities of a power law, spurs of a clock, a response with ripple and roll-off, saturation, noise.
+A case has one to three molecules of random geometry, their singly substituted ¹³C species where the signal shows them, split lines
+of some weaker species, foreign peaks with intensities of a power law, spurs of a clock, a response with ripple and roll-off,
+saturation, noise.
 """
 
 from __future__ import annotations

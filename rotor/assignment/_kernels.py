@@ -8,6 +8,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+MIXED = 3  # the type of a family of lines of several types
 MHZ_PER_KELVIN = 20836.61912  # k/h, CODATA 2018
 
 
@@ -41,9 +42,9 @@ def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats,
 @njit(cache=True, nogil=True)
 def lines_in_band(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, strength: NDArray[np.float32],
-    constants: Floats, low: float, high: float, energy: Floats, row: Ints, frequency: Floats, s_nu: Floats,
+    constants: Floats, windows: Floats, energy: Floats, row: Ints, frequency: Floats, s_nu: Floats,
 ) -> int:  # fmt: skip
-    """Lines between two frequencies: their rows in the table, frequencies and S ν²; returns how many."""
+    """Lines within windows (n, 2) of frequency: their rows in the table, frequencies and S ν²; returns how many."""
     level_energies(levels, theta, jj, constants, energy)
     kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
     points = strength.shape[0]
@@ -51,9 +52,15 @@ def lines_in_band(
     k = int(min(max(x, 0.0), points - 2))
     w = min(max(x - k, 0.0), 1.0)
     count = 0
+    low, high = windows[0, 0], windows[-1, 1]
     for n in range(len(upper)):
         f = energy[upper[n]] - energy[lower[n]]
         if low < f < high and count < len(row):
+            inside = False
+            for m in range(len(windows)):
+                inside = inside or (windows[m, 0] <= f <= windows[m, 1])
+            if not inside:
+                continue
             s = (1 - w) * strength[k, n] + w * strength[k + 1, n]
             if s > 1e-3:
                 row[count], frequency[count], s_nu[count] = n, f, s * f * f
@@ -79,23 +86,30 @@ def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: I
 @njit(cache=True, nogil=True)
 def strongest_lines(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
-    tops: Floats, temperatures: Floats, low: float, high: float, count: int, apart: float,
+    tops: Floats, log_dipoles: Floats, temperatures: Floats, windows: Floats, count: int, apart: float,
 ) -> tuple[Ints, Floats]:  # fmt: skip
-    """Per top and type the strongest lines in the band, (tops, 3, count), -1 where none, and ∂ν/∂(A, B, C); of near ones the first."""
-    rows = np.full((len(tops), 3, count), -1)
-    slopes = np.zeros((len(tops), 3, count, 3))
+    """The strongest lines in the band of each top by types a, b, c, and of all types with its dipole; of near lines the first.
+
+    log_dipoles (tops, 3) : ln μ². Returns rows (tops, 4, count), -1 where there is none, and ∂ν/∂(A, B, C) (tops, 4, count, 3).
+    """
+    rows = np.full((len(tops), 4, count), -1)
+    slopes = np.zeros((len(tops), 4, count, 3))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         constants[:3] = tops[t]
-        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu)
+        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
         height = np.empty(found)
         for n in range(found):
             height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_KELVIN * temperatures[t])
-        for q in range(3):
+        for q in range(4):
             taken = np.empty(count)
             at = 0
-            of_type = np.flatnonzero(kind[row[:found]] == q)
+            if q == MIXED:
+                of_type = np.arange(found)
+                height += log_dipoles[t][kind[row[:found]]]
+            else:
+                of_type = np.flatnonzero(kind[row[:found]] == q)
             for n in of_type[np.argsort(-height[of_type])]:
                 near = False
                 for m in range(at):
@@ -154,7 +168,12 @@ def sweep(
                     if last > low and first < high:
                         p = np.searchsorted(seeds, first)
                         while p < n and seeds[p] <= last:
-                            if p != a and p != b and abs(log_seeds[p] - log_seeds[a]) < ratio and abs(log_seeds[p] - log_seeds[b]) < ratio:
+                            if (
+                                p != a
+                                and p != b
+                                and abs(log_seeds[p] - log_seeds[a]) < ratio
+                                and abs(log_seeds[p] - log_seeds[b]) < ratio
+                            ):
                                 w = (seeds[p] - before) / (third - before) if third != before else 0.0
                                 s, d = before_sum + w * (mean - before_sum), before_half + w * (half - before_half)
                                 hits, misses = 0, 0
@@ -274,17 +293,18 @@ def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
 @njit(cache=True, nogil=True)
 def quick_ratios(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
-    tops: Floats, kinds: Ints, temperatures: Floats, low: float, high: float, sigma_mhz: float,
+    tops: Floats, kinds: Ints, temperatures: Floats, windows: Floats, sigma_mhz: float,
     peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int, apart: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """ln of the likelihood ratio of each rigid top (tops,), lines of its family's type alone, and the temperature it is best at."""
+    """ln of the likelihood ratio of each rigid top (tops,), lines of one type or of all, and the temperature it is best at."""
     out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         constants[:3] = tops[t]
-        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, low, high, energy, row, f, s_nu)
-        of_type = np.flatnonzero(kind[row[:found]] == kinds[t])
+        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
+        mixed = kinds[t] == MIXED
+        of_type = np.arange(found) if mixed else np.flatnonzero(kind[row[:found]] == kinds[t])
         if len(of_type) == 0:
             continue
         for temperature in temperatures:
@@ -292,9 +312,9 @@ def quick_ratios(
             strongest = _apart(np.argsort(-expected), f[of_type], most, apart)
             chosen = of_type[strongest]
             ratios, _ = best_scales(
-                f[chosen], expected[strongest], np.full(len(chosen), kinds[t]), np.full(len(chosen), sigma_mhz),
+                f[chosen], expected[strongest], kind[row[chosen]], np.full(len(chosen), sigma_mhz),
                 peaks, log_peaks, log_density, log_threshold, spread, detected, most, 8,
             )  # fmt: skip
-            if ratios[kinds[t]] > out[t]:
-                out[t], best[t] = ratios[kinds[t]], temperature
+            if ratios.sum() > out[t]:
+                out[t], best[t] = ratios.sum(), temperature
     return out, best

@@ -1,4 +1,9 @@
-"""From evidence to a probability and a word."""
+"""From evidence to the probability that constants are right, and to a word.
+
+The evidence ln Z (`rotor.assignment.growth.with_evidence`) compares a species with a random background of peaks. Real spectra are not
+random: another species' pattern, a multiple of J or a twin fit in part. The probability is a logistic function of ln Z whose numbers
+were fitted to synthetic cases (`benchmarks/bench_assign.py`; docs/assign.md shows the calibration).
+"""
 
 from __future__ import annotations
 
@@ -6,14 +11,25 @@ import numpy as np
 
 from rotor.assignment.growth import Grown
 
-MIDDLE, WIDTH = 40.0, 8.0
+CERTAIN, LIKELY, NOT_FOUND = "certain", "likely", "not found"
+LEAST_CERTAIN, LEAST_LIKELY = 0.99, 0.5
+MIDDLE, WIDTH = 40.0, 8.0  # of the logistic function of ln Z
+UNDETERMINED = 0.5  # factor for constants that the lines do not determine: a twin is as good
+FEWEST = 6  # peaks below which nothing is found: three constants, a temperature and a scale are fitted
 
 
 def probability(grown: Grown) -> float:
-    """Probability that the constants are right."""
-    return float(1 / (1 + np.exp(-(grown.evidence - MIDDLE) / WIDTH)))
+    """Probability that the constants of a species are right."""
+    if grown.lines < FEWEST:
+        return 0.0
+    known = 1.0 if grown.determined else UNDETERMINED
+    return known * float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE) / WIDTH, -50, 50))))
 
 
 def word(p: float) -> str:
-    """certain, likely or not found."""
-    return "certain" if p > 0.99 else "likely" if p > 0.5 else "not found"
+    """certain from 0.99, likely from 0.5 on, else not found.
+
+    >>> word(0.999), word(0.7), word(0.1)
+    ('certain', 'likely', 'not found')
+    """
+    return CERTAIN if p >= LEAST_CERTAIN else LIKELY if p >= LEAST_LIKELY else NOT_FOUND

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment._kernels import strongest_lines
+from rotor.assignment._kernels import MIXED, strongest_lines
 from rotor.assignment.rigid_table import RigidTable
 
 STRONGEST = 7  # lines of a type from which families are chosen
@@ -24,13 +24,16 @@ FEWEST_COMPANIONS = 4
 SMALLEST_DETERMINANT = 1e-4  # of the derivatives of a family's lines by A, B, C
 SAME_PEAK_MHZ = 0.3  # nearer lines are one peak
 SAMPLES, MOST = 2000, 1500
+MIXED_WORTH = 0.5  # of a top with lines of several types, over one with lines of a type
+WEAKEST_DIPOLE = 0.1  # component over the largest, of families of lines of several types
+PLACES = 4  # of a top: types a, b, c, and all of them
 LEAST_GAIN = 0.3  # tops that the last family serves anew
 DECAY = 0.45  # what another family is worth for a top that a family serves already
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Three lines of a type by their rows in the table, those they predict, and the share of sampled tops that have them."""
+    """Three lines by their rows in the table, those they predict, the share of sampled tops that they serve; kind: a, b, c or several."""
 
     kind: int
     lines: Ints
@@ -103,17 +106,18 @@ def families(
         Those that serve the most tops first.
     """
     tops = sample_tops(bounds, samples, rng)
-    temperatures = np.exp(rng.uniform(*np.log(temperature_k), size=len(tops)))
+    temperatures = np.exp(rng.uniform(np.log(temperature_k[0]), np.log(temperature_k[1]), len(tops)))
     j = table.quanta[:, 0].astype(np.float64)
     rows, slopes = strongest_lines(
-        table.levels, table.theta, j * (j + 1), table.upper, table.lower, table.kind, table.strength, tops, temperatures,
-        *band_mhz, COMPANIONS, SAME_PEAK_MHZ,
+        table.levels, table.theta, j * (j + 1), table.upper, table.lower, table.kind, table.strength, tops,
+        2 * np.log(rng.uniform(WEAKEST_DIPOLE, 1.0, (len(tops), 3))), temperatures,
+        np.array([band_mhz]), COMPANIONS, SAME_PEAK_MHZ,
     )  # fmt: skip
     return _cover(table, *_members(table, rows, slopes), len(tops), most)
 
 
 def _members(table: RigidTable, rows: Ints, slopes: Floats) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """Families of each sampled top and type: lines (members, 3), the place 3 top + type, all lines and which of them are predicted."""
+    """Families of each sampled top and type: lines (members, 3), the place 4 top + type, all lines and which of them are predicted."""
     lines, slopes = rows.reshape(-1, COMPANIONS), slopes.reshape(-1, COMPANIONS, 3)
     enough = np.flatnonzero((lines >= 0).sum(axis=1) >= 3 + FEWEST_COMPANIONS)
     picks = np.array(list(combinations(range(STRONGEST), 3)))
@@ -140,8 +144,9 @@ def _cover(
     keys, family = np.unique((chosen[:, 0] * size + chosen[:, 1]) * size + chosen[:, 2], return_inverse=True)
     by_family, by_place = np.argsort(family, kind="stable"), np.argsort(place, kind="stable")
     firsts = np.searchsorted(family[by_family], np.arange(len(keys) + 1))
-    starts = np.searchsorted(place[by_place], np.arange(3 * tops + 1))
-    worth, gain = np.ones(3 * tops), np.diff(firsts).astype(np.float64)
+    starts = np.searchsorted(place[by_place], np.arange(PLACES * tops + 1))
+    worth = np.where(np.arange(PLACES * tops) % PLACES == MIXED, MIXED_WORTH, 1.0)
+    gain = np.bincount(family, worth[place], minlength=len(keys))
     out = []
     for _ in range(min(most, len(keys))):
         best = int(np.argmax(gain))
@@ -157,10 +162,17 @@ def _cover(
     return out
 
 
+def _mixed(table: RigidTable, lines: Ints, kind: int) -> bool:
+    """Whether more than a third of lines are of another type than one."""
+    return bool((table.kind[lines] != kind).mean() > 1 / 3) if len(lines) else False
+
+
 def _family(table: RigidTable, chosen: Ints, lines: Ints, good: NDArray[np.bool_], share: float) -> Family:
     """A family with the lines that it predicts in most tops, strong ones before weak ones."""
     weight = 1.0 / (4 + np.broadcast_to(np.arange(lines.shape[1]), lines.shape))
     useful = good & ~np.isin(lines, chosen)
     line, which = np.unique(lines[useful], return_inverse=True)
     total = np.bincount(which, weight[useful])
-    return Family(int(table.kind[chosen[0]]), chosen, line[np.argsort(-total, kind="stable")][:COMPANIONS], share)
+    kinds = table.kind[chosen]
+    kind = int(kinds[0]) if (kinds == kinds[0]).all() and not _mixed(table, line, int(kinds[0])) else MIXED
+    return Family(kind, chosen, line[np.argsort(-total, kind="stable")][:COMPANIONS], share)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
@@ -26,6 +25,9 @@ SMALLEST_MHZ = 0.003  # standard error of a peak, at least
 BLENDED_MHZ = 0.08  # predicted lines nearer than this are one peak
 TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
 MOST_LINES = 400
+OPEN = 1e-3  # relative standard error from which a constant is not known
+FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
+LARGER = (10.0, 40.0)  # factors of the errors when a species is grown again
 SHARP_MHZ = 0.03  # standard error of predicted lines that tell the temperature
 
 
@@ -45,8 +47,9 @@ class Grown:
     """A species as far as lines could be added.
 
     constants (8,), covariance (8, 8) in MHz: A, B, C, DJ, DJK, DK, d1, d2. temperature_k. ratios (3,), scales (3,) by type: ln of
-    likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks, obs - calc in MHz, share in
-    the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
+    likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks,
+    obs - calc in MHz, share in the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
+    start : the root that it was grown from.
     """
 
     constants: Floats
@@ -64,6 +67,12 @@ class Grown:
     start: Candidate | None = None
 
     @property
+    def determined(self) -> bool:
+        """Whether B and C are known to 0.1 %; lines of Q branches alone leave A + C open, and what is a twin."""
+        errors = np.sqrt(np.diag(self.covariance)[1:3])
+        return bool((errors < OPEN * self.constants[1:3]).all())
+
+    @property
     def lines(self) -> int:
         """Number of peaks assigned."""
         return len(set(self.peak.tolist()))
@@ -79,13 +88,20 @@ def quartic_sizes(constants: Floats) -> Floats:
     return 4 / SOFTEST_MHZ**2 * np.array([mean**3, a * mean**2, a**3, mean**3 / 2, mean**3 / 6])
 
 
+def quartic_prior(field: Field, constants: Floats) -> tuple[Floats, Floats]:
+    """A-priori values and standard errors of the quartic constants: about 0, or those of a parent within a fifth of their size."""
+    if field.parent is None:
+        return np.zeros(5), quartic_sizes(constants)
+    return field.parent[3:], 0.2 * np.abs(field.parent[3:]) + 0.01 * quartic_sizes(constants)
+
+
 def predict(field: Field, constants: Floats, temperature_k: float, most: int = MOST_LINES) -> Predicted:
     """The strongest lines of each type in the band."""
     table = field.table
     size = len(table.upper)
     energy, row, f, s_nu = np.empty(len(field.jj)), np.empty(size, np.int64), np.empty(size), np.empty(size)
     count = _kernels.lines_in_band(
-        table.levels, table.theta, field.jj, table.upper, table.lower, table.strength, constants, *field.peaks.band_mhz,
+        table.levels, table.theta, field.jj, table.upper, table.lower, table.strength, constants, field.peaks.windows,
         energy, row, f, s_nu,
     )  # fmt: skip
     row, f = row[:count], f[:count]
@@ -102,20 +118,48 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
 def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
     """∂ν/∂c of lines (rows, 8)."""
     table = field.table
-    return _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
+    slopes: Floats = _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
+    return slopes
 
 
 def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
     """The species that a candidate leads to; None where its constants run out of order."""
-    constants = np.concatenate([start.constants, np.zeros(5)])
-    prior = np.diag(1 / np.concatenate([0.05 * constants[:3], quartic_sizes(constants)]) ** 2)
+    centre, sizes = quartic_prior(field, start.constants)
+    constants = np.concatenate([start.constants, centre])
+    prior = np.diag(1 / np.concatenate([0.05 * constants[:3], sizes]) ** 2)
     slopes = slopes_of(field, start.family.lines, constants)
-    covariance = np.linalg.inv(slopes.T @ slopes / 0.05**2 + prior)
+    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes / FIRST_MHZ**2 + prior), dtype=np.float64)
+    return _grown(field, constants, covariance, prior, FIRST_MHZ, start, rounds)
+
+
+def regrown(field: Field, species: Grown) -> Grown:
+    """The species grown again from its constants with errors that are taken to be larger, where that gives more evidence.
+
+    Lines that were taken too early and hold others off are given up that way.
+    """
+    best, start = species, species.start
+    if start is None:
+        return species
+    _, sizes = quartic_prior(field, species.constants)
+    prior = np.diag(1 / np.concatenate([0.05 * species.constants[:3], sizes]) ** 2)
+    for factor in LARGER:
+        covariance = np.linalg.inv(np.linalg.inv(species.covariance) / factor**2 + prior)
+        begin = start._replace(temperature_k=species.temperature_k)
+        sigma0 = max(3 * species.rms_mhz, SMALLEST_MHZ)
+        again = _grown(field, species.constants, np.asarray(covariance, dtype=np.float64), prior, sigma0, begin, ROUNDS)
+        if again is not None and again.evidence > best.evidence:
+            best = again
+    return best
+
+
+def _grown(
+    field: Field, constants: Floats, covariance: Floats, prior: Floats, sigma0: float, start: Candidate, rounds: int
+) -> Grown | None:
+    """Rounds of matching and refitting until no line is added."""
     temperature, last, before = start.temperature_k, -1, -1
     found: Grown | None = None
-    sigma0 = 0.05
     for turn in range(rounds):
-        if turn in (1, 3, 6, 9, 12, 15, 18, 21):
+        if turn == 1 or (turn and turn % 3 == 0):
             temperature = best_temperature(field, constants, covariance, sigma0)
         chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else CHANCE_OF_FEW
         matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
@@ -184,7 +228,12 @@ def _ratios(
 
 
 def _matched(
-    field: Field, constants: Floats, covariance: Floats, temperature_k: float, sigma0: float, most_chance: float,
+    field: Field,
+    constants: Floats,
+    covariance: Floats,
+    temperature_k: float,
+    sigma0: float,
+    most_chance: float,
     before: Grown | None,
 ) -> _Matched | None:
     """Lines that take a peak."""
@@ -219,7 +268,9 @@ class Merged:
     slope: Floats
 
 
-def merged_lines(field: Field, constants: Floats, temperature_k: float, scales: Floats, most: int = MOST_LINES) -> Merged:
+def merged_lines(
+    field: Field, constants: Floats, temperature_k: float, scales: Floats, most: int = MOST_LINES
+) -> Merged:
     """Lines above the threshold, those nearer than the width of a peak as one."""
     lines = predict(field, constants, temperature_k, most)
     level = lines.expected + scales[lines.kind]
@@ -287,7 +338,13 @@ def _without_doubles(chosen: Ints, height: Floats) -> Ints:
 
 
 def _refitted(
-    field: Field, constants: Floats, prior: Floats, temperature: float, matched: _Matched, sigma0: float, start: Candidate
+    field: Field,
+    constants: Floats,
+    prior: Floats,
+    temperature: float,
+    matched: _Matched,
+    sigma0: float,
+    start: Candidate,
 ) -> tuple[Floats, Floats, float, Grown]:
     """One step of weighted least squares, with weights that fall for far lines."""
     peaks = field.peaks
@@ -307,8 +364,8 @@ def _refitted(
     weight = 1 / (sigma**2 * (1 + (residual / (2.4 * sigma)) ** 2))
     normal = slope.T @ (weight[:, None] * slope) + prior
     pull = slope.T @ (weight * residual)
-    pull[3:] -= np.diag(prior)[3:] * constants[3:]
-    covariance = np.linalg.inv(normal)
+    pull[3:] -= np.diag(prior)[3:] * (constants[3:] - quartic_prior(field, constants)[0])
+    covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     new = constants + covariance @ pull
     after = residual - slope @ (new - constants)
     scatter = 1.4826 * float(np.median(np.abs(after))) * np.sqrt(len(peak) / max(len(peak) - 4, 1.0))
@@ -343,13 +400,18 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
         without = _joint_ratio(field, grown, np.where(fewer, scales, -np.inf), sigma0) if fewer.any() else 0.0
         if without > best:
             best, active = without, fewer
-    sizes = quartic_sizes(grown.constants)
+    centre, sizes = quartic_prior(field, grown.constants)
     volume = float(np.log(field.bounds.high - field.bounds.low).sum())
     scaled = grown.covariance.copy()
     scaled[3:] /= sizes[:, None]
     scaled[:, 3:] /= sizes[None, :]
     _, determinant = np.linalg.slogdet(scaled)
-    occam = 0.5 * determinant + 1.5 * np.log(2 * np.pi) - volume - 0.5 * float(np.sum((grown.constants[3:] / sizes) ** 2))
+    occam = (
+        0.5 * determinant
+        + 1.5 * np.log(2 * np.pi)
+        - volume
+        - 0.5 * float(np.sum(((grown.constants[3:] - centre) / sizes) ** 2))
+    )
     return replace(
         grown, ratios=np.where(active, ratios, 0.0), scales=np.where(active, scales, -np.inf), evidence=best + occam
     )

@@ -14,18 +14,24 @@ from rotor.table import Table
 
 CLOCKS_MHZ = (10.0, 20.0, 25.0, 50.0, 100.0, 125.0, 200.0, 250.0, 500.0)
 DENSITY_WIDTH_MHZ = 400.0
+EMPTY = 30.0  # mean distances between peaks: a longer empty stretch was not recorded
 LOG_WIDTH = 0.35  # of the kernel that estimates the density of ln intensity
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PeakList(Table):
-    """Peaks rising in frequency: frequency_mhz, intensity, uncertainty_mhz (n,) each; band_mhz: first and last frequency recorded."""
+    """Peaks rising in frequency.
+
+    frequency_mhz, intensity, uncertainty_mhz (n,). band_mhz : first and last frequency recorded. given_windows (k, 2) : parts of the
+    band, where they are known.
+    """
 
     frequency_mhz: Floats
     intensity: Floats
     uncertainty_mhz: Floats
     band_mhz: tuple[float, float]
     source: str = ""
+    given_windows: Floats | None = None
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -36,6 +42,19 @@ class PeakList(Table):
             "uncertainty_mhz": self.uncertainty_mhz,
         }
 
+    @cached_property
+    def windows(self) -> Floats:
+        """Parts of the band that were recorded (n, 2), without stretches that are empty though thirty peaks were to be expected."""
+        if self.given_windows is not None:
+            return self.given_windows
+        f = np.concatenate([[self.band_mhz[0]], self.frequency_mhz, [self.band_mhz[1]]])
+        steps = np.diff(f)
+        empty = np.flatnonzero(steps > max(EMPTY * float(np.mean(steps)), 0.01 * (f[-1] - f[0])))
+        inner = empty[(empty > 0) & (empty < len(steps) - 1)]
+        first = np.concatenate([[f[0]], f[inner + 1] - 1.0])
+        last = np.concatenate([f[inner] + 1.0, [f[-1]]])
+        return np.column_stack([first, last])
+
     def where(self, mask: NDArray[np.bool_]) -> PeakList:
         """The peaks of a mask."""
         return replace(
@@ -43,6 +62,7 @@ class PeakList(Table):
             frequency_mhz=self.frequency_mhz[mask],
             intensity=self.intensity[mask],
             uncertainty_mhz=self.uncertainty_mhz[mask],
+            given_windows=self.windows,
         )
 
     @cached_property
@@ -101,14 +121,20 @@ def peak_list(
     error = np.broadcast_to(np.asarray(0.01 if uncertainty_mhz is None else uncertainty_mhz, dtype=np.float64), f.shape)
     where = f"{source}: " if source else ""
     if f.ndim != 1 or f.shape != height.shape:
-        raise ValueError(f"{where}{f.shape} frequencies and {height.shape} intensities; two columns of equal length are needed")
+        raise ValueError(
+            f"{where}{f.shape} frequencies and {height.shape} intensities; two columns of equal length are needed"
+        )
     if len(f) < 2:
-        raise ValueError(f"{where}{len(f)} peak: constants need more; at least 5 lines of a species must be in the list")
+        raise ValueError(
+            f"{where}{len(f)} peak: constants need more; at least 5 lines of a species must be in the list"
+        )
     for name, column in (("frequency_mhz", f), ("intensity", height), ("uncertainty_mhz", error)):
         bad = np.flatnonzero(~(np.isfinite(column) & (column > 0)))
         if len(bad):
             hint = "; give heights on a linear scale, with the baseline at 0" if name == "intensity" else ""
-            raise ValueError(f"{where}row {bad[0] + 1}: {name} is {column[bad[0]]:g}; a finite number above 0 is needed{hint}")
+            raise ValueError(
+                f"{where}row {bad[0] + 1}: {name} is {column[bad[0]]:g}; a finite number above 0 is needed{hint}"
+            )
     if f.max() < 500.0:
         raise ValueError(
             f"{where}frequencies from {f.min():g} to {f.max():g}: below 500 MHz no top has a spectrum that can be searched; "

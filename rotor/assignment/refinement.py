@@ -11,16 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.assignment.growth import SMALLEST_MHZ, Grown, quartic_sizes
-from rotor.assignment.rigid_table import PARAMETERS, RigidTable
+from rotor.assignment.growth import OPEN, SMALLEST_MHZ, Grown, quartic_sizes
 from rotor.assignment.peaks import PeakList
+from rotor.assignment.rigid_table import PARAMETERS, RigidTable
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.fit import Fit, FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.tops.constants import Constants
 
 REJECTED = 5.0  # standard errors beyond which a line does not count
-OPEN = 1e-3  # relative standard error above which a constant is said to be open
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,9 @@ class Refined:
     @property
     def open_constants(self) -> tuple[str, ...]:
         """Which of A, B, C the lines leave open: known to no better than 0.1 %."""
-        return tuple(name for name, value, error in zip("ABC", self.values, self.errors, strict=False) if error > OPEN * value)
+        return tuple(
+            name for name, value, error in zip("ABC", self.values, self.errors, strict=False) if error > OPEN * value
+        )
 
 
 def assigned_lines(grown: Grown, peaks: PeakList, table: RigidTable) -> Assignments:
@@ -51,7 +52,9 @@ def assigned_lines(grown: Grown, peaks: PeakList, table: RigidTable) -> Assignme
 def refine(grown: Grown, peaks: PeakList, table: RigidTable) -> Refined:
     """The species fitted."""
     lines = assigned_lines(grown, peaks, table)
-    start = Constants(**dict(zip(PARAMETERS, grown.constants.tolist(), strict=True)), reduction="S", representation="Ir")
+    start = Constants(
+        **dict(zip(PARAMETERS, grown.constants.tolist(), strict=True)), reduction="S", representation="Ir"
+    )
     sizes = quartic_sizes(grown.constants)
     free = parameters(start, PARAMETERS, priors_mhz=dict(zip(PARAMETERS[3:], sizes.tolist(), strict=True)))
     free = type(free)(**{**free.__dict__, "centre": np.concatenate([free.start[:3], np.zeros(5)])})

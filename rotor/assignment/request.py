@@ -1,143 +1,246 @@
-"""A request for constants from a spectrum, and what answers it."""
+"""A request for constants from a spectrum, and its answer."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
+from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.assignment.doublets import with_centres
 from rotor.assignment.evidence import probability, word
-from rotor.assignment.families import Bounds, Family, families
+from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown
+from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologue
 from rotor.assignment.peaks import PeakList, spurs
-from rotor.assignment.refinement import Refined, refine
-from rotor.assignment.rigid_table import rigid_table
+from rotor.assignment.refinement import refine
+from rotor.assignment.rigid_table import JMAX, rigid_table
 from rotor.assignment.search import Field
 from rotor.assignment.species import (
     FIRST_STAGES,
     NEXT_STAGES,
     Clock,
+    compiled,
     explained,
     next_species,
     strength,
-    without,
 )
-from rotor.checks import require_positive, require_whole
+from rotor.molecules.molecule import Molecule
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Flag, Numbers, Quantity, Whole
 
-WIDEST = Bounds(np.array([500.0, 200.0, 150.0]), np.array([20000.0, 12000.0, 9000.0]))
+LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # of A, B, C, where nothing is known
 COLDEST_K, HOTTEST_K = 0.7, 12.0
-JMAX = 30
-GUESS = 0.03
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
+GUESS_ERROR = 0.033  # of a guess: 3 % and a little
+SAMPLES_OF_GUESS = 300
+STRONG, MANY = 20, 5  # so many of the strongest peaks without a species: a stronger one may be there
 
 
 @dataclass(frozen=True)
 class AssignRequest:
-    """Constants to find.
+    """Constants to find in a spectrum; every field is checked when the request is made.
 
-    peaks : of the spectrum. temperature_k : of the gas, None where it is not known. species : how many to look for
-    guess : A, B, C in MHz known to 3 %. bounds : of A, B, C in MHz. seconds : after which the search ends with what it has
+    peaks : of the spectrum. species : how many are looked for; a stronger one that is met on the way is added. temperature_k : of the
+    gas; None: not known. guess_mhz : A, B, C known to 3 %. low_mhz, high_mhz : bounds of A, B, C. isotopologues : whether those of
+    `molecule` are looked for. molecule : geometry of the first species. seconds : after which the search ends with what it has.
+    seed : of the sample of tops from which families of lines are chosen.
     """
 
     peaks: PeakList
-    temperature_k: float | None = None
-    species: int = 1
-    guess: tuple[float, float, float] | None = None
-    bounds: Bounds = WIDEST
-    seconds: float = 20.0
-    seed: int = 1
+    molecule: Molecule | None = field(default=None, repr=False)
+    species: int = declared(1, Whole(1, 20), "How many species to look for", "observables.species", common=True)
+    temperature_k: float | None = declared(
+        None,
+        Quantity("K", above=0, metavar="T"),
+        "Temperature of the gas (K); by default it is found",
+        "conditions.temperature",
+        common=True,
+        example=2.0,
+    )
+    guess_mhz: tuple[float, ...] | None = declared(
+        None,
+        Numbers("MHz", (3,), "2458,490,409"),
+        "A, B, C known to 3 % (MHz)",
+        "observables.guess",
+        common=True,
+        example=[2458.0, 490.0, 409.0],
+    )
+    low_mhz: tuple[float, ...] = declared(
+        LOWEST_MHZ, Numbers("MHz", (3,), "500,200,150"), "Least A, B, C (MHz)", "observables.low"
+    )
+    high_mhz: tuple[float, ...] = declared(
+        HIGHEST_MHZ, Numbers("MHz", (3,), "20000,12000,9000"), "Greatest A, B, C (MHz)", "observables.high"
+    )
+    isotopologues: bool = declared(
+        False,
+        Flag(),
+        "Look for isotopologues of the first species; needs its geometry",
+        "observables.isotopologues",
+        common=True,
+    )
+    seconds: float = declared(
+        20.0, Quantity("s", above=0, metavar="T"), "End the search after so many seconds", "numerics.seconds"
+    )
+    seed: int = declared(1, Whole(0), "Seed of the sample of tops", "numerics.seed")
 
     def __post_init__(self) -> None:
-        require_whole("species", self.species, 1, 20)
-        require_positive("seconds", self.seconds, "s")
-        if self.temperature_k is not None:
-            require_positive("temperature_k", self.temperature_k, "K")
+        check_fields(self)
+        low, high = np.array(self.low_mhz), np.array(self.high_mhz)
+        if not (low < high).all() or not (low > 0).all():
+            raise ValueError(
+                f"low_mhz: {self.low_mhz}, high_mhz: {self.high_mhz}: expected 0 < low < high for A, B and C"
+            )
+        if self.guess_mhz is not None and not (self.guess_mhz[0] > self.guess_mhz[1] > self.guess_mhz[2] > 0):
+            raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
+        if self.isotopologues and self.molecule is None:
+            raise ValueError("isotopologues: a geometry of the first species is needed; give it as the molecule")
 
     @property
-    def search_bounds(self) -> Bounds:
-        """The bounds, or those of the guess."""
-        if self.guess is None:
-            return self.bounds
-        centre = np.array(self.guess)
-        return Bounds(centre * (1 - 1.1 * GUESS), centre * (1 + 1.1 * GUESS))
-
-
-@dataclass(frozen=True, eq=False)
-class AssignedSpecies:
-    """One species of the answer."""
-
-    grown: Grown
-    refined: Refined
-    peak: NDArray[np.int64]
-    strength: float
-    probability: float
-    twins: tuple[Floats, ...] = ()
+    def bounds(self) -> Bounds:
+        """Of A, B, C, those of the guess where there is one."""
+        if self.guess_mhz is None:
+            return Bounds(np.array(self.low_mhz), np.array(self.high_mhz))
+        centre = np.array(self.guess_mhz)
+        return Bounds(centre * (1 - GUESS_ERROR), centre * (1 + GUESS_ERROR))
 
     @property
-    def word(self) -> str:
-        """certain, likely or not found."""
-        return word(self.probability)
-
-
-@dataclass(frozen=True, eq=False)
-class AssignAnswer:
-    """Species by falling strength, and which peaks nothing explains."""
-
-    request: AssignRequest
-    species: tuple[AssignedSpecies, ...]
-    unexplained: NDArray[np.bool_]
-    spurs: NDArray[np.bool_]
+    def temperatures(self) -> Floats:
+        """Those that are tried (K)."""
+        return np.array(TRIED_K if self.temperature_k is None else [self.temperature_k])
 
 
 @lru_cache(maxsize=8)
-def _families(bounds: tuple[float, ...], band: tuple[float, float], temperature: tuple[float, float], seed: int) -> list[Family]:
-    low_high = np.array(bounds).reshape(3, 2)
+def families_for(
+    bounds: tuple[float, ...], band_mhz: tuple[float, float], range_k: tuple[float, float], seed: int, samples: int
+) -> list[Family]:
+    """Families in the order in which to try them; the same ones again where nothing has changed."""
+    pairs = np.array(bounds).reshape(3, 2)
     rng = np.random.default_rng(seed)
-    return families(rigid_table(JMAX), Bounds(low_high[:, 0], low_high[:, 1]), band, temperature, rng)
+    return families(rigid_table(JMAX), Bounds(pairs[:, 0], pairs[:, 1]), band_mhz, range_k, rng, samples, MOST)
+
+
+def families_of(request: AssignRequest) -> list[Family]:
+    """Families for the band, bounds and temperature of a request."""
+    known = request.temperature_k
+    range_k = (COLDEST_K, HOTTEST_K) if known is None else (0.8 * known, 1.25 * known)
+    samples = SAMPLES if request.guess_mhz is None else SAMPLES_OF_GUESS
+    return families_for(tuple(request.bounds.array.tolist()), request.peaks.band_mhz, range_k, request.seed, samples)
 
 
 def answer_assign(request: AssignRequest) -> AssignAnswer:
-    """The answer."""
-    clock = Clock(request.seconds)
-    peaks = request.peaks
-    of_clock = spurs(peaks)
-    known = request.temperature_k
-    temperatures = np.array(TRIED_K if known is None else [known])
-    bounds = request.search_bounds
-    range_k = (COLDEST_K, HOTTEST_K) if known is None else (0.9 * known, 1.1 * known)
-    tried = _families(tuple(bounds.array.tolist()), peaks.band_mhz, range_k, request.seed)
-    left = ~of_clock
-    table = rigid_table(JMAX)
-    out = list[AssignedSpecies]()
-    extra = 2
-    while True:
-        seen = Field(peaks.where(left), table, bounds, temperatures)
-        stages = FIRST_STAGES if len(out) < request.species else NEXT_STAGES
-        rivals = next_species(seen, tried, stages, clock)
-        if not rivals or word(probability(rivals[0])) == "not found":
-            break
-        best = rivals[0]
-        rows = np.flatnonzero(left)
-        refined = refine(best, seen.peaks, table)
-        twins = tuple(one.constants for one in rivals[1:] if one.evidence > best.evidence - 5)
-        out.append(
-            AssignedSpecies(best, refined, rows[best.peak], strength(seen, best), probability(best), twins)
-        )
-        left[rows[explained(seen, best, 0.1)]] = False
-        if len(out) >= request.species:
-            if extra == 0 or not _stronger_left(peaks, left, of_clock, out):
+    """The species of a spectrum with their constants, as far as they stand above chance.
+
+    Parameters
+    ----------
+    request : AssignRequest
+
+    Returns
+    -------
+    AssignAnswer
+        Species by falling strength; none where nothing is found.
+
+    Notes
+    -----
+    The method is described in docs/assign.md. Only asymmetric tops with lines of J up to 30 are found. The answer to a request is always
+    the same, unless the search ends by its seconds.
+    """
+    search = _Search(request, spurs(request.peaks))
+    search.main_species()
+    if request.isotopologues:
+        search.isotopologues()
+    return search.answer()
+
+
+@dataclass(eq=False)
+class _Search:
+    """A search under way: which peaks are left, and the species so far."""
+
+    request: AssignRequest
+    of_clock: NDArray[np.bool_]
+    species: list[AssignedSpecies] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.left = ~self.of_clock
+        self.table = rigid_table(JMAX)
+        self.families = families_of(self.request)
+        compiled(self.table)
+        self.clock = Clock(self.request.seconds)
+
+    def main_species(self) -> None:
+        """Species with structure of their own: as many as asked for, and stronger ones."""
+        extra = 2
+        while len(self.species) < self.request.species or (extra and self._stronger_may_be_left()):
+            extra -= len(self.species) >= self.request.species
+            if not self._one_more():
                 break
-            extra -= 1
-    out.sort(key=lambda one: -one.strength)
-    return AssignAnswer(request, tuple(out), left, of_clock)
 
+    def _one_more(self) -> bool:
+        """Whether a further species was found, split lines as their centres where single ones show none."""
+        stages = FIRST_STAGES if not self.species else NEXT_STAGES
+        rows = np.flatnonzero(self.left)
+        if len(rows) < 5:
+            return False
+        peaks = self.request.peaks.where(self.left)
+        rivals = self._rivals(peaks, stages)
+        if rivals:
+            self._add(peaks, np.column_stack([rows, rows]), rivals)
+            return True
+        if not self.species and self.request.species == 1 and len(peaks) > 2000:
+            return False
+        centres, members = with_centres(peaks)
+        rivals = self._rivals(centres, NEXT_STAGES)
+        if rivals:
+            self._add(centres, rows[members], rivals)
+        return bool(rivals)
 
-def _stronger_left(
-    peaks: PeakList, left: NDArray[np.bool_], of_clock: NDArray[np.bool_], species: list[AssignedSpecies]
-) -> bool:
-    """Whether several of the strongest peaks belong to nothing yet, so that a stronger species may be there."""
-    order = np.argsort(np.where(of_clock, 0.0, -peaks.intensity))[:20]
-    return int(left[order].sum()) >= 5
+    def _rivals(self, peaks: PeakList, stages: Any) -> list[Grown]:
+        seen = Field(peaks, self.table, self.request.bounds, self.request.temperatures)
+        rivals = next_species(seen, self.families, stages, self.clock)
+        return rivals if rivals and word(probability(rivals[0])) != "not found" else []
+
+    def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> None:
+        """Take the first of the rivals, and what it explains from the peaks."""
+        best = rivals[0]
+        seen = Field(peaks, self.table, self.request.bounds, self.request.temperatures)
+        refined = refine(best, peaks, self.table)
+        twins = tuple(
+            (other.constants[:3], other.evidence) for other in rivals[1:] if other.evidence > best.evidence - 10
+        )
+        self.species.append(
+            AssignedSpecies(
+                grown=best, refined=refined, peak=members[best.peak], strength=strength(seen, best),
+                probability=probability(best), twins=twins, isotopologue=isotopologue,
+            )
+        )  # fmt: skip
+        mask = explained(seen, best)
+        self.left[members[mask].ravel()] = False
+
+    def _stronger_may_be_left(self) -> bool:
+        """Whether several of the strongest peaks belong to nothing yet."""
+        order = np.argsort(np.where(self.of_clock, 0.0, -self.request.peaks.intensity))[:STRONG]
+        return int(self.left[order].sum()) >= MANY
+
+    def isotopologues(self) -> None:
+        """Isotopologues of the strongest species."""
+        if not self.species or self.request.molecule is None:
+            return
+        parent = max(self.species, key=lambda one: one.strength)
+        for one in expected_isotopologues(parent.refined.values, self.request.molecule):
+            if self.clock.over() or self.left.sum() < 5:
+                break
+            rows = np.flatnonzero(self.left)
+            peaks = self.request.peaks.where(self.left)
+            constants = replace(parent.grown, constants=parent.refined.values)
+            grown = find_isotopologue(peaks, constants, one, self.table)
+            if grown is not None:
+                self._add(peaks, np.column_stack([rows, rows]), [grown], one.label)
+
+    def answer(self) -> AssignAnswer:
+        """Species by falling strength, isotopologues behind them."""
+        order = sorted(self.species, key=lambda one: (bool(one.isotopologue), -one.strength))
+        return AssignAnswer(self.request, tuple(order), self.left, self.of_clock, self.clock.over())

@@ -86,7 +86,9 @@ def rigid_table(jmax: int = JMAX) -> RigidTable:
 
 def _top(kappa: float) -> Top:
     """A top with ½(A+C) = 3 and ½(A-C) = 1."""
-    constants = Constants(A=4.0, B=3.0 + kappa, C=2.0, DJ=0.0, DJK=0.0, DK=0.0, d1=0.0, d2=0.0, reduction="S", representation="Ir")
+    constants = Constants(
+        A=4.0, B=3.0 + kappa, C=2.0, DJ=0.0, DJK=0.0, DK=0.0, d1=0.0, d2=0.0, reduction="S", representation="Ir"
+    )
     return Top.from_constants(constants, dipole_abc_debye=(1.0, 1.0, 1.0))
 
 

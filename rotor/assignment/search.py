@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
@@ -40,12 +41,13 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """What a search sees: peaks, the table, bounds of constants, temperatures to try."""
+    """What a search sees: peaks, the table, bounds of constants, temperatures to try; constants (8,) of a parent with like distortion."""
 
     peaks: PeakList
     table: RigidTable
     bounds: Bounds
     temperatures: Floats
+    parent: Floats | None = None
 
     @cached_property
     def jj(self) -> Floats:
@@ -59,7 +61,7 @@ class Field:
         return np.argsort(-self.peaks.intensity, kind="stable")
 
     @cached_property
-    def near(self) -> np.ndarray:
+    def near(self) -> NDArray[np.float32]:
         """Distance (MHz) from the centres of bins of the band to the nearest of the strongest peaks."""
         low, high = self.peaks.band_mhz
         most = max(30, int(CHANCE * (high - low) / (2 * NEAR_MHZ)))
@@ -74,10 +76,12 @@ class Field:
         return np.sort(self.order[:count])
 
 
-def roots_of(field: Field, family: Family, seeds: Ints, need: int = 4) -> Floats:
+def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     """Roots of a family (n, 5): hits, misses, A, B, C."""
     table = field.table
-    upper, lower = table.upper[family.lines], table.lower[family.lines]
+    # the line with the largest change of J first: two Q branches alone do not give ½(A+C)
+    lines = family.lines[np.argsort(-np.abs(_change_of_jj(field, family.lines)), kind="stable")]
+    upper, lower = table.upper[lines], table.lower[lines]
     further, below = table.upper[family.companions], table.lower[family.companions]
     energies = table.levels[:, :, 0]
     out = np.empty((4000, 5))
@@ -89,6 +93,10 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int = 4) -> Floats
         field.bounds.array, need, out,
     )  # fmt: skip
     return out[:found]
+
+
+def _change_of_jj(field: Field, lines: Ints) -> Floats:
+    return np.asarray(field.jj[field.table.upper[lines]] - field.jj[field.table.lower[lines]])
 
 
 def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Candidate]:
@@ -110,8 +118,9 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
 def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Floats]:
     """ln likelihood ratios of rigid tops (n, 3), each by lines of one type, and the best temperatures."""
     table, peaks = field.table, field.peaks
-    return _kernels.quick_ratios(
+    found: tuple[Floats, Floats] = _kernels.quick_ratios(
         table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
-        field.temperatures, *peaks.band_mhz, ROUGH_MHZ, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
+        field.temperatures, peaks.windows, ROUGH_MHZ, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
         peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ,
     )  # fmt: skip
+    return found

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.assignment.families import Family
-from rotor.assignment.growth import Grown, grow, predict
-from rotor.assignment.peaks import PeakList
+from rotor.assignment.families import Bounds, Family
+from rotor.assignment.growth import Grown, grow, predict, regrown
+from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import Candidate, Field, quick_ratios, ranked, roots_of
 
 CLEAR = 300.0  # evidence at which a search ends at once
 FAINT = 10.0  # ln likelihood ratio below which a root is not grown
 CHUNK = 12  # families between two looks at the candidates
 PER_FAMILY, PER_CHUNK = 4, 5
-NEAR, GROWN_NEAR = 3e-4, 2e-3  # relative difference of constants of roots of which one is grown; of those near a species
+NEAR, GROWN_NEAR = (
+    3e-4,
+    2e-3,
+)  # relative difference of constants of roots of which one is grown; of those near a species
+AROUND = 0.01  # relative difference of constants of roots that may be of one species
+PEAK_MHZ = 0.1  # half the width of a peak
 MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
 
 Stop = Callable[[], bool]
@@ -34,7 +40,7 @@ class Stage:
     last: int
 
 
-FIRST_STAGES = (Stage(60, 0, 120), Stage(60, 120, 400), Stage(110, 0, 220))
+FIRST_STAGES = (Stage(60, 0, 150), Stage(60, 150, 600), Stage(110, 0, 220), Stage(60, 600, 1200))
 NEXT_STAGES = (Stage(60, 0, 120),)
 SCARCE = 45  # peaks up to which all families are tried: a family costs as the third power of their number
 
@@ -69,18 +75,44 @@ def next_species(
         chosen = families[stage.first : stage.last]
         for at in range(0, len(chosen), CHUNK):
             if clock.over():
-                return _best(grown)
+                return _finished(seen, grown, [])
             candidates = list[Candidate]()
             for family in chosen[at : at + CHUNK]:
                 candidates += ranked(seen, family, roots_of(seen, family, seeds, need), FAINT)[:PER_FAMILY]
             grown += _grown(seen, candidates, tried, PER_CHUNK)
-            if grown and max(one.evidence for one in grown) > clear:
-                best = _best(grown)
-                return _best(best + _grown(seen, aliases(seen, best[0]), [], 3))
-        if grown and max(one.evidence for one in grown) > clear / 8:
+            if max((one.evidence for one in grown if one.determined), default=0.0) > clear:
+                return _finished(seen, grown, candidates)
+        if max((one.evidence for one in grown if one.determined), default=0.0) > clear / 8:
             break
+    return _finished(seen, grown, [])
+
+
+def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> list[Grown]:
+    """The species with their rivals: other roots near the best one, multiples of its J, and the best one grown again."""
     best = _best(grown)
-    return _best(best + _grown(seen, aliases(seen, best[0]), [], 3)) if best else []
+    if not best or best[0].evidence < 0:
+        return best
+    first = best[0]
+    near = [one for one in candidates if np.abs(np.log(one.constants / first.constants[:3])).max() < AROUND]
+    again = [regrown(seen, first), *_grown(seen, near, [], 2), *_grown(seen, aliases(seen, first), [], 3)]
+    return _best(best + again)
+
+
+@lru_cache(maxsize=1)
+def compiled(table: RigidTable) -> bool:
+    """Whether the compiled loops are loaded: a search of five peaks has run, so that no search counts the compiler's time."""
+    from rotor.assignment.peaks import peak_list
+
+    peaks = peak_list([9000.0, 9500.0, 10000.0, 10100.0, 11000.0], np.ones(5), 0.1)
+    seen = Field(peaks, table, Bounds(np.array([2.0e3, 500, 400]), np.array([4.0e3, 2e3, 2e3])), np.array([2.0, 4.0]))
+    family = _lowest_a_lines(seen, 5)
+    if family is None:
+        return False
+    roots_of(seen, family, seen.seeds(5), 1)
+    candidate = Candidate(np.array([3000.0, 1050.0, 950.0]), family, 0.0, 2.0)
+    quick_ratios(seen, candidate.constants[None, :], np.zeros(1, dtype=np.int64))
+    grow(seen, candidate)
+    return True
 
 
 def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, float]], most: int) -> list[Grown]:
@@ -150,12 +182,18 @@ def _lowest_a_lines(seen: Field, j: int) -> Family | None:
     """J ← J-1 of Ka = 0 and both of Ka = 1."""
     table = seen.table
     upper, lower = table.quanta[table.upper], table.quanta[table.lower]
-    chosen = (table.kind == 0) & (upper[:, 0] == j) & (lower[:, 0] == j - 1) & (upper[:, 1] <= 1) & (upper[:, 1] == lower[:, 1])
+    chosen = (
+        (table.kind == 0)
+        & (upper[:, 0] == j)
+        & (lower[:, 0] == j - 1)
+        & (upper[:, 1] <= 1)
+        & (upper[:, 1] == lower[:, 1])
+    )
     rows = np.flatnonzero(chosen)
     return Family(0, rows, np.zeros(0, dtype=np.int64), 0.0) if len(rows) == 3 else None
 
 
-def explained(seen: Field, grown: Grown, width_mhz: float) -> NDArray[np.bool_]:
+def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
     """Which peaks a species explains: those assigned, and those at a predicted line that are not far stronger than it."""
     out = np.zeros(len(seen.peaks), dtype=bool)
     out[grown.peak] = True
@@ -164,7 +202,7 @@ def explained(seen: Field, grown: Grown, width_mhz: float) -> NDArray[np.bool_]:
     strong = level > seen.peaks.log_threshold - 2.0
     f, height = lines.frequency[strong], level[strong]
     peaks = seen.peaks
-    first, last = np.searchsorted(peaks.frequency_mhz, f - width_mhz), np.searchsorted(peaks.frequency_mhz, f + width_mhz)
+    first, last = np.searchsorted(peaks.frequency_mhz, f - PEAK_MHZ), np.searchsorted(peaks.frequency_mhz, f + PEAK_MHZ)
     for n in np.flatnonzero(last > first).tolist():
         near = slice(first[n], last[n])
         out[near] |= peaks.log_intensity[near] < height[n] + 1.5
@@ -176,9 +214,3 @@ def strength(seen: Field, grown: Grown) -> float:
     lines = predict(seen, grown.constants, grown.temperature_k, 20)
     level = lines.expected + np.where(grown.ratios > 3.0, grown.scales, -np.inf)[lines.kind]
     return float(np.exp(level.max()))
-
-
-def without(seen: Field, mask: NDArray[np.bool_]) -> Field:
-    """The same search without some peaks."""
-    rest: PeakList = seen.peaks.where(~mask)
-    return replace(seen, peaks=rest)

@@ -1,0 +1,182 @@
+"""What was found in a spectrum: species, their lines, and the peaks that nothing explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment.evidence import NOT_FOUND, word
+from rotor.assignment.growth import LEAST_RATIO, Grown
+from rotor.assignment.refinement import Refined
+from rotor.assignment.rigid_table import PARAMETERS, TYPES
+from rotor.fitting.assignment import Assignments
+from rotor.table import Table, TextOf
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+if TYPE_CHECKING:
+    from rotor.assignment.request import AssignRequest
+
+
+@dataclass(frozen=True, eq=False)
+class AssignedSpecies:
+    """One species.
+
+    grown, refined : the search's result, and the fit. peak (m, 2) : peaks of the request behind each assigned line, two of a split one.
+    strength : height of the strongest line in the units of the spectrum. probability : that the constants are right. twins : other
+    constants (3,) with evidence that is as good but for a factor e^10. isotopologue : what it is of the first species.
+    """
+
+    grown: Grown
+    refined: Refined
+    peak: Ints
+    strength: float
+    probability: float
+    twins: tuple[tuple[Floats, float], ...] = ()
+    isotopologue: str = ""
+
+    @property
+    def word(self) -> str:
+        """certain or likely."""
+        return word(self.probability)
+
+    @property
+    def constants(self) -> Constants:
+        """A, B, C and quartic constants with standard errors, S reduction."""
+        values, errors = self.refined.values.tolist(), self.refined.errors.tolist()
+        return Constants(
+            **dict(zip(PARAMETERS, values, strict=True)), reduction="S", representation="Ir",
+            uncertainties=dict(zip(PARAMETERS, errors, strict=True)),
+        )  # fmt: skip
+
+    @property
+    def lines(self) -> Assignments:
+        """The assigned lines, ready for a fit."""
+        return self.refined.fit.lines
+
+    @property
+    def kind(self) -> str:
+        """The types of its lines, such as "ac"."""
+        return "".join(name for name, ratio in zip(TYPES, self.grown.ratios, strict=True) if ratio > LEAST_RATIO)
+
+    @property
+    def dipole_ratio(self) -> Floats:
+        """|μa|, |μb|, |μc| over the largest of them (3,): intensities go with μ²."""
+        scales = np.where(self.grown.ratios > LEAST_RATIO, self.grown.scales, -np.inf)
+        return np.asarray(np.exp((scales - scales.max()) / 2))
+
+    @property
+    def split(self) -> bool:
+        """Whether its lines are split in two."""
+        return bool((self.peak[:, 0] != self.peak[:, 1]).mean() > 0.3)
+
+    @property
+    def top(self) -> Top:
+        """A top with the constants and the relative dipole."""
+        a, b, c = self.dipole_ratio.tolist()
+        return Top.from_constants(self.constants, dipole_abc_debye=(a, b, c))
+
+    def facts(self) -> dict[str, Any]:
+        """Everything but the lines."""
+        constants, errors = self.refined.values.tolist(), self.refined.errors.tolist()
+        return {
+            "word": self.word,
+            "probability": self.probability,
+            "evidence": self.grown.evidence,
+            "constants_mhz": dict(zip(PARAMETERS, constants, strict=True)),
+            "errors_mhz": dict(zip(PARAMETERS, errors, strict=True)),
+            "open_constants": list(self.refined.open_constants),
+            "types": self.kind,
+            "dipole_ratio": self.dipole_ratio.tolist(),
+            "temperature_k": self.grown.temperature_k,
+            "lines": len(self.lines),
+            "peaks": len(np.unique(self.peak)),
+            "rms_mhz": self.refined.fit.rms_mhz(),
+            "weighted_rms": self.refined.fit.weighted_rms,
+            "strength": self.strength,
+            "split_lines": self.split,
+            "isotopologue": self.isotopologue or None,
+            "twins": [{"constants_mhz": twin.tolist(), "evidence": evidence} for twin, evidence in self.twins],
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AssignedPeaks(Table):
+    """The peaks of a spectrum: to which species each belongs (0: none), its first line and what this is calculated at."""
+
+    frequency_mhz: Floats
+    intensity: Floats
+    uncertainty_mhz: Floats
+    species: Ints
+    spur: NDArray[np.bool_]
+    upper: Ints
+    lower: Ints
+    calculated_mhz: Floats
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """All columns; -1 and nan where no line is assigned."""
+        labels = {
+            f"{name}_{side}": getattr(self, side)[:, n]
+            for side in ("upper", "lower")
+            for n, name in enumerate(("j", "ka", "kc"))
+        }
+        return {
+            "frequency_mhz": self.frequency_mhz, "intensity": self.intensity, "uncertainty_mhz": self.uncertainty_mhz,
+            "species": self.species, "spur": self.spur.astype(np.int64), **labels, "calculated_mhz": self.calculated_mhz,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AssignAnswer(TextOf):
+    """Species by falling strength, and which peaks nothing explains.
+
+    unexplained, spurs (n,) : peaks of the request that belong to no species, and harmonics of a clock. ended : whether the search was ended
+    by its seconds.
+    """
+
+    shown = "table"
+
+    request: AssignRequest
+    species: tuple[AssignedSpecies, ...]
+    unexplained: NDArray[np.bool_]
+    spurs: NDArray[np.bool_]
+    ended: bool = False
+
+    @property
+    def word(self) -> str:
+        """Of the first species: certain, likely or not found."""
+        return self.species[0].word if self.species else NOT_FOUND
+
+    @property
+    def table(self) -> AssignedPeaks:
+        """Every peak with its assignment."""
+        peaks = self.request.peaks
+        size = len(peaks)
+        species, calculated = np.zeros(size, dtype=np.int64), np.full(size, np.nan)
+        upper, lower = np.full((size, 3), -1), np.full((size, 3), -1)
+        for number, one in reversed(list(enumerate(self.species, 1))):
+            fit = one.refined.fit
+            for side in (1, 0):
+                at = one.peak[:, side]
+                species[at], calculated[at] = number, fit.blended_mhz
+                upper[at], lower[at] = fit.lines.upper, fit.lines.lower
+        return AssignedPeaks(
+            peaks.frequency_mhz, peaks.intensity, peaks.uncertainty_mhz, species, self.spurs, upper, lower, calculated
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Everything but the table of peaks."""
+        return {
+            "word": self.word,
+            "peaks": len(self.request.peaks),
+            "band_mhz": list(self.request.peaks.band_mhz),
+            "spurs": int(self.spurs.sum()),
+            "unexplained": int(self.unexplained.sum()),
+            "ended_by_time": self.ended,
+            "species": [one.facts() for one in self.species],
+        }

@@ -1,0 +1,147 @@
+"""Isotopologues of a species in natural abundance, from its constants and a geometry.
+
+Constants of an isotopologue are those of the parent times the ratio that the geometry gives (`rotor.tops.isotopes`); errors of the
+geometry cancel but for some per mille. Within that distance threes of the strongest lines are laid on peaks of the expected height;
+each gives shifts of A, B, C, which all visible lines then judge. Dipole, temperature and quartic constants are the parent's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.families import Bounds, Family
+from rotor.assignment.growth import Grown, Merged, grow, merged_lines
+from rotor.assignment.peaks import PeakList
+from rotor.assignment.rigid_table import RigidTable
+from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
+from rotor.molecules.molecule import Molecule
+from rotor.tops.isotopes.isotopologues import isotopologues
+from rotor.tops.top import Top
+
+SHIFT_ERROR = 0.08  # of the shift of a constant: of a geometry whose bond lengths are right to 1 %
+LEAST_ERROR = 2e-4  # of a constant: vibrations
+LEAST_ABUNDANCE = 1e-3
+LOG_HEIGHT = 1.2  # of peaks about the expected height that are tried
+ROUGH_MHZ = 0.05  # standard error of lines of the parent's distortion
+MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 12, 20, 2000, 4
+ENOUGH = 8.0  # evidence above which an isotopologue is reported; its constants are nearly known
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """An isotopologue to look for: its name, constants (3,) in MHz with their errors, and abundance over the parent's."""
+
+    label: str
+    constants: Floats
+    errors: Floats
+    abundance: float
+
+
+def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]:
+    """Singly substituted species of a molecule at natural abundance, the most abundant first.
+
+    Raises ValueError where the geometry's constants are more than a fifth away from those of the parent.
+    """
+    top = Top.from_molecule(molecule)
+    own = np.array([top.constants[name] for name in "ABC"]) if top.kind == "asymmetric" else np.zeros(3)
+    if not own.all() or np.abs(own / parent[:3] - 1).max() > 0.2:
+        raise ValueError(
+            f"molecule: A, B, C of its geometry are {', '.join(f'{x:.1f}' for x in own)} MHz, those of the species "
+            f"{', '.join(f'{x:.1f}' for x in parent[:3])} MHz; a geometry of this molecule is needed"
+        )
+    out = []
+    found = isotopologues(top, min_abundance=LEAST_ABUNDANCE)
+    for one in found[1:]:
+        if len(one.substituted) != 1:
+            continue
+        ratio = np.array([one.top.constants[name] for name in "ABC"]) / own
+        constants = parent[:3] * ratio
+        errors = constants * (SHIFT_ERROR * np.abs(ratio - 1) + LEAST_ERROR)
+        out.append(Expected(one.label, constants, errors, one.abundance / found[0].abundance))
+    return out
+
+
+def find_isotopologue(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable) -> Grown | None:
+    """The isotopologue among peaks, None where it does not stand above chance."""
+    bounds = Bounds(one.constants - 3 * one.errors, one.constants + 3 * one.errors)
+    seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants)
+    scales = parent.scales + np.log(one.abundance)
+    start = np.concatenate([one.constants, parent.constants[3:]])
+    lines = merged_lines(seen, start, parent.temperature_k, scales)
+    visible = np.argsort(-lines.height, kind="stable")[:MOST_LINES]
+    visible = visible[lines.height[visible] > peaks.log_threshold - 0.5]
+    if len(visible) < 4:
+        return None
+    shifts = [
+        shift
+        for three in _triples(lines.slope[visible, :3] * one.errors, visible)
+        for shift in _shifts(peaks, lines, three, one)
+    ]
+    if not shifts:
+        return None
+    ratios = np.array([_ratio(peaks, lines, visible, shift) for shift in shifts])
+    grown = []
+    for best in np.argsort(-ratios)[:GROWN].tolist():
+        family = Family(int(table.kind[lines.main[visible[0]]]), lines.main[visible[:3]], lines.main[:0], 0.0)
+        candidate = Candidate(one.constants + shifts[best], family, float(ratios[best]), parent.temperature_k)
+        species = grow(seen, candidate)
+        if species is not None and _like(species, scales) and _within(species, bounds):
+            grown.append(species)
+    best_one = max(grown, key=lambda g: g.evidence, default=None)
+    return best_one if best_one is not None and best_one.evidence > ENOUGH else None
+
+
+def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
+    """Threes of visible lines that determine the shifts of the constants, strong and independent ones first."""
+    chosen = []
+    for three in combinations(range(min(len(visible), MOST_OF_TRIPLES)), 3):
+        sizes = np.linalg.svd(slopes[list(three)], compute_uv=False)
+        chosen.append((float(sizes[-1] / sizes[0]), visible[list(three)]))
+    chosen.sort(key=lambda item: -item[0])
+    return [three for _, three in chosen[:TRIPLES]]
+
+
+def _shifts(peaks: PeakList, lines: Merged, three: Ints, one: Expected) -> list[Floats]:
+    """Shifts of A, B, C that put three lines on peaks of their height."""
+    slopes = lines.slope[three, :3]
+    reach = 3 * np.sqrt(((slopes * one.errors) ** 2).sum(axis=1)) + 0.05
+    near = []
+    for n, line in enumerate(three.tolist()):
+        first, last = np.searchsorted(peaks.frequency_mhz, lines.centre[line] + reach[n] * np.array([-1, 1]))
+        rows = np.arange(first, last)
+        fits = np.abs(peaks.log_intensity[rows] - lines.height[line]) < LOG_HEIGHT
+        near.append(peaks.frequency_mhz[rows[fits]] - lines.centre[line])
+    if not all(len(part) for part in near) or np.prod([len(part) for part in near]) > MOST_SHIFTS:
+        return []
+    moved = np.stack(np.meshgrid(*near, indexing="ij"), axis=-1).reshape(-1, 3)
+    shift = np.linalg.solve(slopes, moved.T).T if abs(np.linalg.det(slopes)) > 1e-9 else np.zeros((0, 3))
+    return list(shift[(np.abs(shift) < 3 * one.errors).all(axis=1)])
+
+
+def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:
+    """ln of the likelihood ratio of the visible lines moved by a shift of the constants."""
+    centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
+    value = _kernels.joint_ratio(
+        centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,
+        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, np.zeros(len(peaks), np.int64), 1,
+    )  # fmt: skip
+    return float(value)
+
+
+def _like(grown: Grown, scales: Floats) -> bool:
+    """Whether the intensities are those of the abundance within a factor of three."""
+    strongest = int(np.argmax(scales))
+    return bool(abs(grown.scales[strongest] - scales[strongest]) < np.log(3.0))
+
+
+def _within(grown: Grown, bounds: Bounds) -> bool:
+    """Whether the constants stayed where they were expected."""
+    margin = bounds.high - bounds.low
+    return bool(
+        (grown.constants[:3] > bounds.low - margin).all() and (grown.constants[:3] < bounds.high + margin).all()
+    )

@@ -1,0 +1,263 @@
+"""Constants from peak lists: synthetic spectra with their truth, lists of ../shared, spectra without a molecule, wrong input."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.assignment.answer import AssignAnswer
+from rotor.assignment.peaks import PeakList, peak_list, spurs
+from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.assignment.rigid_table import PARAMETERS
+from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
+
+SHARED = Path(__file__).parents[2] / "shared" / "reference" / "broadband"
+BAND = (8000.0, 18000.0)
+TRUTH = {"A": 2237.03, "B": 1368.45, "C": 884.21, "DJ": 4e-5, "DJK": 1e-4, "DK": 2e-4, "d1": -1e-5, "d2": -1e-6}
+SECOND = {"A": 3614.2, "B": 811.4, "C": 702.9, "DJ": 5e-5, "DJK": 2e-4, "DK": 1e-3, "d1": -6e-6, "d2": -5e-7}
+
+
+def lines_of(
+    truth: dict[str, float], dipole: tuple[float, float, float], height: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies and intensities at 2 K down to a thousandth of the strongest."""
+    top = rotor.Top.from_constants(
+        rotor.Constants(**truth, reduction="S", representation="Ir"), dipole_abc_debye=dipole
+    )
+    lines = rotor.line_list(top, temperature_k=2.0, jmax=30, range_mhz=BAND)
+    intensity = 10 ** lines.columns["lgint"]
+    intensity *= height / intensity.max()
+    return lines.frequency_mhz[intensity > 1.0], intensity[intensity > 1.0]
+
+
+def spectrum(seed: int = 5, foreign: int = 60, second: bool = False) -> PeakList:
+    """A b- and c-type species, foreign peaks, errors of 5 kHz; on demand an a-type species of half its strength."""
+    rng = np.random.default_rng(seed)
+    f, i = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
+    if second:
+        g, j = lines_of(SECOND, (1.0, 0.0, 0.0), 50.0)
+        f, i = np.concatenate([f, g]), np.concatenate([i, j])
+    i = i * np.exp(0.2 * rng.normal(size=len(i)))
+    f = np.concatenate([f + 0.005 * rng.normal(size=len(f)), rng.uniform(*BAND, foreign)])
+    i = np.concatenate([i, rng.random(foreign) ** (-1 / 0.8)])
+    return peak_list(f, i, 0.005, band_mhz=BAND)
+
+
+def is_right(answer: AssignAnswer, number: int, truth: dict[str, float]) -> bool:
+    """Whether A, B, C are within five standard errors and 0.1 %."""
+    constants = answer.species[number].constants
+    off = np.array([constants[name] - truth[name] for name in "ABC"])
+    errors = np.array([constants.uncertainties[name] for name in "ABC"])
+    values = np.array([truth[name] for name in "ABC"])
+    return bool((np.abs(off) < 5 * errors).all() and (np.abs(off) < 1e-3 * values).all())
+
+
+@pytest.fixture(scope="module")
+def answer() -> AssignAnswer:
+    """Of one species among foreign peaks."""
+    return answer_assign(AssignRequest(spectrum(), seconds=120))
+
+
+def test_the_species_is_found_with_its_kind_and_temperature(answer: AssignAnswer) -> None:
+    assert answer.word == "certain"
+    assert is_right(answer, 0, TRUTH)
+    one = answer.species[0]
+    assert one.kind == "bc"
+    np.testing.assert_allclose(one.dipole_ratio, [0, 1, 0.6], atol=0.15)  # intensities scatter by 20 %
+    assert 1.4 <= one.grown.temperature_k <= 2.8  # the grid's neighbours of 2 K
+
+
+def test_lines_and_what_is_left(answer: AssignAnswer) -> None:
+    one = answer.species[0]
+    assert len(one.lines) > 60
+    assert np.abs(one.refined.fit.difference_mhz).max() < 0.05
+    columns = answer.table.columns
+    assert (columns["species"] == 1).sum() == len(np.unique(one.peak))
+    assert answer.unexplained.sum() > 30  # most of the foreign peaks
+
+
+def test_lines_are_ready_for_a_fit(answer: AssignAnswer, tmp_path: Path) -> None:
+    """The written lines, read back and fitted, give the same constants."""
+    from rotor.fitting.fit import fit_lines
+    from rotor.fitting.parameters import parameters
+
+    path = tmp_path / "found.csv"
+    write_assigned_lines(answer.species[0].lines, path)
+    lines = read_assigned_lines(path)
+    start = answer.species[0].constants
+    fitted = fit_lines(lines, start, parameters(start, PARAMETERS))
+    assert fitted.converged
+    for name in "ABC":
+        assert fitted.named[name] == pytest.approx(start[name], abs=3 * start.uncertainties[name])
+
+
+def test_the_same_request_gives_the_same_answer(answer: AssignAnswer) -> None:
+    again = answer_assign(answer.request)
+    assert json.dumps(again.facts()) == json.dumps(answer.facts())
+
+
+def test_two_species() -> None:
+    found = answer_assign(AssignRequest(spectrum(second=True), species=2, seconds=120))
+    assert len(found.species) == 2
+    assert is_right(found, 0, TRUTH)
+    assert is_right(found, 1, SECOND)
+    assert found.species[1].kind == "a"
+
+
+def test_a_guess_is_enough_where_the_search_is_narrow() -> None:
+    guess = tuple(TRUTH[name] * factor for name, factor in zip("ABC", (1.02, 0.98, 1.015), strict=True))
+    found = answer_assign(AssignRequest(spectrum(seed=8), guess_mhz=guess, temperature_k=2.0, seconds=120))
+    assert is_right(found, 0, TRUTH)
+
+
+def redrawn(peaks: PeakList, seed: int) -> PeakList:
+    """The same intensities at frequencies drawn again within each 200 MHz."""
+    rng = np.random.default_rng(seed)
+    floor = np.floor(peaks.frequency_mhz / 200) * 200
+    f = np.clip(floor + 200 * rng.random(len(peaks)), *peaks.band_mhz)
+    return peak_list(f, peaks.intensity, peaks.uncertainty_mhz, band_mhz=peaks.band_mhz)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_redrawn_frequencies_hold_no_species(seed: int) -> None:
+    assert answer_assign(AssignRequest(redrawn(spectrum(), seed), seconds=120)).word == "not found"
+
+
+def test_two_peaks_hold_no_species() -> None:
+    found = answer_assign(AssignRequest(peak_list([7000.0, 9000.0], [1.0, 2.0])))
+    assert found.word == "not found"
+    assert found.facts()["species"] == []
+
+
+def test_isotopologues_of_a_geometry() -> None:
+    """13C species of a chain, from a geometry with all bonds 0.5 % too long."""
+    from rotor.molecules.molecule import Molecule
+    from rotor.tops.isotopes.isotopologues import isotopologues
+
+    x = np.array(
+        [
+            [0.0, 0, 0],
+            [1.5, 0, 0],
+            [2.2, 1.3, 0.1],
+            [1.5, 2.5, 0.3],
+            [0.1, 2.5, -0.4],
+            [-0.7, 1.3, 0.4],
+            [3.6, 1.4, 0.3],
+        ]
+    )
+    molecule = Molecule(("C", "C", "C", "O", "C", "C", "O"), x)
+    parent = rotor.Top.from_molecule(molecule)
+    singles = [one for one in isotopologues(parent, min_abundance=5e-3)[1:] if len(one.substituted) == 1]
+    distortion = {"DJ": 2e-5, "DJK": 1e-4, "DK": 1e-3, "d1": -3e-6, "d2": -2e-7}
+    rng = np.random.default_rng(4)
+    f, i = [], []
+    for top, height in [(parent, 2000.0), *((one.top, 22.0) for one in singles)]:
+        truth = {name: top.constants[name] for name in "ABC"} | distortion
+        frequency, intensity = lines_of(truth, (1.0, 0.6, 0.0), height)
+        f.append(frequency)
+        i.append(intensity)
+    f, i = np.concatenate(f), np.concatenate(i)
+    strong = i > 6.0
+    peaks = peak_list(f[strong] + 0.004 * rng.normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND)
+    longer = Molecule(molecule.symbols, 1.005 * x)
+    request = AssignRequest(peaks, molecule=longer, isotopologues=True, seconds=120)
+    found = answer_assign(request)
+    assert is_right(found, 0, {name: parent.constants[name] for name in "ABC"})
+    right = 0
+    for one in found.species[1:]:
+        names = [single for single in singles if single.label == one.isotopologue]
+        off = [one.constants[name] - names[0].top.constants[name] for name in "ABC"]
+        right += bool((np.abs(off) < 5 * np.array([one.constants.uncertainties[name] for name in "ABC"])).all())
+    assert right == len(found.species) - 1  # none is wrong
+    assert right >= 0.8 * len(singles)
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        (([7000.0], [1.0]), "1 peak: constants need more"),
+        (([7.0, 9.0], [1.0, 1.0]), "if they are in GHz, multiply by 1000"),
+        (([7000.0, 9000.0], [1.0, -1.0]), "row 2: intensity is -1"),
+        (([7000.0, np.nan], [1.0, 1.0]), "row 2: frequency_mhz is nan"),
+        (([7000.0, 9000.0], [1.0]), "two columns of equal length"),
+    ],
+)
+def test_wrong_peaks_are_refused(columns: tuple[list[float], list[float]], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        peak_list(*columns)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"species": 0}, "species: 0: expected a whole number"),
+        ({"guess_mhz": (1.0, 2.0, 3.0)}, "expected A > B > C > 0"),
+        ({"isotopologues": True}, "a geometry of the first species is needed"),
+        ({"low_mhz": (9e4, 1.0, 1.0)}, "expected 0 < low < high"),
+    ],
+)
+def test_wrong_requests_are_refused(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        AssignRequest(peak_list([7000.0, 9000.0], [1.0, 1.0]), **settings)  # type: ignore[arg-type]
+
+
+def test_spurs_are_multiples_of_a_clock() -> None:
+    rng = np.random.default_rng(3)
+    real = rng.uniform(6000, 18000, 300)
+    comb = 50.0 * rng.choice(np.arange(121, 359), 8, replace=False)
+    peaks = peak_list(np.concatenate([real, comb]), np.ones(308))
+    found = peaks.frequency_mhz[spurs(peaks)]
+    assert set(comb) <= set(found)
+    assert len(found) <= 10
+    assert not spurs(peak_list(real, np.ones(300))).any()
+
+
+def test_a_gap_in_the_band_is_seen() -> None:
+    peaks = spectrum()
+    cut = peaks.where((peaks.frequency_mhz < 11000) | (peaks.frequency_mhz > 14000))
+    cut = replace(cut, given_windows=None)
+    assert len(cut.windows) == 2
+    assert cut.windows[0, 1] == pytest.approx(11000, abs=200)
+    assert is_right(answer_assign(AssignRequest(cut, seconds=120)), 0, TRUTH)
+
+
+def case_of(number: int) -> tuple[PeakList, dict[str, object]]:
+    """A list of ../shared and its truth."""
+    path = SHARED / f"case_{number:03d}.csv.gz"
+    if not path.exists():
+        pytest.skip("no ../shared/reference/broadband beside the checkout")
+    with gzip.open(path, "rt") as text:
+        rows = np.array(list(csv.reader(text))[1:], dtype=float)
+    truth = json.loads((SHARED / "truth" / f"case_{number:03d}.json").read_text())
+    return peak_list(*rows.T, band_mhz=tuple(map(float, truth["range_mhz"]))), truth
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("number", [7, 19, 39])
+def test_lists_of_shared(number: int) -> None:
+    peaks, truth = case_of(number)
+    found = answer_assign(AssignRequest(peaks, seconds=120))
+    assert is_right(found, 0, truth["species"][0])  # type: ignore[index]
+
+
+@pytest.mark.oracle
+@pytest.mark.slow
+def test_all_lists_of_shared() -> None:
+    """The strongest species of at least 90 % of the lists with a signal-to-noise ratio of 100, none confidently wrong."""
+    right, total = 0, 0
+    for number in range(1, 41):
+        peaks, truth = case_of(number)
+        if truth["signal_to_noise"] < 100:  # type: ignore[operator]
+            continue
+        total += 1
+        found = answer_assign(AssignRequest(peaks, seconds=120))
+        mains = [one for one in truth["species"] if "isotopologue_of" not in one]  # type: ignore[attr-defined]
+        right += any(is_right(found, n, mains[0]) for n in range(len(found.species)))
+    assert right >= 0.9 * total

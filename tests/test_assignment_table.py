@@ -1,0 +1,96 @@
+"""The table of rigid tops and its compiled loops against `rotor.line_list` and `rotor.solve_levels`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.assignment import _kernels
+from rotor.assignment.families import Bounds, families, sample_tops
+from rotor.assignment.growth import predict, slopes_of
+from rotor.assignment.peaks import peak_list
+from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
+from rotor.assignment.search import Field
+
+TOPS = [
+    (2458.69, 490.426, 408.870, 2.6e-5, 6.7e-5, 2.0e-3, -4.3e-6, -5.8e-7),  # κ = -0.92
+    (8628.65, 457.5, 434.46, 2.0e-5, 3.0e-4, 9.0e-3, -1.0e-6, -2.0e-7),  # κ = -0.99
+    (1327.89, 1062.97, 658.72, 5.0e-5, 1.0e-4, 1.0e-4, -1.0e-5, -3.0e-6),  # κ = 0.21
+]
+
+
+def field_of(low: float = 6000.0, high: float = 18000.0) -> Field:
+    """A search with two peaks at the ends of a band."""
+    peaks = peak_list([low, high], [1e-30, 1e-30], band_mhz=(low, high))
+    bounds = Bounds(np.array([500.0, 200, 150]), np.array([2e4, 1.2e4, 9e3]))
+    return Field(peaks, rigid_table(JMAX), bounds, np.array([2.0]))
+
+
+@pytest.mark.parametrize("values", TOPS)
+def test_lines_are_those_of_line_list(values: tuple[float, ...]) -> None:
+    constants = dict(zip(PARAMETERS, values, strict=True))
+    top = rotor.Top.from_constants(
+        rotor.Constants(**constants, reduction="S", representation="Ir"), dipole_abc_debye=(1, 1, 1)
+    )
+    lines = rotor.line_list(top, temperature_k=2.0, jmax=JMAX, range_mhz=(6000, 18000), min_lgint=None)
+    columns = lines.columns
+    seen = field_of()
+    found = predict(seen, np.array(values), 2.0, 4000)
+    names = ("j_upper", "ka_upper", "kc_upper", "j_lower", "ka_lower", "kc_lower")
+    known = {tuple(row): n for n, row in enumerate(np.column_stack([columns[name] for name in names]).tolist())}
+    table = seen.table
+    labels = np.column_stack([table.quanta[table.upper[found.row]], table.quanta[table.lower[found.row]]]).tolist()
+    strongest = np.argsort(-found.expected)[:150]
+    pairs = [(n, known[tuple(labels[n])]) for n in strongest.tolist()]
+    mine, theirs = np.array(pairs).T
+    # 20 kHz: interpolation, and distortion to first order alone; the widths of peaks are five times that
+    np.testing.assert_allclose(found.frequency[mine], lines.frequency_mhz[theirs], atol=0.02)
+    intensity = np.log(10.0) * columns["lgint"][theirs]
+    difference = found.expected[mine] - intensity
+    assert np.ptp(difference) < 0.2  # 1 - exp(-hν/kT) is taken to first order: 0.13 between 6 and 18 GHz at 2 K
+
+
+def test_derivatives_are_differences() -> None:
+    seen, values = field_of(), np.array(TOPS[0])
+    lines = predict(seen, values, 2.0, 40)
+    slopes = slopes_of(seen, lines.row, values)
+    energy, moved = np.empty(len(seen.jj)), np.empty(len(seen.jj))
+    table = seen.table
+    for q, step in enumerate((0.01, 0.01, 0.01, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6)):
+        shifted = values.copy()
+        shifted[q] += step
+        _kernels.level_energies(table.levels, table.theta, seen.jj, values, energy)
+        _kernels.level_energies(table.levels, table.theta, seen.jj, shifted, moved)
+        change = (moved - energy) / step
+        expected = change[table.upper[lines.row]] - change[table.lower[lines.row]]
+        # half a per cent: the slope of the grid between its points
+        np.testing.assert_allclose(slopes[:, q], expected, rtol=5e-3, atol=2e-2 * np.abs(expected).max())
+
+
+def test_sampled_tops_keep_the_bounds_and_the_planar_limit() -> None:
+    bounds = Bounds(np.array([1000.0, 500, 400]), np.array([5000.0, 2000, 1500]))
+    a, b, c = sample_tops(bounds, 500, np.random.default_rng(1)).T
+    assert ((a > b) & (b > c)).all()
+    assert (1 / c <= 1 / a + 1 / b + 1e-12).all()
+    assert ((a >= 1000) & (a <= 5000) & (b >= 500) & (b <= 2000) & (c >= 400) & (c <= 1500)).all()
+
+
+def test_bounds_without_a_top_are_refused() -> None:
+    bounds = Bounds(np.array([1000.0, 2000, 400]), np.array([1100.0, 2200, 500]))
+    with pytest.raises(ValueError, match="no A > B > C"):
+        sample_tops(bounds, 10, np.random.default_rng(1))
+
+
+def test_families_determine_three_constants() -> None:
+    """Each family's lines have independent derivatives for some top of the sample, and it predicts other lines."""
+    bounds = Bounds(np.array([1000.0, 500, 400]), np.array([5000.0, 2000, 1500]))
+    table = rigid_table(JMAX)
+    found = families(table, bounds, (6000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 50)
+    assert len(found) == 50
+    assert found[0].share >= found[-1].share
+    for one in found:
+        change = table.quanta[table.upper[one.lines], 0] - table.quanta[table.lower[one.lines], 0]
+        assert (change != 0).any()  # Q branches alone say nothing of A + C
+        assert len(one.companions) >= 4
+        assert not set(one.lines.tolist()) & set(one.companions.tolist())
