@@ -90,7 +90,7 @@ def test_lines_are_ready_for_a_fit(answer: AssignAnswer, tmp_path: Path) -> None
 
     path = tmp_path / "found.csv"
     write_assigned_lines(answer.species[0].lines, path)
-    lines = read_assigned_lines(path)
+    lines, _ = read_assigned_lines(path, ("j", "ka", "kc"))
     start = answer.species[0].constants
     fitted = fit_lines(lines, start, parameters(start, PARAMETERS))
     assert fitted.converged

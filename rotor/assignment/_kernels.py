@@ -4,12 +4,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rotor.units import MHZ_PER_K
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 MIXED = 3  # the type of a family of lines of several types
-MHZ_PER_KELVIN = 20836.61912  # k/h, CODATA 2018
 
 
 @njit(cache=True, nogil=True)
@@ -101,7 +102,7 @@ def strongest_lines(
         found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
         height = np.empty(found)
         for n in range(found):
-            height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_KELVIN * temperatures[t])
+            height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_K * temperatures[t])
         for q in range(4):
             taken = np.empty(count)
             at = 0
@@ -308,7 +309,7 @@ def quick_ratios(
         if len(of_type) == 0:
             continue
         for temperature in temperatures:
-            expected = np.log(s_nu[of_type]) - energy[lower[row[of_type]]] / (MHZ_PER_KELVIN * temperature)
+            expected = np.log(s_nu[of_type]) - energy[lower[row[of_type]]] / (MHZ_PER_K * temperature)
             strongest = _apart(np.argsort(-expected), f[of_type], most, apart)
             chosen = of_type[strongest]
             ratios, _ = best_scales(

@@ -14,6 +14,7 @@ from rotor.assignment.growth import Grown
 CERTAIN, LIKELY, NOT_FOUND = "certain", "likely", "not found"
 LEAST_CERTAIN, LEAST_LIKELY = 0.99, 0.5
 MIDDLE, WIDTH = 40.0, 8.0  # of the logistic function of ln Z
+MIDDLE_OF_ISOTOPOLOGUES = 6.0
 UNDETERMINED = 0.5  # factor for constants that the lines do not determine: a twin is as good
 FEWEST = 6  # peaks below which nothing is found: three constants, a temperature and a scale are fitted
 
@@ -24,6 +25,11 @@ def probability(grown: Grown) -> float:
         return 0.0
     known = 1.0 if grown.determined else UNDETERMINED
     return known * float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE) / WIDTH, -50, 50))))
+
+
+def probability_of_isotopologue(grown: Grown) -> float:
+    """Probability that the constants of an isotopologue are right, whose evidence counts from a volume of constants that is small."""
+    return float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE_OF_ISOTOPOLOGUES) / 2.0, -50, 50))))
 
 
 def word(p: float) -> str:

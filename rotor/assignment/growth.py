@@ -14,6 +14,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
+from rotor.units import MHZ_PER_K
 
 SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrations from which a priori sizes of quartic constants follow
 ROUNDS = 24
@@ -106,7 +107,7 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     )  # fmt: skip
     row, f = row[:count], f[:count]
     below = energy[table.lower[row]]
-    expected = np.log(s_nu[:count]) - below / (_kernels.MHZ_PER_KELVIN * temperature_k)
+    expected = np.log(s_nu[:count]) - below / (MHZ_PER_K * temperature_k)
     kind = table.kind[row]
     kept = np.zeros(count, dtype=bool)
     for q in range(3):
@@ -192,10 +193,10 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
     lines = predict(field, constants, TEMPERATURES[-1], 4000)
     errors = _errors(slopes_of(field, lines.row, constants), covariance, sigma0)
     sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
-    strength = lines.expected[sharp] + lines.energy[sharp] / (_kernels.MHZ_PER_KELVIN * TEMPERATURES[-1])
+    strength = lines.expected[sharp] + lines.energy[sharp] / (MHZ_PER_K * TEMPERATURES[-1])
     peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
     for t in TEMPERATURES:
-        expected = strength - lines.energy[sharp] / (_kernels.MHZ_PER_KELVIN * t)
+        expected = strength - lines.energy[sharp] / (MHZ_PER_K * t)
         ratios, _ = _kernels.best_scales(
             lines.frequency[sharp], expected, lines.kind[sharp], errors[sharp], peaks.frequency_mhz, peaks.log_intensity,
             peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 300, 6,

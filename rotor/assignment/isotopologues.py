@@ -22,13 +22,14 @@ from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
 from rotor.molecules.molecule import Molecule
 from rotor.tops.isotopes.isotopologues import isotopologues
 from rotor.tops.top import Top
+from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
-SHIFT_ERROR = 0.08  # of the shift of a constant: of a geometry whose bond lengths are right to 1 %
-LEAST_ERROR = 2e-4  # of a constant: vibrations
+SHIFT_ERROR = 0.03  # of the shift of a constant: of a geometry whose bond lengths are right to 1 %
+MOMENT_ERROR = 0.05  # u Å², of the change of a moment of inertia: 2 Δm r δr for 1 u at 1.5 Å, known to 0.016 Å
 LEAST_ABUNDANCE = 1e-3
 LOG_HEIGHT = 1.2  # of peaks about the expected height that are tried
 ROUGH_MHZ = 0.05  # standard error of lines of the parent's distortion
-MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 12, 20, 2000, 4
+MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 9, 84, 2000, 4
 ENOUGH = 8.0  # evidence above which an isotopologue is reported; its constants are nearly known
 
 
@@ -61,7 +62,7 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
             continue
         ratio = np.array([one.top.constants[name] for name in "ABC"]) / own
         constants = parent[:3] * ratio
-        errors = constants * (SHIFT_ERROR * np.abs(ratio - 1) + LEAST_ERROR)
+        errors = SHIFT_ERROR * np.abs(constants - parent[:3]) + constants**2 / ROTATIONAL_MHZ_U_ANGSTROM2 * MOMENT_ERROR
         out.append(Expected(one.label, constants, errors, one.abundance / found[0].abundance))
     return out
 
@@ -79,7 +80,7 @@ def find_isotopologue(peaks: PeakList, parent: Grown, one: Expected, table: Rigi
         return None
     shifts = [
         shift
-        for three in _triples(lines.slope[visible, :3] * one.errors, visible)
+        for three in _triples(lines.slope[:, :3] * one.errors, visible)
         for shift in _shifts(peaks, lines, three, one)
     ]
     if not shifts:
@@ -100,8 +101,9 @@ def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
     """Threes of visible lines that determine the shifts of the constants, strong and independent ones first."""
     chosen = []
     for three in combinations(range(min(len(visible), MOST_OF_TRIPLES)), 3):
-        sizes = np.linalg.svd(slopes[list(three)], compute_uv=False)
-        chosen.append((float(sizes[-1] / sizes[0]), visible[list(three)]))
+        rows = visible[list(three)]
+        sizes = np.linalg.svd(slopes[rows], compute_uv=False)
+        chosen.append((float(sizes[-1] / sizes[0]), rows))
     chosen.sort(key=lambda item: -item[0])
     return [three for _, three in chosen[:TRIPLES]]
 

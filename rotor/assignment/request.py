@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.doublets import with_centres
-from rotor.assignment.evidence import probability, word
+from rotor.assignment.evidence import probability, probability_of_isotopologue, word
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown
 from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologue
@@ -211,12 +211,10 @@ class _Search:
         twins = tuple(
             (other.constants[:3], other.evidence) for other in rivals[1:] if other.evidence > best.evidence - 10
         )
+        p = probability_of_isotopologue(best) if isotopologue else probability(best)
         self.species.append(
-            AssignedSpecies(
-                grown=best, refined=refined, peak=members[best.peak], strength=strength(seen, best),
-                probability=probability(best), twins=twins, isotopologue=isotopologue,
-            )
-        )  # fmt: skip
+            AssignedSpecies(best, refined, members[best.peak], strength(seen, best), p, twins, isotopologue)
+        )
         mask = explained(seen, best)
         self.left[members[mask].ravel()] = False
 
