@@ -379,7 +379,11 @@ def test_more_constants_than_lines_no_lines_and_unknown_levels_are_refused():
 def test_the_constants_that_the_lines_call_for_are_chosen():
     rigid = TRUE.replace(**{name: None for name in TRUE.values if name not in "ABC"}, reduction="A")
     candidates = ["DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK", "PhiJ", "PhiJK", "PhiKJ", "PhiK"]
-    fit, steps = choose_constants(synthetic(TRUE), with_names(rigid, []), ["A", "B", "C"], candidates)
+    shown = []
+    fit, steps = choose_constants(
+        synthetic(TRUE), with_names(rigid, []), ["A", "B", "C"], candidates, progress=shown.append
+    )
+    assert shown == steps  # every step as it is taken
     assert {step.name for step in steps} == {"DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"}
     assert fit.weighted_rms < 1.2
 
