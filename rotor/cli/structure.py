@@ -253,7 +253,8 @@ def _show(file: FamilyFile, answer: Answer) -> None:
         show_table(_planar_table(answer.planar))
     if answer.substitution:
         show_table(_coordinates_table(answer.substitution))
-        show_table(_values_table("rs", answer.substitution.values))
+        if answer.substitution.values:
+            show_table(_values_table("rs", answer.substitution.values))
     for one in answer.fitted:
         show_table(_values_table(one.method, (*one.values, *one.vibrational)))
         worst = max(one.moments, key=lambda moment: abs(moment.difference))

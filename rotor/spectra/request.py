@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
+Q_TOO_SMALL, Q_TOO_LARGE = 0.9, 10.0  # of the sum: a given Q beyond has a note
 NO_DIPOLE = "none: a rigid spherical top has no rotational lines"
 
 
@@ -168,6 +169,21 @@ class SpectrumAnswer(TextOf):
     request: SpectrumRequest
     lines: Lines
 
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """The limits of the lines, and a partition function that was given and is far from the sum over levels."""
+        given, lines = self.request.q, self.lines
+        if given is None or not lines.levels.of_named_constants:
+            return tuple(lines.warnings)
+        from rotor.thermodynamics import partition_function
+
+        summed = partition_function(lines.top, lines.temperature_k, effects=lines.levels.effects).q
+        if Q_TOO_SMALL * summed <= given <= Q_TOO_LARGE * summed:
+            return tuple(lines.warnings)
+        factor = f"intensities differ by a factor of {summed / given:.3g}"
+        text = f"Q = {given:g} is given where the sum over the levels is {summed:.4g}: {factor}"
+        return (*lines.warnings, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
+
     @property
     def column_per_cm2(self) -> float | None:
         """Molecules in the line of sight, 1/cm²; None without a layer."""
@@ -261,7 +277,7 @@ class SpectrumAnswer(TextOf):
             "column_per_cm2": self.column_per_cm2,
             "optical_depth": self.optical_depth,
             "hyperfine": hyperfine_facts(lines.top, lines.levels),
-            "notes": [*lines.top.notes, *lines.warnings],
+            "notes": [*lines.top.notes, *self.notes],
             **limit_facts(lines.top, self.typical_j, lines.levels.effects),
             "errors": self.errors.as_json(),
         }

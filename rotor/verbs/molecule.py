@@ -187,8 +187,10 @@ def top_of(reading: Reading) -> Top:
         weights = given.spin_weights
         top = reading.within("spin_weights", lambda: top.with_weights(dict(weights), reading.source("spin_weights")))
     top = _with_states(_with_spins(top, reading), reading)
+    from rotor.tops.plausible import implausible
+
     _refuse_weights_of_another_kind(top)
-    for text in top.notes:
+    for text in (*top.notes, *implausible(top)):
         reading.note(text)
     return top
 

@@ -300,7 +300,7 @@ VERB = Verb(
     ),
     shown=SpectrumShown,
     content=content,
-    notes=lambda answer: answer.lines.warnings,
+    notes=lambda answer: answer.notes,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="MHz",
     spectral=True,

@@ -275,8 +275,10 @@ def read_top(given: Input) -> Top:
     elif given.spins is not None:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
     top = _with_states(top, given)
+    from rotor.tops.plausible import implausible
+
     refuse_weights_of_another_kind(top)
-    for text in top.notes:
+    for text in (*top.notes, *implausible(top)):
         note(text)
     return top
 

@@ -1,0 +1,32 @@
+"""Input that hardly any molecule has is taken with a note."""
+
+import pytest
+
+import rotor
+from rotor.formats.molecules.library import names
+from rotor.tops.plausible import implausible
+
+
+def test_constants_beyond_a_rigid_body(call):
+    """I_c - I_a - I_b = 505379.008 (1/1500 - 1/3000 - 1/9000) = 112.3 u Å², a third of I_c."""
+    code, _, err = call("levels", "--constants", "A=9000 B=3000 C=1500 MHz", "--jmax", "1")
+    assert code == 0
+    assert "I_c - I_a - I_b = 112 u Å², 33 % of I_c" in err
+    assert call("levels", "--constants", "A=9000 B=3000 C=2250 MHz", "--jmax", "1")[2] == ""  # flat to round-off
+
+
+def test_no_molecule_of_the_library_is_implausible():
+    assert [name for name in names() if implausible(rotor.read(name))] == []
+
+
+def test_a_dipole_too_large(call):
+    err = call("info", "--constants", "A=9 B=3 C=2.3 GHz", "--dipole-abc", "185,0,0")[2]
+    assert "a dipole of 185 D is larger than that of a molecule" in err
+    assert implausible(rotor.Top.from_constants("B=9 GHz", dipole_abc_debye=(19.0, 0, 0))) == ()
+
+
+@pytest.mark.parametrize(("q", "noted"), [("5", True), ("178.1", False), ("400", False), ("5000", True)])
+def test_a_partition_function_far_from_the_sum(call, q, noted):
+    code, _, err = call("spectrum", "water", "--q", q, "--jmax", "2")
+    assert code == 0
+    assert ("is given where the sum over the levels is 178" in err) == noted
