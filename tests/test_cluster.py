@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+import time
+from pathlib import Path
 
+import distributed
 import pytest
 
 from rotor.scenes.cluster import dask_executor
@@ -41,14 +45,12 @@ def test_processes_and_a_cluster_exclude_each_other(call, folder):
 @pytest.fixture
 def cluster():
     """Two workers in this process."""
-    distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
     ) as made:
         yield made.scheduler_address
 
 
-@pytest.mark.slow
 def test_a_sweep_on_a_cluster_gives_the_same_bytes(call, folder, cluster):
     (folder / "one").mkdir()
     single = run_sweep(SWEEP, out="one")
@@ -61,7 +63,6 @@ def test_a_sweep_on_a_cluster_gives_the_same_bytes(call, folder, cluster):
         assert (folder / name).read_bytes() == (folder / "one" / name).read_bytes()
 
 
-@pytest.mark.slow
 def test_one_scene_is_spread_over_a_cluster(cluster):
     scene = StarkScene(
         molecule="CH3CN", conditions=StarkConditions(field="0:50kV/cm:6"), observables=StarkObservables(jmax=2)
@@ -73,12 +74,97 @@ def test_one_scene_is_spread_over_a_cluster(cluster):
         assert (spread.table.columns[name] == column).all(), name
 
 
-@pytest.mark.slow
 def test_a_scheduler_that_is_not_there(monkeypatch):
-    pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr("rotor.scenes.cluster.WAIT_SECONDS", 1)
     with (
         pytest.raises(ValueError, match=r"tcp://127.0.0.1:9: no scheduler of Dask answers within 1 s"),
         dask_executor("tcp://127.0.0.1:9"),
     ):
         pass
+
+
+def test_a_sweep_on_a_cluster_goes_on_where_it_stopped(folder, cluster):
+    count = []
+
+    def stop(made):
+        count.append(made)
+        if len(count) == 2:
+            raise KeyboardInterrupt
+
+    def interrupted():
+        with dask_executor(cluster) as pool:
+            run_sweep(SWEEP, record="r", executor=pool, on_point=stop)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    with dask_executor(cluster) as pool:
+        result = run_sweep(SWEEP, record="r", executor=pool)
+    assert result.computed == 4
+    assert result.columns["rows"].tolist() == [3, 6] * 3
+
+
+def _wait_and_write(name):
+    time.sleep(0.5)
+    Path(name).write_text("done")
+
+
+def test_what_has_not_begun_on_a_cluster_is_cancelled(folder, cluster):
+    """Two workers have begun two of forty pieces, which take 10 s together, when an error ends the context."""
+
+    def interrupted():
+        with dask_executor(cluster) as pool:
+            for n in range(40):
+                pool.submit(_wait_and_write, str(folder / f"{n}.txt"))
+            time.sleep(0.2)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    time.sleep(1.5)  # s; two pieces end that had begun
+    written = len(list(folder.glob("*.txt")))
+    assert written < 20
+    time.sleep(1.5)
+    assert len(list(folder.glob("*.txt"))) == written  # six more would have been written
+
+
+@pytest.fixture
+def certificate(tmp_path):
+    """A certificate signed by itself, and its key."""
+    key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
+    made = subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", cert, "-days", "2",
+         "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1,DNS:localhost"],
+        capture_output=True, check=False,
+    )  # fmt: skip
+    if made.returncode:
+        pytest.skip("openssl, which makes the certificate, is not there")
+    return str(cert), str(cert), str(key)
+
+
+def test_an_encrypted_cluster_takes_a_client_with_certificates(call, folder, certificate):
+    authority, cert, key = certificate
+    security = distributed.Security(
+        tls_ca_file=authority, tls_scheduler_cert=cert, tls_scheduler_key=key, tls_worker_cert=cert, tls_worker_key=key,
+        tls_client_cert=cert, tls_client_key=key, require_encryption=True,
+    )  # fmt: skip
+    write_scene(SWEEP, "s.toml")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tls://", security=security
+    ) as made:
+        address = made.scheduler_address
+        assert address.startswith("tls://")
+        code, _, err = call("run", "s.toml", "--dask", address)
+        assert (code, "no scheduler of Dask answers" in err) == (2, True)
+        code, _, err = call("run", "s.toml", "--dask", address, "--dask-tls", ",".join(certificate))
+        assert code == 0, err
+    assert len(list(folder.glob("*.csv"))) == 6
+
+
+def test_certificates_that_are_not_there(call, folder):
+    write_scene(SWEEP, "s.toml")
+    for given, said in (("a,b", "expected three files"), ("a,b,c", "a: no such file")):
+        code, _, err = call("run", "s.toml", "--dask", "tls://localhost:1", "--dask-tls", given)
+        assert code == 2
+        assert said in err
+    code, _, err = call("run", "s.toml", "--dask-tls", "a,b,c")
+    assert (code, "goes with --dask" in err) == (2, True)

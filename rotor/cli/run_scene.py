@@ -58,6 +58,11 @@ class Options:
     dask: str | None = option(
         None, metavar="ADDRESS", help="Spread them over the workers of a Dask scheduler instead: tcp://head:8786."
     )
+    dask_tls: str | None = option(
+        None,
+        metavar="CA,CERT,KEY",
+        help="Of an encrypted cluster: PEM files of the authority, the certificate, its key.",
+    )
     record: str | None = option(
         None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
     )
@@ -98,9 +103,11 @@ def _workers(options: Options) -> Iterator[Executor | None]:
     if options.dask is not None:
         if number is not None:
             raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
-        with _of_dask(options.dask) as cluster:
+        with _of_dask(options.dask, options.dask_tls) as cluster:
             yield cluster
         return
+    if options.dask_tls is not None:
+        raise ValueError("--dask-tls: goes with --dask, the address of a scheduler")
     if number is None or number == 1:
         yield None
         return
@@ -111,14 +118,17 @@ def _workers(options: Options) -> Iterator[Executor | None]:
 
 
 @contextmanager
-def _of_dask(address: str) -> Iterator[Executor]:
+def _of_dask(address: str, certificates: str | None) -> Iterator[Executor]:
     from contextlib import ExitStack
 
-    from rotor.scenes.cluster import dask_executor
+    from rotor.scenes.cluster import dask_executor, tls_security
 
+    files = [] if certificates is None else certificates.split(",")
+    if files and len(files) != 3:
+        raise ValueError(f"--dask-tls {certificates}: expected three files: of the authority, the certificate, its key")
     with ExitStack() as stack:
         try:
-            pool = stack.enter_context(dask_executor(address))
+            pool = stack.enter_context(dask_executor(address, tls_security(*files) if files else None))
         except ValueError as error:
             raise ValueError(f"--dask: {error}") from None
         yield pool

@@ -9,29 +9,56 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 INSTALL = 'python -m pip install "molrotor[dask]"'
 WAIT_SECONDS = 10  # for a scheduler to answer
 
 
 @contextmanager
-def dask_executor(address: str) -> Iterator[Executor]:
-    """The workers of the scheduler at an address such as tcp://head:8786, until the end of the context.
+def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
+    """The workers of a Dask scheduler, until the end of the context; where it ends with an error, what has not begun is cancelled.
 
-    Raises ValueError where dask.distributed is not installed, with the command that installs it, and where no scheduler answers.
+    address: tcp://head:8786, or tls://head:8786. security: a `distributed.Security` with the certificates of an encrypted cluster, as
+    `tls_security` reads them; by default that of Dask's own configuration. Raises ValueError where dask.distributed is not
+    installed, with the command that installs it, and where no scheduler answers.
     """
     try:
         from distributed import Client
     except ImportError:
         raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
     try:
-        client = Client(address, timeout=WAIT_SECONDS, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
+        client = Client(address, timeout=WAIT_SECONDS, set_as_default=False, security=security)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise ValueError(
-            f"{address}: no scheduler of Dask answers within {WAIT_SECONDS} s ({error}); expected an address such as tcp://head:8786"
+            f"{address}: no scheduler of Dask answers within {WAIT_SECONDS} s ({error}); expected an address such as tcp://head:8786, "
+            "or tls://head:8786 with certificates"
         ) from None
+    pool = client.get_executor()
     try:
-        with client.get_executor() as pool:
-            yield pool
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False)  # cancels what has not begun
+        raise
+    else:
+        pool.shutdown()
     finally:
         client.close()
+
+
+def tls_security(authority: str, certificate: str, key: str) -> Any:
+    """The security of a client of an encrypted cluster: files in PEM of the authority, the client's certificate and its key.
+
+    Raises ValueError for a file that is not there, and where dask.distributed is not installed.
+    """
+    for name in (authority, certificate, key):
+        if not Path(name).is_file():
+            raise ValueError(
+                f"{name}: no such file; expected PEM files of the authority, the client's certificate, its key"
+            )
+    try:
+        from distributed import Security
+    except ImportError:
+        raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
+    return Security(tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True)
