@@ -251,7 +251,7 @@ def _cell(value: Any) -> str:
 
 def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
     import rotor
-    from rotor.cli.shared.workers import progress_bar
+    from rotor.reports.progress import progress_bar
     from rotor.scenes.sweep import run_sweep
 
     record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")

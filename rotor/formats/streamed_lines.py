@@ -11,7 +11,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,6 +33,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import intensity_cut, jmax_for_cut, require_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
 from rotor.spectra.transitions import all_transitions
+from rotor.temporary import locked_file
 from rotor.thermodynamics import PartitionFunction
 from rotor.thermodynamics.trusted_levels import are_trusted
 from rotor.tops.top import Top
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
 PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
+MEMORY_MB = 500  # for the sort, beside the program itself
 _BATCH = 1 << 18  # lines that are made into text at once
 _MANIFEST = "manifest.json"
 
@@ -56,6 +58,59 @@ class StreamedList:
     pieces_found: int
     jmax: int
     q: float
+
+
+@dataclass(frozen=True)
+class SortedLines:
+    """A list that is sorted on disk, in a Parquet file of its own folder, to be written in other formats."""
+
+    file: Path
+    count: int
+    pieces_made: int
+    pieces_found: int
+    plan: _Plan
+    record: Mapping[str, Any]
+    memory_mb: int
+
+    def write(self, target: Path, tag: int = 0) -> None:
+        """Write the list as .parquet or .cat by the suffix of the name."""
+        if target.suffix.lower() == ".parquet":
+            with atomic_path(target) as unfinished:
+                shutil.copyfile(self.file, unfinished)
+            return
+        count = 0
+        with open_atomic(target) as handle:
+            for part in _catalogues(self.plan, self.file, tag, self.memory_mb):
+                handle.write(format_lines(part))
+                count += len(part)
+        write_beside(target, dict(self.record) | {"lines": count})
+
+    def strongest_cut(self, count: int) -> tuple[float | None, int]:
+        """The lgint that so many lines reach, and the highest J of these; None where the list has no more."""
+        from rotor.formats.tables import quoted
+
+        with _engine(self.plan.folder, self.memory_mb) as engine:
+            rows = engine.execute(
+                f"SELECT lgint, greatest(j_upper, j_lower) FROM read_parquet({quoted(str(self.file))}) WHERE lgint IS NOT NULL "
+                f"ORDER BY lgint DESC LIMIT {count}"
+            ).fetchall()
+        return (rows[-1][0] if len(rows) == count else None), max((j for _, j in rows), default=1)
+
+    @property
+    def span_mhz(self) -> tuple[float, float]:
+        """The lowest and the highest frequency."""
+        from rotor.formats.tables import quoted
+
+        with _engine(self.plan.folder, self.memory_mb) as engine:
+            row = engine.execute(
+                f"SELECT min(frequency_mhz), max(frequency_mhz) FROM read_parquet({quoted(str(self.file))})"
+            ).fetchone()
+        assert row is not None  # an aggregate always has one row
+        return row[0], row[1]
+
+    def remove(self) -> None:
+        """Remove the folder with the list."""
+        shutil.rmtree(self.plan.folder, ignore_errors=True)
 
 
 @dataclass(frozen=True)
@@ -91,7 +146,7 @@ def stream_lines(
     q: float | None = None,
     vibrational_factor: float = 1.0,
     tag: int = 0,
-    memory_mb: int = 500,
+    memory_mb: int = MEMORY_MB,
     piece_lines: int = PIECE_LINES,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
@@ -145,6 +200,43 @@ def stream_lines(
     target = Path(path)
     if target.suffix.lower() not in (".parquet", ".cat"):
         raise ValueError(f"{path}: a streamed list is written as .parquet or .cat; the suffix names the format")
+    with locked_file(target):
+        made = sorted_lines(
+            top,
+            Path(f"{target}.pieces"),
+            jmax=jmax,
+            temperature_k=temperature_k,
+            min_lgint=min_lgint,
+            range_mhz=range_mhz,
+            q=q,
+            vibrational_factor=vibrational_factor,
+            memory_mb=memory_mb,
+            piece_lines=piece_lines,
+            effects=effects,
+            executor=executor,
+        )
+        made.write(target, tag)
+        made.remove()
+    return StreamedList(target, made.count, made.pieces_made, made.pieces_found, made.plan.jmax, made.plan.partition.q)
+
+
+def sorted_lines(
+    top: Top,
+    folder: Path,
+    *,
+    jmax: int | None,
+    temperature_k: float,
+    min_lgint: float | None,
+    range_mhz: tuple[float, float],
+    q: float | None,
+    vibrational_factor: float,
+    memory_mb: int = MEMORY_MB,
+    piece_lines: int = PIECE_LINES,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> SortedLines:
+    """The lines of `stream_lines`, sorted in a folder; pieces that are there already are not made again."""
     if piece_lines < 1 or memory_mb < 100:
         raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: expected at least 1 line and 100 MB")
     require_cut(min_lgint)
@@ -158,18 +250,26 @@ def stream_lines(
         vibrational_factor=vibrational_factor,
         effects=effects,
     )
-    plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
+    plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, folder)
     ranges = list(_ranges(plan, piece_lines))
     record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
     _open_folder(plan.folder, record)
 
     missing = [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
-    for _ in (executor.map if executor else map)(_make_piece, *jobs):
-        pass
-    lines = _merge(plan, [plan.piece(*r) for r in ranges], target, record, tag, memory_mb)
-    shutil.rmtree(plan.folder)
-    return StreamedList(target, lines, len(missing), len(ranges) - len(missing), plan.jmax, plan.partition.q)
+    before = len(ranges) - len(missing)
+    for done, _ in enumerate((executor.map if executor else map)(_make_piece, *jobs), before + 1):
+        if progress is not None:
+            progress(done, len(ranges))
+    merged = plan.folder / "sorted.parquet"
+    count = _sort([plan.piece(*r) for r in ranges], merged, record, plan.folder, memory_mb)
+    return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
+
+
+def transition_count(top: Top, jmax: int) -> float:
+    """About how many transitions a list has up to a J before any cut, without spins and further states."""
+    components = sum(1 for mu in top.dipole_abc_debye or () if mu)
+    return 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
 
 
 def _refuse_forks(executor: Executor | None) -> None:
@@ -315,22 +415,6 @@ def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
 def _quanta(lines: Lines) -> dict[str, Any]:
     columns = lines.levels.quanta_columns(lines.upper, "upper") | lines.levels.quanta_columns(lines.lower, "lower")
     return {name: column.astype(np.int16) for name, column in columns.items()}
-
-
-def _merge(plan: _Plan, pieces: list[Path], target: Path, record: Mapping[str, Any], tag: int, memory_mb: int) -> int:
-    """All pieces sorted into the target; the number of its lines."""
-    if target.suffix.lower() == ".parquet":
-        with atomic_path(target) as unfinished:
-            return _sort(pieces, unfinished, record, plan.folder, memory_mb)
-    merged = plan.folder / "sorted.parquet"
-    _sort(pieces, merged, record, plan.folder, memory_mb)
-    with open_atomic(target) as handle:
-        count = 0
-        for part in _catalogues(plan, merged, tag, memory_mb):
-            handle.write(format_lines(part))
-            count += len(part)
-    write_beside(target, dict(record) | {"lines": count})
-    return count
 
 
 def _sort(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> int:

@@ -18,12 +18,13 @@ from rotor.requests.fill import Given, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
+from rotor.verbs.long_lists import LongAnswer, answer_long, is_long
 from rotor.verbs.molecule import has_unit, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
 
 if TYPE_CHECKING:
-    from rotor.spectra.lines import Lines
+    pass
 
 MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
 HITRAN_K = 296.0
@@ -150,6 +151,9 @@ def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """The lines in the format of the suffix, with the numbers that it asks for."""
     from rotor.formats import write
 
+    if isinstance(answer, LongAnswer):
+        answer.write(path, tag_of(answer, report.shown))
+        return
     shown, numbers = report.shown, {}
     if shown.hitran_id is not None:
         numbers = dict(zip(("molecule", "isotopologue"), shown.hitran_id, strict=True))
@@ -191,7 +195,7 @@ def show(answer: SpectrumAnswer, report: Report) -> None:
         if lines.levels.of_named_constants
         else f"{lines.top.name}: levels of the file's own parameters"
     )
-    show_facts(_facts(lines, record))
+    show_facts(_facts(answer, record))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer, report.given)}")
     elif record["patterns"] is not None:
@@ -215,8 +219,8 @@ def _why_none(answer: SpectrumAnswer, given: Given) -> str:
     return f"{reason}; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
 
 
-def _facts(lines: Lines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top = lines.top
+def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    lines, top = answer.lines, answer.lines.top
     cut = "none: every allowed line" if record["min_lgint"] is None else f"lgint above {record['min_lgint']:g}"
     spin_weights = record["spin_weights"]
     named = lines.levels.of_named_constants
@@ -231,10 +235,10 @@ def _facts(lines: Lines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
         *top_facts.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("Q", top_facts.q_text(record["q"], classical=named)),
-        ("J max", f"{lines.jmax}: {record['jmax_source']}"),
+        ("J max", f"{record['jmax']}: {record['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(record["hyperfine"]),
-        ("lines", _count_text(lines)),
+        ("lines", _count_text(answer, record["line_count"])),
         *_layer_facts(record),
     ]
 
@@ -252,14 +256,19 @@ def _range_text(range_mhz: tuple[float, float]) -> str:
     return "" if first <= 0 and math.isinf(last) else f", from {first:g} to {last:g} MHz"
 
 
-def _count_text(lines: Lines) -> str:
-    if not len(lines):
+def _count_text(answer: SpectrumAnswer, count: int) -> str:
+    if not count:
         return "none"
-    return f"{len(lines)}, from {lines.frequency_mhz[0]:.4f} to {lines.frequency_mhz[-1]:.4f} MHz"
+    frequency = answer.lines.frequency_mhz
+    first, last = answer.span_mhz if isinstance(answer, LongAnswer) else (frequency[0], frequency[-1])
+    return f"{count}, from {first:.4f} to {last:.4f} MHz"
 
 
-def answer_of(request: SpectrumRequest, executor: Any) -> SpectrumAnswer:
-    """The lines of a request, or of the prediction that made it."""
+def answer_of(request: SpectrumRequest, work: Work) -> SpectrumAnswer:
+    """The lines of a request, or of the prediction that made it; on disk where memory may not hold them."""
+    predicted, executor = isinstance(request, int_files.PredictedRequest), work.executor
+    if not predicted and is_long(request, work.files, getattr(work.shown, "resolution", None)):
+        return answer_long(request, work.files, getattr(work.shown, "top_lines", 0), work.progress)
     return (
         int_files.answer_of(request)
         if isinstance(request, int_files.PredictedRequest)
@@ -272,7 +281,7 @@ VERB = Verb(
     about="Rotational lines of a molecule: frequencies, intensities, and what they were made from.",
     examples=EXAMPLES,
     request=SpectrumRequest,
-    answer=lambda request, work: answer_of(request, work.executor),
+    answer=answer_of,
     table=lambda answer: answer.lines,
     rows="lines",
     show=show,

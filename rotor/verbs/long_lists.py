@@ -1,0 +1,106 @@
+"""Lists of lines that do not fit in memory: sorted on disk, written from there, and shown by their strongest lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports.progress import progress_bar
+from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
+
+if TYPE_CHECKING:
+    from rotor.formats.streamed_lines import SortedLines
+
+TRANSITIONS = 2_000_000  # before the cut, beyond which a list is made on disk: in memory each takes some 0.3 kB
+STRONGEST = 1_000  # lines that are in memory
+STREAMED = frozenset({"cat", "parquet"})  # outputs that are written from the disk
+
+
+@dataclass(frozen=True, repr=False)
+class LongAnswer(SpectrumAnswer):
+    """A list on disk. lines: the strongest of them; whole: all. span_mhz: its first and last frequency. files: still to be written."""
+
+    whole: SortedLines
+    span_mhz: tuple[float, float]
+    files: list[Path]
+
+    def write(self, path: Path, tag: int) -> None:
+        """Write all lines; what is on disk is removed with the last file."""
+        self.whole.write(path, tag)
+        self.files.pop()
+        if not self.files:
+            self.whole.remove()
+
+    def facts(self) -> dict[str, Any]:
+        """As of any list, of all its lines."""
+        plan = self.whole.plan
+        return super().facts() | {
+            "jmax": plan.jmax,
+            "line_count": self.whole.count,
+            "min_lgint": self.request.min_lgint,
+        }
+
+
+def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> bool:
+    """Whether a list is made on disk: so many transitions that memory may not hold them, and no output that needs it."""
+    from rotor.formats.streamed_lines import transition_count
+
+    plain = request.shape == "sticks" and request.layer is None and resolution is None and not request.untrusted
+    if (
+        not plain
+        or request.covariance is not None
+        or request.vibrations is not None
+        or not files
+        or files.keys() - STREAMED
+    ):
+        return False
+    if any(path.suffix == ".gz" for paths in files.values() for path in paths) or request.top.dipole_abc_debye is None:
+        return False
+    return transition_count(request.top, _highest_j(request)) > TRANSITIONS
+
+
+def _highest_j(request: SpectrumRequest) -> int:
+    """The highest J that is given, or, roughly, that of the usual cut: where Q is not known yet, for Q = 1."""
+    from rotor.spectra.intensity import USUAL_CUT, jmax_for_cut
+
+    dipole = request.top.dipole_abc_debye
+    if request.jmax is not None or dipole is None:
+        return request.jmax or 0
+    least = USUAL_CUT if request.min_lgint is None else request.min_lgint
+    try:
+        return jmax_for_cut(request.top, dipole, request.temperature_k, request.q or 1e4, least)
+    except ValueError:  # the list itself says so
+        return 0
+
+
+def answer_long(
+    request: SpectrumRequest, files: Mapping[str, tuple[Path, ...]], strongest: int, progress: bool
+) -> LongAnswer:
+    """The lines of a request, sorted in a folder beside the first of its files; a run that was cut off goes on from there."""
+    paths = [path for several in files.values() for path in several]
+    with progress_bar("pieces") if progress else nullcontext() as advance:
+        whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)
+    cut, jmax = whole.strongest_cut(max(strongest, STRONGEST))
+    least = request.min_lgint if cut is None else cut
+    lines = answer_spectrum(replace(request, jmax=jmax, min_lgint=least)).lines
+    return LongAnswer(request, lines, whole, whole.span_mhz, paths)
+
+
+def _sorted(request: SpectrumRequest, folder: Path, progress: Callable[[int, int], object] | None) -> SortedLines:
+    from rotor.formats.streamed_lines import sorted_lines
+
+    return sorted_lines(
+        request.top,
+        folder,
+        jmax=request.jmax,
+        temperature_k=request.temperature_k,
+        min_lgint=request.min_lgint,
+        range_mhz=request.range_mhz,
+        q=request.q,
+        vibrational_factor=request.vibrational_factor,
+        effects=request.effects,
+        progress=progress,
+    )

@@ -1,0 +1,159 @@
+"""`rotor spectrum` and scenes make lists on disk that memory may not hold: the same lines, in every format."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene_file import parse_scene
+from rotor.verbs import long_lists
+
+CONSTANTS = "A=8572 B=3640 C=2790 MHz"
+TYPED = (
+    "spectrum",
+    "--constants",
+    CONSTANTS,
+    "--dipole-abc",
+    "1.2,1.9,0.4",
+    "--jmax",
+    "20",
+    "--min-lgint",
+    "none",
+    "--q",
+    "1e5",
+)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Lists of more than a thousand transitions count as long."""
+    monkeypatch.setattr(long_lists, "TRANSITIONS", 1_000)
+    monkeypatch.setattr(long_lists, "STRONGEST", 50)
+
+
+def _in_memory(call, monkeypatch, *arguments):
+    with monkeypatch.context() as patch:
+        patch.setattr(long_lists, "TRANSITIONS", 1e9)
+        return call(*arguments)
+
+
+def test_a_long_list_is_the_same_in_every_format(call, folder, monkeypatch, short):
+    code, out, err = call(*TYPED, "--cat", "a.cat", "--parquet", "a.parquet")
+    assert (code, err) == (0, "")
+    code, plain, _ = _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat", "--parquet", "b.parquet")
+    assert code == 0
+    assert sorted(out.split()) == sorted(plain.split())  # facts and strongest lines; those of one frequency in any order
+    assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
+    import duckdb
+
+    streamed, whole = (duckdb.sql(f"SELECT * FROM '{name}.parquet'").fetchnumpy() for name in "ab")
+    assert len(streamed["frequency_mhz"]) > 10_000
+    assert np.all(np.diff(streamed["frequency_mhz"]) >= 0)
+    order = [np.lexsort((c["lgint"], c["j_lower"], c["frequency_mhz"].round(6))) for c in (streamed, whole)]
+    for name in ("frequency_mhz", "lgint", "energy_lower_cm"):
+        np.testing.assert_allclose(
+            streamed[name][order[0]], whole[name][order[1]], rtol=1e-9, atol=1e-9
+        )  # rounding of blocks
+    assert sorted(path.name for path in folder.iterdir()) == ["a.cat", "a.cat.provenance.json", "a.parquet", "b.cat",
+                                                              "b.cat.provenance.json", "b.parquet"]  # fmt: skip
+
+
+def test_a_scene_makes_a_long_list_on_disk(folder, short):
+    scene = parse_scene(
+        f'schema = 1\nkind = "spectrum"\n[molecule]\nconstants = "{CONSTANTS}"\ndipole_abc = [1.2, 1.9, 0.4]\n'
+        '[observables]\nmin_lgint = "none"\nq = 1e5\n[numerics]\njmax = 20\n[outputs]\ncat = "s.cat"\n'
+    )
+    result = run_scene(scene)
+    assert isinstance(result.answer, long_lists.LongAnswer)
+    facts = result.answer.facts()
+    assert facts["line_count"] > 10_000
+    assert facts["jmax"] == 20
+    assert len(Path("s.cat").read_text().splitlines()) == facts["line_count"] or json.loads(
+        Path("s.cat.provenance.json").read_text()
+    )["lines"] == len(Path("s.cat").read_text().splitlines())  # lines without strength are in no catalogue
+    assert not list(folder.glob("*.pieces"))
+
+
+@pytest.mark.parametrize(
+    "more", [("--csv", "a.csv"), ("--cat", "a.cat.gz"), ("--cat", "a.cat", "--resolution", "1"), ()], ids=str
+)
+def test_what_needs_the_whole_list_has_it(call, folder, monkeypatch, short, more):
+    monkeypatch.setattr(long_lists, "answer_long", lambda *_: pytest.fail("made on disk"))
+    code, _, err = call(*TYPED, *more)
+    assert (code, err) == (0, "")
+    if more[1:] == ("a.cat.gz",):
+        assert len(gzip.decompress(Path("a.cat.gz").read_bytes()).splitlines()) > 10_000
+
+
+def test_short_lists_are_made_in_memory(call, folder, monkeypatch):
+    monkeypatch.setattr(long_lists, "answer_long", lambda *_: pytest.fail("made on disk"))
+    assert call("spectrum", "water", "--cat", "a.cat")[0] == 0
+
+
+def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
+    from rotor.formats import streamed_lines
+
+    monkeypatch.setattr(streamed_lines, "PIECE_LINES", 2_000)
+    made, true = [], streamed_lines._make_piece
+
+    def stopping(plan, first, last):
+        if len(made) == 3:
+            raise KeyboardInterrupt
+        made.append(first)
+        true(plan, first, last)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(streamed_lines, "_make_piece", stopping)
+        patch.setattr(
+            streamed_lines.sorted_lines,
+            "__kwdefaults__",
+            streamed_lines.sorted_lines.__kwdefaults__ | {"piece_lines": 2_000},
+        )
+        assert call(*TYPED, "--cat", "a.cat")[0] == 130
+        assert Path("a.cat.pieces").is_dir()
+        assert not Path("a.cat").exists()
+        patch.setattr(
+            streamed_lines, "_make_piece", lambda plan, first, last: (made.append(first), true(plan, first, last))
+        )
+        assert call(*TYPED, "--cat", "a.cat")[0] == 0
+    assert len(made) == len(set(made))  # no piece twice
+    assert not Path("a.cat.pieces").exists()
+
+
+MEASURED = """
+import resource, sys
+from rotor.cli import run
+code = run(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, file=sys.stderr)
+sys.exit(code)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="resident memory is measured in kB on Linux")
+def test_all_lines_to_j_300_take_less_than_1_gb(tmp_path):
+    """40 million lines of an asymmetric top with three components, sorted, as a catalogue and as Parquet."""
+    typed = [word if word != "20" else "300" for word in TYPED]
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURED, *typed, "--cat", "a.cat", "--parquet", "a.parquet"],
+        cwd=tmp_path, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert int(done.stderr.splitlines()[-1]) < 1000  # MB resident, as the issue asks
+    import duckdb
+
+    count, falls = duckdb.sql(
+        "SELECT count(*), count_if(frequency_mhz < before) FROM (SELECT frequency_mhz, lag(frequency_mhz) OVER () before "
+        f"FROM '{tmp_path / 'a.parquet'}')"
+    ).fetchone()
+    assert count > 30_000_000
+    assert falls == 0
+    assert (tmp_path / "a.cat").stat().st_size > 80 * 30_000_000
