@@ -50,7 +50,8 @@ def test_a_long_list_is_the_same_in_every_format(call, folder, monkeypatch, shor
     assert (code, err) == (0, "")
     code, plain, _ = _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat", "--parquet", "b.parquet")
     assert code == 0
-    assert sorted(out.split()) == sorted(plain.split())  # facts and strongest lines; those of one frequency in any order
+    # facts and strongest lines; those of one frequency in any order
+    assert sorted(out.split()) == sorted(plain.split())
     assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
     import duckdb
 
