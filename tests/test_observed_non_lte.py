@@ -92,7 +92,7 @@ def test_without_collisions_lines_vanish(lamda: Path) -> None:
 
 
 def test_excitation_rises_from_the_background_to_the_gas(lamda: Path) -> None:
-    kelvin = [excited_lines(NonLteComponent(lamda, 1e12, 40.0, n)).excitation_k[0] for n in (1e1, 1e2, 1e3, 1e12)]
+    kelvin = [excited_lines(NonLteComponent(lamda, 1e12, 40.0, n)).excitation_k[0] for n in (1.0, 10.0, 100.0, 1e12)]
     assert 2.725 < kelvin[0] < kelvin[1] < kelvin[2]
     assert kelvin[-1] == pytest.approx(40.0, rel=1e-3)
 

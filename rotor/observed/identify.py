@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.observed.fit import Contribution, FitChoices, SourceFit, contributions, fit_source
+from rotor.observed.fit import FitChoices, SourceFit, fit_source
 from rotor.observed.model import KM_PER_S, Component, Sight, component_depth, model
 from rotor.observed.species import SpeciesLines
 from rotor.observed.spectrum import ObservedSpectrum
@@ -33,6 +33,7 @@ _UNIDENTIFIED = 5.0  # standard deviations
 _VISIBLE = 3.0
 _RIVAL = 0.7  # of the evidence of a species, from which another that is not in the model could explain it
 _RIVALS = 3
+_SHARED = 0.3  # standard deviations, above which a species takes part in a channel
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,14 @@ def identify(
     search.run()
     fit, kept = search.pruned()
     evidence = (
-        tuple(sorted((_evidence(fit, one, bank, search) for one in kept), key=lambda one: -one.signal)) if fit else ()
+        tuple(
+            sorted(
+                (_evidence(fit, k, signal, bank, search) for k, signal in enumerate(kept.tolist())),
+                key=lambda one: -one.signal,
+            )
+        )
+        if fit
+        else ()
     )
     return Identification(evidence, _unidentified(search, fit), fit, len(known), velocity, width)
 
@@ -327,23 +335,43 @@ class _Search:
             noisy, components, self.sight, FitChoices(free=free, shared=shared, most_iterations=iterations)
         )
 
-    def pruned(self) -> tuple[SourceFit | None, list[tuple[int, Contribution]]]:
+    def pruned(self) -> tuple[SourceFit | None, Floats]:
         """The last fit, without species that the others make unnecessary, and the evidence of each that stays."""
         while self.components:
             fit = self.fit(self.components, 40)
-            evidence = list(enumerate(contributions(fit)))
-            weakest = min(evidence, key=lambda one: one[1].signal)
-            if weakest[1].signal >= self.threshold:
-                return fit, evidence
-            lost = {k for k, one in evidence if one.signal < self.threshold / 4} or {weakest[0]}
-            self.components = [one for k, one in enumerate(fit.components) if k not in lost]
-            self.numbers = [one for k, one in enumerate(self.numbers) if k not in lost]
-        return None, []
+            signals = self.signals(fit)
+            if signals.min() >= self.threshold:
+                return fit, signals
+            lost = (signals < self.threshold / 4) | (signals == signals.min())
+            self.components = [one for one, gone in zip(fit.components, lost, strict=True) if not gone]
+            self.numbers = [one for one, gone in zip(self.numbers, lost, strict=True) if not gone]
+        return None, np.zeros(0)
+
+    def signals(self, fit: SourceFit) -> Floats:
+        """For every species the χ² that is lost without it, those that share its channels fitted again."""
+        grid = fit.spectrum.frequency_mhz
+        alone = np.array([model([one], grid, self.sight).brightness_k for one in fit.components])
+        shines = np.abs(alone) > _SHARED * fit.noise
+        out = np.zeros(len(alone))
+        for k in range(len(alone)):
+            near = [i for i in range(len(alone)) if i != k and (shines[i] & shines[k]).any()]
+            rest = [one for i, one in enumerate(fit.components) if i != k and i not in near]
+            left = fit.spectrum.intensity - self.model_k(rest) if rest else fit.spectrum.intensity
+            out[k] = self._misfit(fit, left, [fit.components[i] for i in near]) - fit.chi_squared
+        return out / fit.scale**2
+
+    def _misfit(self, fit: SourceFit, left: Floats, near: list[Component]) -> float:
+        """χ² of what is left with some species, fitted again."""
+        if not near:
+            return float(np.sum((left / fit.noise) ** 2))
+        part = replace(fit.spectrum, intensity=left, noise=fit.noise)
+        return fit_source(
+            part, near, self.sight, FitChoices(free=("column_per_cm2", "excitation_k"), most_iterations=15)
+        ).chi_squared
 
 
-def _evidence(fit: SourceFit, contribution: tuple[int, Contribution], bank: _Bank, search: _Search) -> Evidence:
+def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Search) -> Evidence:
     """What speaks for a species: lost χ², lines seen of those expected, and rivals."""
-    k, one = contribution
     component = fit.components[k]
     alone = model([component], fit.spectrum.frequency_mhz, fit.sight).brightness_k
     expected, visible = _lines_seen(fit, component, alone)
@@ -353,7 +381,7 @@ def _evidence(fit: SourceFit, contribution: tuple[int, Contribution], bank: _Ban
     gain[search.numbers] = 0.0
     order = np.argsort(-gain)[:_RIVALS]
     rivals = tuple(search.known[i].name for i in order if gain[i] > _RIVAL * own)
-    return Evidence(component, one.signal, visible, expected, rivals)
+    return Evidence(component, signal, visible, expected, rivals)
 
 
 def _lines_seen(fit: SourceFit, component: Component, alone: Floats) -> tuple[int, int]:
