@@ -72,17 +72,18 @@ class CombinedFile:
 
     def write_part(self, key: str, values: Mapping[str, Any], table: Table) -> None:
         """Write the rows of a finished point to where they wait."""
-        from rotor.formats.atomic_write import atomic_path
         from rotor.formats.tables import copy_columns
 
         columns = {"point": np.full(len(table), key[:KEY_LENGTH])} | point_columns(values, table)
         small = len(table) <= SMALL_ROWS and all(np.asarray(column).dtype.kind != "O" for column in columns.values())
         path = self.folder / f"{key[:KEY_LENGTH]}{_SMALL if small else _LARGE}"
-        with atomic_path(path) as unfinished:
-            if small:
-                np.savez(unfinished, allow_pickle=False, **columns)
-            else:
-                copy_columns(columns, unfinished, "(FORMAT parquet)")
+        unfinished = path.with_suffix(f".{os.getpid()}{path.suffix}.part")  # in a folder that this sweep alone uses
+        if small:
+            with open(unfinished, "wb") as handle:
+                np.savez(handle, allow_pickle=False, **columns)
+        else:
+            copy_columns(columns, unfinished, "(FORMAT parquet)")
+        os.replace(unfinished, path)
 
     def join(self, keys: Sequence[str], provenance: str) -> None:
         """Write the file: the rows of the points with these keys, in their order; the folder is removed."""

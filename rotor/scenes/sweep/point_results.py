@@ -70,7 +70,7 @@ def _thermo(answer: Any) -> Numbers:
 def _field_map(answer: Any) -> Numbers:
     """The largest move of a level between the first and the last field."""
     states = answer.states
-    curves = [states.energy_mhz[rows] for rows in states.curves().values()]
+    curves = [states.energy_mhz[rows] for rows in states.curves()]
     return {"levels": len(curves), "largest_shift_mhz": max(abs(curve[-1] - curve[0]) for curve in curves)}
 
 
@@ -86,13 +86,8 @@ def _fit(answer: Any) -> Numbers:
 
 
 def _emission(answer: Any) -> Numbers:
-    spectrum = answer.spectrum
-    brightest = int(np.argmax(spectrum.brightness_k))
-    return {
-        "lines": len(answer.lines),
-        "peak_k": spectrum.brightness_k[brightest],
-        "peak_mhz": spectrum.frequency_mhz[brightest],
-    }
+    peak = answer.peak
+    return {"lines": len(answer.lines), "peak_k": peak.brightness_k, "peak_mhz": peak.observed_mhz}
 
 
 def _gas(answer: Any) -> Numbers:
