@@ -19,6 +19,8 @@ from rotor.fluids.record import FluidRecord
 from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, progress_bar, run_fluid
 from rotor.fluids.settings import Settings
 from rotor.fluids.summary import Mean, conserved, means
+from rotor.requests.field import declared, identical, part
+from rotor.requests.readers import Text, Whole
 from rotor.table import TextOf
 from rotor.units import ATOMIC_MASS_KG
 
@@ -59,9 +61,15 @@ class FluidRequest:
     """
 
     box: Atoms | NewBox
-    settings: Settings = DEFAULT
-    engine: str = "rotor"
-    threads: int = 1
+    settings: Settings = part(Settings, identical, identical, DEFAULT)
+    engine: str = declared(
+        "rotor",
+        Text(("rotor", *ENGINES), "NAME"),
+        "Which engine runs it: rotor, openmm or lammps",
+        "numerics.engine",
+        common=True,
+    )
+    threads: int = declared(1, Whole(1), "Threads of the built-in potential, or of the engine", "numerics.threads")
     box_source: str = "given"
 
     def __post_init__(self) -> None:

@@ -4,9 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
+
+from rotor.requests.field import declared
+from rotor.requests.readers import Custom, Quantity, Text, Whole
 
 ENSEMBLES = ("nve", "langevin", "nose-hoover")
 ELECTROSTATICS = ("reaction-field", "ewald", "shifted")
+
+
+def _read_model(given: Any) -> str:
+    from rotor.fluids.forces.models import model_of
+
+    for name in str(given).split(","):
+        model_of(name.strip())
+    return str(given)
 
 
 LARGEST = 1e30  # of any number here: its powers are formed
@@ -24,18 +36,44 @@ class Settings:
     constant of Nosé-Hoover chains. seed: of velocities and noise.
     """
 
-    model: str = "spce"
-    ensemble: str = "nve"
-    temperature_k: float = 298.15
-    step_fs: float = 2.0
-    steps: int = 1000
-    every: int = 10
-    cutoff_angstrom: float = 9.0
-    electrostatics: str = "reaction-field"
-    friction_per_ps: float = 1.0
-    relaxation_fs: float = 100.0
-    seed: int = 1
-    ewald_tolerance: float = 1e-5
+    model: str = declared(
+        "spce",
+        Custom(_read_model, metavar="NAME"),
+        "Rigid model; several joined by commas",
+        "conditions.model",
+        common=True,
+    )
+    ensemble: str = declared(
+        "nve", Text(ENSEMBLES, "NAME"), "nve, langevin or nose-hoover", "conditions.ensemble", common=True
+    )
+    temperature_k: float = declared(
+        298.15,
+        Quantity("K", above=0, metavar="T"),
+        "Of thermostat and starting velocities (K)",
+        "conditions.temperature",
+        common=True,
+    )
+    step_fs: float = declared(
+        2.0, Quantity("fs", above=0, metavar="T"), "Length of a step (fs)", "numerics.step", common=True
+    )
+    steps: int = declared(1000, Whole(0), "How many steps", "conditions.steps", common=True)
+    every: int = declared(10, Whole(1), "Steps between rows", "conditions.every", common=True)
+    cutoff_angstrom: float = declared(
+        9.0, Quantity("Å", above=0, metavar="R"), "Of Lennard-Jones and of charges in real space (Å)", "numerics.cutoff"
+    )
+    electrostatics: str = declared(
+        "reaction-field", Text(ELECTROSTATICS, "NAME"), "reaction-field, ewald or shifted", "numerics.electrostatics"
+    )
+    friction_per_ps: float = declared(
+        1.0, Quantity("1/ps", above=0, metavar="F"), "Of langevin (1/ps)", "conditions.friction"
+    )
+    relaxation_fs: float = declared(
+        100.0, Quantity("fs", above=0, metavar="T"), "Time constant of nose-hoover (fs)", "conditions.relaxation"
+    )
+    seed: int = declared(1, Whole(0), "Of the lattice, the velocities and the noise", "numerics.seed")
+    ewald_tolerance: float = declared(
+        1e-5, Quantity(above=1e-14, below=1), "Of forces by ewald, relative to e²/4πε0 Å²", "numerics.ewald_tolerance"
+    )
 
     def __post_init__(self) -> None:
         for name in ("temperature_k", "step_fs", "cutoff_angstrom", "friction_per_ps", "relaxation_fs"):

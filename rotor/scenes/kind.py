@@ -85,10 +85,12 @@ def kind_of_verb(verb: Verb) -> Kind:
         return asked if verb.adapt is None else verb.adapt(asked, outputs_of(scene, verb), given_of(scene, verb))
 
     def answer(asked: Any, scene: Any, out: Where, executor: Executor | None) -> Any:
+        from rotor.scenes.scene_file import scene_text
+
+        shown, record = verb.read_shown(given_of(scene, verb)), {"scene": scene_text(scene)}
+        work = Work(executor, shown, outputs_of(scene, verb, out), provenance=record)
         with renaming({one.name: one.key for one in verb.fields.values() if one.key}):
-            return verb.answer(
-                asked, Work(executor, out, verb.read_shown(given_of(scene, verb)), outputs_of(scene, verb, out))
-            )
+            return verb.answer(asked, work)
 
     def saved(asked: Any, molecule: Any) -> Scene:
         raise NotImplementedError

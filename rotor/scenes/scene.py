@@ -18,9 +18,6 @@ from rotor.scenes.effect_sections import EffectSection
 from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import (
     BodySection,
-    FluidConditions,
-    FluidNumerics,
-    FluidOutputs,
     MoleculeSection,
     TableOutputs,
     TumbleConditions,
@@ -96,17 +93,6 @@ class TumbleScene(Scene, frozen=True, tag="tumble"):
     outputs: TableOutputs = TableOutputs()
 
 
-class FluidScene(Scene, frozen=True, tag="fluid"):
-    """Rigid molecules that attract and repel, in a periodic box."""
-
-    conditions: FluidConditions
-    accuracy: Annotated[str | float | None, said("of the conserved energy (K) or of Ewald's forces (%)", "0.5 K")] = (
-        None
-    )
-    numerics: FluidNumerics = FluidNumerics()
-    outputs: FluidOutputs = FluidOutputs()
-
-
 class FitScene(Scene, frozen=True, tag="fit"):
     """Constants fitted to measured lines."""
 
@@ -121,7 +107,6 @@ class FitScene(Scene, frozen=True, tag="fit"):
 
 _WRITTEN: Mapping[str, type[Scene]] = {
     "tumble": TumbleScene,
-    "fluid": FluidScene,
     "fit": FitScene,
 }
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from msgspec import field
-
 from rotor.verbs.subjects import molecule_section
 from rotor.verbs.tables import Section, said
 
@@ -80,50 +78,6 @@ class TumbleConditions(Section, frozen=True):
     temperature: Annotated[Quantity, said("whose thermal mean |L| is, half a degree off the middle axis (K)")] = "300 K"
     angular_momentum: Annotated[list[float] | None, said("instead, along a, b, c (ħ)", [10.0, 0.1, 0.1])] = None
     times: Annotated[Grid | None, said("ps of a molecule; by default two periods", "0:2:201")] = None
-
-
-class FluidConditions(Section, frozen=True):
-    """The liquid."""
-
-    model: Annotated[str, said("rigid model, such as spce, tip4p2005, argon")] = "spce"
-    molecules: Annotated[int | None, said("make a box of so many", 216)] = None
-    density: Annotated[float, said("of the box that is made (g/cm³)")] = 0.997
-    equilibration: Annotated[
-        str, said("thermostat before the run of such a box: auto until stationary, 0 none (ps)")
-    ] = "auto"
-    box: Annotated[str | None, said("or a file with a box, counted from the scene's folder", "liquid.traj")] = None
-    ensemble: Annotated[str, said("nve, langevin or nose-hoover")] = "nve"
-    temperature: Annotated[Quantity, said("of the thermostat and of starting velocities (K)")] = "298.15 K"
-    friction: Annotated[float, said("of langevin (1/ps)")] = 1.0
-    relaxation: Annotated[Quantity, said("time constant of nose-hoover (fs)")] = "100 fs"
-    steps: Annotated[int, said("how many steps")] = 1000
-    every: Annotated[int, said("steps between rows")] = 10
-
-
-class FluidNumerics(Section, frozen=True):
-    """Knobs."""
-
-    step: Annotated[Quantity, said("length of a step (fs)")] = "2 fs"
-    cutoff: Annotated[Quantity, said("of Lennard-Jones and of charges in real space (Å)")] = "9 Å"
-    electrostatics: Annotated[str, said("reaction-field, ewald or shifted")] = "reaction-field"
-    ewald_tolerance: Annotated[float, said("of forces by ewald, relative to e²/4πε0 Å²")] = 1e-5
-    seed: Annotated[int, said("of the lattice, the velocities and the noise")] = 1
-    threads: Annotated[int, said("threads of the built-in potential, or of the engine")] = 1
-    engine: Annotated[str, said("rotor, openmm or lammps")] = "rotor"
-
-
-class FluidOutputs(Section, frozen=True):
-    """Files that grow during the run."""
-
-    csv: Annotated[str | None, said("rows as they come", "run.csv")] = None
-    trajectories: Annotated[list[str], said("frames (.traj, .xyz, .extxyz)", ["run.traj"])] = field(
-        default_factory=list
-    )
-    frames_every: Annotated[int | None, said("steps between frames; by default as every", 100)] = None
-    checkpoint: Annotated[
-        str | None, said("what a run needs to go on; one that is there is gone on from", "run.npz")
-    ] = None
-    checkpoint_every: Annotated[int, said("steps between checkpoints")] = 1000
 
 
 class FieldEffects(Section, frozen=True):

@@ -14,10 +14,6 @@ from rotor.verbs.verb import verb_of
 
 STARTS: dict[str, dict[str, Any]] = {
     "tumble": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},
-    "fluid": {
-        "conditions.model": "spce", "conditions.molecules": 216, "conditions.ensemble": "langevin",
-        "conditions.steps": 20_000, "outputs.csv": "fluid.csv", "outputs.checkpoint": "fluid.npz",
-    },
     "fit": {
         "lines.source": "lines.csv", "molecule.source": "water", "parameters.free": ["A", "B", "C"],
         "outputs.csv": "fit.csv", "outputs.report": "out.fit",

@@ -56,14 +56,16 @@ class Subject:
 
 @dataclass(frozen=True)
 class Work:
-    """How an answer is made. executor: shares the work. out: folder of files that grow. shown: the options of the verb itself."""
+    """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
+    remarks. progress: whether somebody looks on. provenance: of files that grow.
+    """
 
     executor: Executor | None = None
-    out: str | os.PathLike[str] = "."
     shown: Any = None
     files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
     note: Note = silent
     progress: bool = False
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb with the texts that were typed, by identity."""
     given = Given(with_extras(verb, typed), "option")
-    shown, files = verb.read_shown(given), asked_files(verb, typed)
-    refuse_overwriting({f"{name}": path for name, path in files.paths.items()}, inputs_of(verb, typed))
+    shown, files, growing = verb.read_shown(given), asked_files(verb, typed), growing_files(verb, typed)
+    refuse_overwriting({**files.paths, **growing.paths}, inputs_of(verb, typed))
     view = picture_settings(verb, typed, "--plot" in files.paths)
     request, subject = verb.read(given, Place(".", note))
-    outputs = {verb_name(name): path for name, path in files.paths.items()}
+    outputs = by_name(files, growing)
     request = request if verb.adapt is None else verb.adapt(request, outputs, given)
     if verb.check is not None:
         verb.check(request, outputs, shown)
     head = {"command": str(context.obj), "input": subject.text}
     with working(verb, typed) as executor:
         with answering() if verb.sound else naming(verb):
-            work = Work(executor, ".", shown, {name: (path,) for name, path in outputs.items()}, note, True)
+            work = Work(executor, shown, outputs, note, True, head)
             answer = answer_of(verb, request, work)
         report = report_of(verb, answer, head, given, view, executor)
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):
             note(text)
-        report.content["files"] = files.names  # type: ignore[index]
+        report.content["files"] = [*growing.names, *files.names]  # type: ignore[index]
         writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
             writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
@@ -105,7 +105,7 @@ def inputs_of(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def verb_name(option: str) -> str:
-    """The name of a file by its option."""
+    """The name of a file by its option, as it is derived from it."""
     return option.strip().removeprefix("--").replace("-", "_")
 
 
@@ -117,12 +117,33 @@ def flag_of(verb: Verb, name: str) -> str:
 def asked_files(verb: Verb, typed: Mapping[str, Any]) -> Files:
     """The files to write when all is done, each with a suffix that can be written."""
     files = Files()
-    for one in verb.outputs:
-        for path in _paths(typed.get(one.name)):
-            files.ask(one.flag, path, one.suffixes)
+    _ask(files, verb, typed, grows=False)
     files.ask("--save-scene", typed.get("save_scene"), (".toml",))
     files.ask_json(typed.get("json"))
     return files
+
+
+def growing_files(verb: Verb, typed: Mapping[str, Any]) -> Files:
+    """The files that grow while the answer is made."""
+    files = Files()
+    _ask(files, verb, typed, grows=True)
+    return files
+
+
+def _ask(files: Files, verb: Verb, typed: Mapping[str, Any], grows: bool) -> None:
+    for one in verb.outputs:
+        for number, path in enumerate(_paths(typed.get(one.name)) if one.grows == grows else ()):
+            files.ask(one.flag + " " * number, path, one.suffixes)
+
+
+def by_name(*groups: Files) -> dict[str, tuple[Path, ...]]:
+    """The paths of files by the names of their outputs."""
+    found: dict[str, tuple[Path, ...]] = {}
+    for files in groups:
+        for option, path in files.paths.items():
+            name = {"trajectory": "trajectories"}.get(verb_name(option), verb_name(option))
+            found[name] = (*found.get(name, ()), path)
+    return found
 
 
 def _paths(value: Any) -> tuple[str, ...]:

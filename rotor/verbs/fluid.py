@@ -1,0 +1,354 @@
+"""`fluid`: a box of rigid molecules, run, written as it runs, and resumed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields, replace
+from math import isnan
+from pathlib import Path
+from tempfile import gettempdir
+from typing import TYPE_CHECKING, Any
+
+from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
+from rotor.fluids.run import Outputs, RunStopped
+from rotor.fluids.settings import Settings
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
+from rotor.requests.fill import Given, read_fields, read_instance, written_fields
+from rotor.requests.readers import Flag, Quantity, Text, Whole
+from rotor.temporary import locked_folder
+from rotor.verbs.subjects import beside
+from rotor.verbs.verb import PICTURES, NoAnswerError, Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+    from rotor.arrays import Floats
+
+FRAMES = (".traj", ".xyz", ".extxyz")
+
+EXAMPLES = """\b
+Examples:
+  rotor fluid water --molecules 216 --ensemble langevin --steps 20000 --trajectory liquid.traj --checkpoint run.npz
+  rotor fluid water --molecules 216 --ensemble langevin --steps 40000 --trajectory liquid.traj --checkpoint run.npz --resume
+  rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -
+  rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
+  rotor fluid water --molecules 64 --cutoff 6 --ensemble langevin --steps 2000 --plot run.png
+  rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
+
+
+@dataclass(frozen=True)
+class BoxInput:
+    """The box: made, or read from a file."""
+
+    source: str | None = declared(
+        None,
+        Text(),
+        "A box with its cell, or with --molecules 'water' or a model's name",
+        option="SOURCE",
+        panel=MOLECULE,
+    )
+    molecules: int | None = declared(
+        None,
+        Whole(1),
+        "Make a box of N molecules on a lattice, relaxed",
+        "conditions.molecules",
+        common=True,
+        example=216,
+    )
+    density: float | None = declared(
+        None, Quantity("g/cm3", above=0, metavar="D"), "Of the box that is made (g/cm³; by default 0.997)", "conditions.density",
+        common=True, example=0.997,
+    )  # fmt: skip
+    equilibration: float | None = declared(
+        None, Quantity("ps", least=0, metavar="T"), "Thermostat before the run (ps), 0 for none; by default until stationary",
+        "conditions.equilibration", none="auto", example="20 ps",
+    )  # fmt: skip
+    box: str | None = declared(
+        None,
+        Text(),
+        "Or a file with a box, counted from the scene's folder",
+        "conditions.box",
+        option="",
+        panel=CONDITIONS,
+        example="liquid.traj",
+    )
+
+
+class Box(SubjectKind):
+    """A box of rigid molecules that is read or made."""
+
+    fields = all_fields(BoxInput)
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The box, and where it is from."""
+        asked: BoxInput = read_instance(BoxInput, given)
+        settings = Settings(**read_fields(Settings, given))
+        if given.style == "key":
+            return self._of_scene(asked, place)
+        if asked.source is None:
+            raise ValueError("SOURCE is missing; --help shows what the command takes")
+        if asked.molecules is not None:
+            return Subject({"box": _new_box(asked, settings), "box_source": "given"}, (), asked.source, place.note)
+        if asked.density is not None:
+            raise ValueError("--density: expected with --molecules; the box of a file has the density of its cell")
+        if not Path(asked.source).is_file():
+            raise ValueError(f"{asked.source}: no such file; with --molecules N a box is made of 'water' or of a model")
+        return Subject({"box": _read(asked.source), "box_source": asked.source}, (), asked.source, place.note)
+
+    def _of_scene(self, asked: BoxInput, place: Place) -> Subject:
+        if (asked.molecules is None) == (asked.box is None):
+            raise ValueError("conditions: give either molecules, to make a box of, or a box")
+        if asked.molecules is not None:
+            density = WATER_G_CM3 if asked.density is None else asked.density
+            box = NewBox(asked.molecules, density, asked.equilibration)
+            return Subject({"box": box, "box_source": "given"}, (), "", place.note)
+        path = str(Path(place.folder) / str(asked.box))
+        if not Path(path).is_file():
+            raise ValueError(f"conditions.box: {path}: no such file")
+        try:
+            return Subject({"box": _read(path), "box_source": str(asked.box)}, (), path, place.note)
+        except ValueError as error:
+            raise ValueError(f"conditions.box: {error}") from None
+
+    def saved(self, request: FluidRequest, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The box that is made, or the file."""
+        if isinstance(request.box, NewBox):
+            made = BoxInput(None, request.box.molecules, request.box.density_g_cm3, request.box.equilibration_ps)
+            return written_fields(made)
+        return {"conditions.box": beside(request.box_source, folder)}
+
+
+def _read(path: str) -> Atoms:
+    from rotor.formats.boxes import read_box
+
+    return read_box(path)
+
+
+def _new_box(asked: BoxInput, settings: Settings) -> NewBox:
+    from rotor.fluids.forces.models import MODELS, model_of
+
+    source = str(asked.source)
+    if source != settings.model and source in MODELS:
+        raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
+    if "," in settings.model or source not in ("water", settings.model):
+        raise ValueError(
+            f"{source!r}: a box is made of one model: write {settings.model.split(',')[0]!r} (or 'water') with its --model"
+        )
+    model = model_of(settings.model)
+    if source == "water" and model.symbols != ("O", "H", "H"):
+        raise ValueError(f"{source!r}: --model {model.name} is no model of water; write {model.name!r}")
+    density = WATER_G_CM3 if asked.density is None else asked.density
+    return NewBox(asked.molecules or 0, density, asked.equilibration)
+
+
+@dataclass(frozen=True)
+class FluidShown(Shown):
+    """How files grow, and whether a run continues."""
+
+    frames_every: int | None = declared(
+        None,
+        Whole(1),
+        "Steps between frames; by default as between rows",
+        "outputs.frames_every",
+        panel=OUTPUT,
+        example=100,
+    )
+    checkpoint_every: int = declared(
+        1000, Whole(1), "Steps between checkpoints", "outputs.checkpoint_every", panel=OUTPUT
+    )
+    resume: bool = declared(False, Flag(), "Continue from the checkpoint", option="--resume", panel=OUTPUT)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DrawnFluid(FluidAnswer):
+    """A run and what its picture needs. centres: of mass (frames, n, 3) in its second half, or at its end."""
+
+    centres: Any = None
+
+
+def answer(request: FluidRequest, work: Work) -> FluidAnswer:
+    """The run; that of a scene resumes from its checkpoint if there is one.
+
+    A run that stops on its way is no mistake of the user.
+    """
+    growing = {name: [str(path) for path in work.files.get(name, ())] for name in ("csv", "trajectories", "checkpoint")}
+    csv, checkpoint = (next(iter(growing[name]), None) for name in ("csv", "checkpoint"))
+    shown, of_scene = work.shown, "scene" in work.provenance
+    outputs = Outputs(csv, tuple(growing["trajectories"]), shown.frames_every, checkpoint, shown.checkpoint_every)
+    resume = shown.resume or (of_scene and checkpoint is not None and Path(checkpoint).is_file())
+    head = {**work.provenance, **_settings(request)}
+
+    def on_start() -> None:
+        from rotor.formats.provenance import write_beside
+
+        if csv is not None and not resume:
+            write_beside(csv, {**head, "start": request.start})
+
+    try:
+        with frames_for(outputs, "plot" in work.files) as (files, frames):
+            quiet: Mapping[str, Any] = {"progress": lambda *_: None} if of_scene else {}
+            made = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
+            if "plot" not in work.files:
+                return made
+            values = {one.name: getattr(made, one.name) for one in fields(FluidAnswer)}
+            return DrawnFluid(**values, centres=_centres(made, frames))
+    except RunStopped as error:
+        raise NoAnswerError(str(error)) from error
+    except KeyboardInterrupt:
+        if checkpoint is not None and Path(checkpoint).is_file():
+            work.note(f"interrupted; the same command with --resume goes on from {checkpoint}")
+        raise
+
+
+def _settings(request: FluidRequest) -> dict[str, Any]:
+    return {"engine": request.engine, "settings": asdict(request.settings)}
+
+
+@contextmanager
+def frames_for(outputs: Outputs, drawn: bool) -> Iterator[tuple[Outputs, str | None]]:
+    """The files of a run and the one its frames are read from: where a picture asks for some, and none is written, a temporary.
+
+    A run that can be resumed has no temporary file: its checkpoint would name it. Its last frame alone is drawn.
+    """
+    if not drawn or outputs.trajectories or outputs.checkpoint is not None:
+        yield outputs, str(outputs.trajectories[0]) if outputs.trajectories else None
+        return
+    with locked_folder(Path(gettempdir()), "rotor-frames-") as folder:
+        path = str(folder / "frames.traj")
+        yield replace(outputs, trajectories=(path,)), path
+
+
+def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
+    """Centres of mass (frames, n, 3) in the second half of a run, or those at its end."""
+    import numpy as np
+    from ase.io import read
+
+    from rotor.fluids.forces.models import models_of, shapes_of
+    from rotor.fluids.initial_box import model_labels
+    from rotor.fluids.motion.bodies import bodies_of
+
+    models = models_of(answer.request.settings.model)
+    shapes = shapes_of(models)
+    taken = read(frames, ":") if frames is not None else [answer.atoms]
+    for atoms in taken:
+        if "molecule" not in atoms.arrays:
+            atoms.arrays["molecule"] = model_labels(atoms, models)
+    return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
+
+
+def draw(answer: FluidAnswer, path: Path, report: Report) -> None:
+    """The picture of the run as a file."""
+    from rotor.fluids.analysis import pair_distribution
+    from rotor.plots.fluid import plot_fluid
+
+    assert isinstance(answer, DrawnFluid)
+    centres, atoms, settings = answer.centres, answer.atoms, answer.request.settings
+    edges = atoms.cell.lengths()
+    shells = None
+    if atoms.pbc.all() and atoms.cell.orthorhombic and centres.shape[1] > 1:
+        shells = pair_distribution(centres, edges, float(edges.min()) / 2, 120)
+    title = f"{centres.shape[1]} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
+    if shells is not None:
+        title += f"; g(r) of {len(centres)} frame{'s' if len(centres) > 1 else ''}"
+    plot_fluid(answer.record, shells, centres.shape[1], path, title=title, view=report.view, provenance=report.command)
+
+
+def _claim(content: Mapping[str, Any], settings: Settings) -> str:
+    """What is known of the thermometer's error; under LAMMPS' noise nothing."""
+    return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
+
+
+def _hill(symbols: str) -> str:
+    """A formula in Hill's order: OH2 is H2O."""
+    from ase.formula import Formula
+
+    return str(Formula(symbols).format("hill"))
+
+
+def show(answer: FluidAnswer, report: Report) -> None:
+    """Print the run and the means of its second half."""
+    content, settings = report.content, answer.request.settings
+    kinds = ", ".join(f"{kind['count']} {_hill(kind['name'])}" for kind in content["molecules"])
+    degrees = content["degrees"]
+    print(f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}")
+    rms, drift = content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
+    facts = [
+        ("model", f"{settings.model}, cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}"),
+        ("start", content["start"]),
+        (
+            "degrees",
+            f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
+        ),
+        ("thermometer", content["thermometer"] + _claim(content, settings)),
+        ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
+    ]
+    if content["density_g_cm3"] is not None:
+        edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
+        facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
+    if content["motion_reason"]:
+        facts.append(("no motion", content["motion_reason"]))
+    show_facts(facts)
+    rows = [
+        [
+            mean["quantity"],
+            mean["unit"],
+            f"{mean['mean']:.6g}",
+            *("-" if isnan(x) else f"{x:.{n}g}" for x, n in ((mean["error"], 2), (mean["effective_samples"], 3))),
+        ]
+        for mean in content["means"]
+    ]
+    print()
+    columns = ["quantity", "unit", "mean", "error", "samples"]
+    rows_meant = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
+    show_table(Table(rows_meant, columns, rows, frozenset({"quantity", "unit"})))
+
+
+VERB = Verb(
+    name="fluid",
+    about="Rigid molecules in a periodic box: a run, its temperatures, energies and pressure.",
+    examples=EXAMPLES,
+    request=FluidRequest,
+    answer=answer,
+    table=lambda answer: answer.record,
+    rows="record",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write rows as they come (.csv)", example="run.csv", grows=True),
+        Output(
+            "trajectories",
+            FRAMES,
+            "Write frames as they come (.traj, .xyz, .extxyz); repeatable",
+            example="run.traj",
+            option="--trajectory",
+            grows=True,
+            many=True,
+        ),
+        Output(
+            "checkpoint",
+            (".npz",),
+            "Checkpoint file (.npz); a scene resumes from it if it exists",
+            example="run.npz",
+            grows=True,
+        ),
+        Output("plot", PICTURES, "Draw temperatures, energy and g(r) (.png, .pdf, .svg)", draw, "run.png"),
+    ),
+    subject=Box(),
+    shown=FluidShown,
+    content=lambda answer, shown: _settings(answer.request),
+    notes=lambda answer: answer.notes,
+    drawn="ps",
+    scaled=False,
+    sound=False,
+    accuracy="of the conserved energy (K) or of Ewald's forces (%)",
+    accuracy_example="0.5 K",
+    start={
+        "conditions.model": "spce",
+        "conditions.molecules": 216,
+        "conditions.ensemble": "langevin",
+        "conditions.steps": 20_000,
+        "outputs.csv": "fluid.csv",
+        "outputs.checkpoint": "fluid.npz",
+    },
+)
