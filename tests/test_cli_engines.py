@@ -73,7 +73,7 @@ def test_what_engines_do_not_do(call, folder, options: tuple[str, ...], said: st
 
 @pytest.mark.parametrize(("engine", "option", "said"), [
     ("lammps", ("--ensemble", "nose-hoover"), "error: nose-hoover: LAMMPS' chains"),
-    ("openmm", ("--electrostatics", "shifted"), "error: electrostatics 'shifted': expected reaction-field"),
+    ("openmm", ("--electrostatics", "shifted"), "error: --electrostatics 'shifted': expected reaction-field"),
 ])  # fmt: skip
 def test_what_an_engine_does_not_take(call, folder, engine: str, option: tuple[str, ...], said: str) -> None:
     if importlib.util.find_spec(engine) is None:

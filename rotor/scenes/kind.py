@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,16 +18,13 @@ from rotor.plots.view import WHOLE
 from rotor.requests.fill import renaming
 from rotor.scenes.molecule import named
 from rotor.scenes.scene import Scene
-from rotor.scenes.sections import Grid, MoleculeSection, QuantumEffects, VibrationSection
+from rotor.scenes.sections import Grid, MoleculeSection
 from rotor.verbs.verb import Place, Report, Verb, Work, files_of, verb_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rotor.quantum.effect import QuantumEffect
     from rotor.table import Table
-    from rotor.thermodynamics import VibrationalStates
-    from rotor.tops.top import Top
 
 Writer = Callable[[Path], None]
 Where = str | os.PathLike[str]
@@ -139,95 +136,6 @@ def grid(name: str, value: Grid | None, unit: str) -> tuple[float, ...] | None:
     if not all(map(math.isfinite, value)):
         raise ValueError(f"{name}: expected finite numbers")
     return tuple(value)
-
-
-def frequencies(name: str, text: str | None) -> tuple[float, float]:
-    """First and last frequency in MHz; all of them for None."""
-    from rotor.units import parse_range
-
-    return (0.0, math.inf) if text is None else named(name, lambda: parse_range(text, "MHz"))
-
-
-def cut(name: str, value: float | str) -> float | None:
-    """A cut; None for the word none."""
-    if isinstance(value, str):
-        if value.strip().lower() != "none":
-            raise ValueError(f'{name}: {value!r}: expected a number, or "none"')
-        return None
-    return value
-
-
-def vibrations(given: VibrationSection) -> VibrationalStates | None:
-    """The vibrational states that one of the two keys gives."""
-    if given.fundamentals is None and given.states is None:
-        return None
-    from rotor.thermodynamics import VibrationalStates
-
-    if given.fundamentals is not None and given.states is not None:
-        raise ValueError("vibration: fundamentals and states: give one of them")
-    harmonic = given.fundamentals is not None
-    name = "vibration.fundamentals" if harmonic else "vibration.states"
-    listed = given.fundamentals or given.states or ""
-    if isinstance(listed, str):
-        return named(name, lambda: VibrationalStates.parse(listed, harmonic=harmonic))
-    if any(len(pair) != 2 for pair in listed):
-        raise ValueError(f"{name}: expected pairs of an energy and its degeneracy")
-    energies, degeneracies = [pair[0] for pair in listed], [pair[1] for pair in listed]
-    return named(name, lambda: VibrationalStates(tuple(energies), tuple(map(int, degeneracies)), harmonic))
-
-
-def saved_vibrations(states: VibrationalStates | None) -> VibrationSection:
-    """The table that gives vibrational states back, the same doubles."""
-    if states is None:
-        return VibrationSection()
-    pairs = [[e, float(g)] for e, g in zip(states.energies_cm, states.degeneracies, strict=True)]
-    return VibrationSection(fundamentals=pairs) if states.harmonic else VibrationSection(states=pairs)
-
-
-def effects_of(top: Top, asked: QuantumEffects, molecule: MoleculeSection) -> tuple[QuantumEffect, ...]:
-    """The Hamiltonian that a scene asks for; spins by default where the scene itself gives their constants."""
-    from rotor.quantum.effects.of_top import effects_of as library_effects
-    from rotor.quantum.effects.watson import Centrifugal
-
-    hyperfine = molecule.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
-    if asked.hyperfine_method != "exact" and not hyperfine:
-        raise ValueError("effects.hyperfine_method: without hyperfine no line is split; add hyperfine = true")
-    tolerance = quantity("effects.hyperfine_tolerance", asked.hyperfine_tolerance, "MHz")
-    found = named("effects.hyperfine", lambda: library_effects(top, hyperfine, asked.hyperfine_method, tolerance))
-    return found if asked.distortion else tuple(one for one in found if not isinstance(one, Centrifugal))
-
-
-def hyperfine_of(asked: bool | None, molecule: MoleculeSection) -> bool:
-    """Whether spins take part: as asked for, by default where the scene itself gives their constants."""
-    return molecule.spin_constants is not None if asked is None else asked
-
-
-def saved_hyperfine(hyperfine: bool, top: Top) -> bool | None:
-    """The key that says so again; None of a top without spins."""
-    return hyperfine if hyperfine or top.spin_constants is not None else None
-
-
-def saved_effects(effects: Iterable[QuantumEffect], top: Top) -> QuantumEffects:
-    """The table that asks for these effects of a top.
-
-    Raises ValueError for effects that a scene has no name for.
-    """
-    every = {effect.name: effect for effect in effects}
-    spins = {"nuclear quadrupole", "spin-rotation", "spin-spin"}
-    known = {"rigid rotor", "centrifugal distortion", "interacting states", "hyperfine method"}
-    if unknown := every.keys() - spins - known:
-        raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")
-    hyperfine = None if top.spin_constants is None else bool(every.keys() & spins)
-    distortion, method = "centrifugal distortion" in every, every.get("hyperfine method")
-    if method is None:
-        return QuantumEffects(distortion=distortion, hyperfine=hyperfine)
-    from rotor.quantum.spins.method import HyperfineMethod
-
-    assert isinstance(method, HyperfineMethod)
-    tolerance = f"{method.tolerance_mhz!r} MHz"
-    return QuantumEffects(
-        distortion=distortion, hyperfine=hyperfine, hyperfine_method=method.method, hyperfine_tolerance=tolerance
-    )
 
 
 @contextmanager

@@ -18,33 +18,6 @@ Grid = list[float] | str
 MoleculeSection: Any = molecule_section()
 
 
-class QuantumEffects(Section, frozen=True):
-    """What the Hamiltonian consists of besides the rigid rotor."""
-
-    distortion: Annotated[bool, said("centrifugal distortion, as far as constants are there")] = True
-    hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
-    hyperfine_method: Annotated[
-        str, said("exact, N-diagonal, first-order, or auto: the cheapest that keeps the tolerance")
-    ] = "exact"
-    hyperfine_tolerance: Annotated[Quantity, said("how far auto may be off exact lines (MHz)")] = "0.1 kHz"
-
-
-class VibrationSection(Section, frozen=True):
-    """Vibrational states that the partition function counts; one of the two."""
-
-    fundamentals: Annotated[
-        str | list[list[float]] | None,
-        said("harmonic, with degeneracies (cm⁻¹); or pairs [energy, degeneracy]", "667.4x2,1388,2349"),
-    ] = None
-    states: Annotated[str | list[list[float]] | None, said("of single states, likewise (cm⁻¹)", "859,520x2")] = None
-
-
-class BasisNumerics(Section, frozen=True):
-    """Knobs; what is left out is chosen."""
-
-    jmax: Annotated[int | None, said("highest J", 40)] = None
-
-
 class TableOutputs(Section, frozen=True):
     """Files to write."""
 
@@ -80,14 +53,15 @@ class TumbleConditions(Section, frozen=True):
     times: Annotated[Grid | None, said("ps of a molecule; by default two periods", "0:2:201")] = None
 
 
-class FieldEffects(Section, frozen=True):
-    """What the Hamiltonian consists of besides the semi-rigid rotor and the field."""
-
-    hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
+_SHARED = {
+    "QuantumEffects": "SpectrumEffects", "VibrationSection": "SpectrumVibration", "BasisNumerics": "SpectrumNumerics",
+    "FieldEffects": "StarkEffects",
+}  # fmt: skip  # tables that several kinds have
 
 
 def __getattr__(name: str) -> Any:
     """The structure of a table of a kind: `RamanConditions` is that of [conditions] of raman."""
+    name = _SHARED.get(name, name)
     if name == "EmittingMolecule":
         from rotor.verbs.emission import emitting_molecule
 
