@@ -22,6 +22,7 @@ from rotor.quantum.effects.spin_effect import parse_name
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
+from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 from rotor.tops.spins.spin_constants import SpinConstants, spins_of
 from rotor.tops.states.state_constants import StateConstants, states_of_name
 from rotor.tops.top import Top
@@ -83,9 +84,10 @@ class TopConstants:
         return MappingProxyType(found)
 
     @property
-    def _parts(self) -> list[Constants | StateConstants | SpinConstants]:
+    def _parts(self) -> list[Constants | StateConstants | SpinConstants | InternalRotationConstants]:
         spins = self.top.spin_constants if self.hyperfine else None
-        return [part for part in (self.top.constants, self.top.states, spins) if part is not None]
+        parts = (self.top.constants, self.top.internal_rotation, self.top.states, spins)
+        return [part for part in parts if part is not None]
 
     @cached_property
     def _first_levels(self) -> Levels:
@@ -119,6 +121,8 @@ class TopConstants:
         """
         if "(" in name:
             return parse_name(name).text
+        if self.top.internal_rotation is not None and is_torsional(name):
+            return name
         if "[" not in name:
             return self.top.constants.own_name(name)
         states, head = states_of_name(name), name.partition("[")[0].strip()
@@ -144,6 +148,11 @@ class TopConstants:
     def _of(self, values: Mapping[str, float], errors: Mapping[str, float]) -> TopConstants:
         """A set with these values and uncertainties, and all else of this one."""
         top = self.top
+        internal = top.internal_rotation
+        if internal is not None:
+            moved = [{name: table[name] for name in table if is_torsional(name)} for table in (values, errors)]
+            internal = replace(internal, values=moved[0], uncertainties=moved[1])
+            values, errors = ({name: t[name] for name in t if not is_torsional(name)} for t in (values, errors))
         gone = {name: None for name in top.constants.values if name not in values}
         own = top.constants.replace(**_plain(values), **gone, uncertainties=_plain(errors))
         states, spins = top.states, top.spin_constants
@@ -151,7 +160,15 @@ class TopConstants:
             states = replace(states, values=_of_states(values), uncertainties=_of_states(errors))
         if spins is not None and self.hyperfine:
             spins = replace(spins, values=_of_spins(values), uncertainties=_of_spins(errors))
-        made = replace(top, constants=own, states=states, spin_constants=spins, covariance=None, level_table=None)
+        made = replace(
+            top,
+            constants=own,
+            states=states,
+            spin_constants=spins,
+            internal_rotation=internal,
+            covariance=None,
+            level_table=None,
+        )
         return TopConstants(made, self.hyperfine)
 
     def _refuse_unknown(self, name: str) -> None:

@@ -62,6 +62,10 @@ def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     columns = {name: labels[:, i] for i, name in enumerate(form)}
     unsigned = [i for i, name in enumerate(form) if name != "k"]
     _refuse(constants, labels, np.asarray((labels[:, unsigned] < 0).any(axis=1)))
+    if constants.top.internal_rotation is not None:
+        from rotor.fitting.torsion_levels import torsion_levels
+
+        return torsion_levels(begin, labels)
     if constants.hyperfine:
         return _of_spins(begin, columns, labels, names)
     if "kc" in form:

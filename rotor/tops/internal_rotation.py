@@ -47,7 +47,9 @@ class InternalRotationConstants:
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM". vt_max: the
     highest torsional state of the levels. functions: n_v, the torsional functions kept for each K. spin_states: 2I + 1 of each nucleus
-    that turns, 2 of hydrogen. uncertainties: in MHz (of rho without a unit). source: where the values are from.
+    that turns, 2 of hydrogen. names: "K", of E levels by the signed K that they mostly are; "energy", Ka and Kc counted by energy inside
+    each v_t, as westerfit and BELGI (A levels) do, which is another order for a top that turns nearly freely. uncertainties: in MHz (of
+    rho without a unit). source: where the values are from.
 
     >>> constants = InternalRotationConstants({"F": "7.6 cm-1", "rho": 0.33, "V3": "408 cm-1"}, "RAM")
     >>> round(constants.values["V3"]), constants.weights
@@ -59,6 +61,7 @@ class InternalRotationConstants:
     vt_max: int = 1
     functions: int = 9
     spin_states: int = 2
+    names: str = "K"
     uncertainties: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 
@@ -86,11 +89,13 @@ class InternalRotationConstants:
                 f"torsional states up to v_t = {self.vt_max} from n_v = {self.functions} functions: expected n_v of at least v_t + 2 "
                 "and at most 20"
             )
+        if self.names not in ("K", "energy"):
+            raise ValueError(f"names {self.names!r} of levels of internal rotation: expected K or energy")
         object.__setattr__(self, "values", MappingProxyType(numbers))
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        others = (self.vt_max, self.functions, self.spin_states, dict(self.uncertainties), self.source)
+        others = (self.vt_max, self.functions, self.spin_states, self.names, dict(self.uncertainties), self.source)
         return type(self), (dict(self.values), self.frame, *others)
 
     @property

@@ -70,6 +70,17 @@ def counted_k(j: Ints, v: Ints, energies: Floats) -> Ints:
     return k
 
 
+def counted_ka_kc(j: Ints, v: Ints, energies: Floats) -> tuple[Ints, Ints]:
+    """Ka and Kc by energy inside each v_t of each J: J(0,J), J(1,J), J(1,J-1), ... as in a rigid prolate top, of either species."""
+    ka = counted_k(j, v, energies)
+    order = np.lexsort([energies, v, j])
+    second = np.zeros(len(j), dtype=bool)
+    second[order[1:]] = (
+        (ka[order][1:] == ka[order][:-1]) & (v[order][1:] == v[order][:-1]) & (j[order][1:] == j[order][:-1])
+    )
+    return ka, np.where((ka > 0) & ~second, j - ka + 1, j - ka)
+
+
 def kc_of_parity(j: Ints, k: Ints, parity: Ints) -> Ints:
     """Kc of levels of σ = 0 from K ≥ 0 and the parity s p: J - K or J - K + 1, whichever has (-1)^Kc = s p (-1)^J.
 

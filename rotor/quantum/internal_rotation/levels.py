@@ -144,7 +144,7 @@ def torsion_rotation_levels(
     start = 0
     for name, sigma in SPECIES.items():
         species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve(
-            model.coefficients, constants.vt_max
+            model.coefficients, constants.vt_max, constants.names == "energy"
         )
         made = _blocks(species, start, 1 if sigma == 0 else 2)
         columns = {

@@ -13,6 +13,7 @@ from rotor.quantum.blocks import LinearBlocks, SolvedBlocks, blocks_of_elements
 from rotor.quantum.internal_rotation.contracted import Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
+    counted_ka_kc,
     kc_of_pairs,
     kc_of_parity,
     named_by_energy,
@@ -28,10 +29,10 @@ class SpeciesBlocks:
     functions: TorsionRotation
     linear: LinearBlocks
 
-    def solve(self, coefficients: ArrayLike, vt_max: int) -> SpeciesLevels:
-        """Levels with v_t up to `vt_max`."""
+    def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
+        """Levels with v_t up to `vt_max`; with `by_energy` Ka and Kc are counted by energy inside v_t."""
         values = np.asarray(coefficients, dtype=float)
-        return SpeciesLevels(self.functions, self.linear.solve(values), self._diagonal(values), vt_max)
+        return SpeciesLevels(self.functions, self.linear.solve(values), self._diagonal(values), vt_max, by_energy)
 
     def _diagonal(self, coefficients: Floats) -> Floats:
         """Zeroth-order energies ⟨f|H|f⟩ of the functions."""
@@ -59,6 +60,7 @@ class SpeciesLevels:
     solved: SolvedBlocks
     zeroth_order: Floats
     vt_max: int
+    by_energy: bool = False
 
     @cached_property
     def _named(self) -> tuple[Ints, Ints, Ints]:
@@ -100,7 +102,9 @@ class SpeciesLevels:
         _, v, name = self._named
         labels = self.functions.labels
         j, k = labels["J"][name], labels["K"][name]
-        if self.functions.folded:
+        if self.by_energy:
+            k, kc = counted_ka_kc(j, v, self.energies)
+        elif self.functions.folded:
             kc = kc_of_parity(j, k, labels["s"][name] * self.functions.torsion.parity[v])
         else:
             kc = kc_of_pairs({"J": j, "vt": v}, k, self.energies)

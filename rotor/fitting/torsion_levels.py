@@ -1,0 +1,118 @@
+"""Chosen levels of a molecule with an internal rotor, and their derivatives by its constants.
+
+Blocks are those of `rotor.quantum.internal_rotation`, made once for the J in which a line has a level; each iteration solves them at other
+values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F and ∂E/∂ρ follow by the chain rule. The torsional
+functions that are the basis belong to the constants of the start; they are made anew where F, ρ or V3 move by more than a hundredth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.top_constants import TopConstants
+from rotor.quantum.internal_rotation.levels import SPECIES
+from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.species import SpeciesBlocks
+from rotor.quantum.labelled import LevelModel, MissingLevelsError
+
+MOVED = 0.01  # relative change of a torsional constant from which the torsional functions are made anew
+TORSIONAL = ("F", "rho", "V3", "V6")
+
+
+@dataclass(frozen=True)
+class LabelledSpecies:
+    """The labels of one species: their places among all, and columns J, v_t, Ka, Kc."""
+
+    sigma: int
+    places: Ints
+    keys: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionLevels(LevelModel):
+    """Levels of all species by label, for any values of the constants."""
+
+    names: tuple[str, ...]
+    count: int
+    functions: int
+    by_energy: bool
+    species: tuple[LabelledSpecies, ...]
+    _blocks: dict[int, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`. Raises MissingLevelsError for labels that no level has."""
+        model = RamModel(dict(zip(self.names, np.asarray(values_mhz).tolist(), strict=True)))
+        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
+        for part in self.species:
+            j, vt = part.keys[:, 0], part.keys[:, 1]
+            found = self._blocks_of(part, model).solve(model.coefficients, int(vt.max()), self.by_energy)
+            quanta = found.quanta
+            rows = _rows(np.column_stack([quanta[name] for name in ("j", "vt", "ka", "kc")]), part.keys)
+            if (rows < 0).any():
+                raise MissingLevelsError(
+                    f"there is no level of J = {j[rows < 0][0]} with this label", part.places[rows < 0]
+                )
+            energies[part.places] = found.energies[rows]
+            slopes[part.places] = found.solved.slopes(found.rows[rows]) @ model.jacobian
+        return energies, slopes
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """1: levels are called by what they mostly are, whatever the constants are."""
+        return np.ones(self.count)
+
+    def _blocks_of(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
+        """The blocks of a species, made anew where the torsion has moved."""
+        torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
+        known = self._blocks.get(part.sigma)
+        if known is None or (np.abs(torsion - known[0]) > MOVED * np.abs(known[0])).any():
+            j = part.keys[:, 0]
+            blocks = model.blocks(
+                part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, wanted=np.unique(j)
+            )
+            self._blocks[part.sigma] = torsion, blocks
+        return self._blocks[part.sigma][1]
+
+
+def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
+    """The model for labels (levels, k) by `constants.quanta`, A standing as 0 and E as 1.
+
+    Raises MissingLevelsError for labels that no level has.
+    """
+    internal = constants.top.internal_rotation
+    assert internal is not None
+    columns = dict(zip(constants.quanta, labels.T, strict=True))
+    keys = np.column_stack([columns[name] for name in ("j", "vt", "ka", "kc")])
+    sigma = columns["species"]
+    wrong = ~np.isin(sigma, list(SPECIES.values())) | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
+    if wrong.any():
+        places = np.flatnonzero(wrong)
+        text = ", ".join(f"{name} = {columns[name][places[0]]}" for name in constants.quanta)
+        raise MissingLevelsError(f"there is no level with {text} (species 0 is A, 1 is E) in this model", places)
+    parts = [LabelledSpecies(value, np.flatnonzero(sigma == value), keys[sigma == value]) for value in SPECIES.values()]
+    names = tuple(constants.values)
+    return TorsionLevels(
+        names,
+        len(labels),
+        internal.functions,
+        internal.names == "energy",
+        tuple(part for part in parts if len(part.places)),
+    )
+
+
+def _exist(keys: Ints) -> np.ndarray:
+    """Whether (J, v_t, Ka, Kc) is a label: Ka + Kc is J or J + 1."""
+    j, vt, ka, kc = keys.T
+    return (keys >= 0).all(axis=1) & (ka <= j) & (kc <= j) & np.isin(ka + kc - j, (0, 1)) & (vt >= 0)
+
+
+def _rows(table: Ints, keys: Ints) -> Ints:
+    """Rows of a table (n, k) of whole numbers of at least 0 that equal keys (m, k), -1 where none does."""
+    spans = np.maximum(table.max(axis=0), keys.max(axis=0)) + 1
+    codes, wanted = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
+    order = np.argsort(codes)
+    place = np.minimum(np.searchsorted(codes[order], wanted), len(codes) - 1)
+    rows = order[place]
+    return np.asarray(np.where(codes[rows] == wanted, rows, -1))
