@@ -110,6 +110,7 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
             dipole_abc_debye=top.dipole_abc_debye,
             spin_weights=top.spin_weights,
             states=top.states,
+            internal_rotation=top.internal_rotation,
             spin_constants=top.spin_constants,
             polarizability_abc_angstrom3=top.polarizability_abc_angstrom3,
             magnetic=top.magnetic,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.quanta import value_text
+from rotor.quantum.quanta import label_value
 from rotor.table import Table, counted
 
 
@@ -110,7 +110,7 @@ class Assignments(Table):
 
     def label_text(self, label: Sequence[int]) -> str:
         """One label as text."""
-        return " ".join(value_text(q, name in self.halves) for name, q in zip(self.names, label, strict=True))
+        return " ".join(label_value(name, q, name in self.halves) for name, q in zip(self.names, label, strict=True))
 
 
 def _refuse_numbers(lines: Assignments) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import TopConstants
@@ -102,10 +103,10 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     )
 
 
-def _exist(keys: Ints) -> np.ndarray:
+def _exist(keys: Ints) -> NDArray[np.bool_]:
     """Whether (J, v_t, Ka, Kc) is a label: Ka + Kc is J or J + 1."""
     j, vt, ka, kc = keys.T
-    return (keys >= 0).all(axis=1) & (ka <= j) & (kc <= j) & np.isin(ka + kc - j, (0, 1)) & (vt >= 0)
+    return np.asarray((keys >= 0).all(axis=1) & (ka <= j) & (kc <= j) & np.isin(ka + kc - j, (0, 1)) & (vt >= 0))
 
 
 def _rows(table: Ints, keys: Ints) -> Ints:

@@ -40,7 +40,7 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
-from rotor.quantum.quanta import value_text
+from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
@@ -293,6 +293,8 @@ def _size(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     text = (row.get(name) or "").strip()
+    if name.startswith("species_") and text in SPECIES_NUMBERS:
+        return SPECIES_NUMBERS[text]
     if text.partition("/")[2] == "2":
         raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is whole here")
     value = _real(path, line, name, row)

@@ -210,14 +210,15 @@ def constants_for(lines: str, top: Top, free: Sequence[str]) -> ConstantSet:
 
     Raises ValueError for lines or free constants of spins that the top has not.
     """
-    rotation = len(QUANTA[top.kind]) + (top.states is not None)
+    rotation = len(QUANTA[top.kind]) + (top.states is not None) + 2 * (top.internal_rotation is not None)
     hyperfine = names_sums(lines, rotation) or any("(" in name for name in free)
     if hyperfine and top.spin_constants is None:
         raise ValueError(
             f"{lines}: lines or free constants of spins, and the constants to start from have none; give them there, such as "
             "[spins.14N] with chi_aa = -4.2" + ("" if top.states else "; a number v of the state needs [states] there")
         )
-    return TopConstants(top, hyperfine) if hyperfine or top.states is not None else top.constants
+    further = top.states is not None or top.internal_rotation is not None
+    return TopConstants(top, hyperfine) if hyperfine or further else top.constants
 
 
 def with_more_lines(request: FitRequest, path: str) -> FitRequest:
@@ -273,12 +274,14 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     own = start.lower().endswith(".toml") and Path(start).exists()
     file = read_molecule_file(start) if own else _file_of(request, path)
     sources = {**file.sources, "constants": origin}
-    named, states, spins = fit.named, file.states, file.spin_constants
+    named, states, spins, internal = fit.named, file.states, file.spin_constants, file.internal_rotation
     if isinstance(named, TopConstants):
         top = named.top
         states = replace(top.states, source=origin) if top.states is not None else None
         spins = replace(top.spin_constants, source=origin) if named.hyperfine and top.spin_constants else spins
+        internal = replace(top.internal_rotation, source=origin) if top.internal_rotation is not None else None
         sources |= {"states": origin} if states is not None else {}
+        sources |= {"internal_rotation": origin} if internal is not None else {}
         named = top.constants
     made = replace(
         file,
@@ -286,6 +289,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
         covariance=covariance_of_determined(fit.parameters, fit.statistics),
         states=states,
         spin_constants=spins,
+        internal_rotation=internal,
         levels=None,
         serves=None,
         sources=sources,
@@ -309,6 +313,7 @@ def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
         sources={table: text for table, text in sources.items() if text},
         states=top.states,
         spin_constants=top.spin_constants,
+        internal_rotation=top.internal_rotation,
     )
 
 

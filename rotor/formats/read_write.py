@@ -228,6 +228,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         covariance=file.covariance,
         spin_constants=replace(file.spin_constants, source=file.cited("spins")) if file.spin_constants else None,
         magnetic=_magnetic(file),
+        internal_rotation=file.internal_rotation,
     )
 
 

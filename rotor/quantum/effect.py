@@ -114,8 +114,11 @@ class QuantumEffect(ABC):
         """Moments that make lines besides plain dipoles, such as those of a spin."""
         return ()
 
-    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int) -> Levels | None:
-        """Levels of all effects together where this one needs functions of its own; None where the functions of the rotation serve."""
+    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Levels | None:
+        """Levels of all effects together where this one needs functions of its own; None where the functions of the rotation serve.
+
+        Without vectors the levels serve sums over states: all that the functions have, whose names may be those of others.
+        """
         return None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:

@@ -7,6 +7,7 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -57,6 +58,10 @@ class MomentBlock(ABC):
     @abstractmethod
     def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
         """Reduced elements (n_up, n_low) up to phases, their squares the strengths."""
+
+    @abstractmethod
+    def slopes(self, names: Sequence[str]) -> Floats:
+        """∂E/∂c (n, names) of the states by constants of the Hamiltonian."""
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,8 @@ _HEADINGS = {
 # how a picture writes sums with spins, in TeX
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
 
+SPECIES_NUMBERS = {"A": 0, "E": 1}  # how labels of whole numbers have species
+
 Quanta = Mapping[str, NDArray[Any]]
 
 
@@ -106,6 +108,16 @@ def value_text(value: Any, half: bool = False) -> str:
     if not half:
         return str(value)
     return f"{value}/2" if value % 2 else str(value // 2)
+
+
+def label_value(name: str, value: int, half: bool = False) -> str:
+    """One quantum number of a label of whole numbers as text, species by their letters.
+
+    >>> label_value("species", 1), label_value("f", 3, half=True)
+    ('E', '3/2')
+    """
+    letters = {number: letter for letter, number in SPECIES_NUMBERS.items()}
+    return letters.get(value, str(value)) if name == "species" else value_text(value, half)
 
 
 def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), width: int = 2) -> list[str]:

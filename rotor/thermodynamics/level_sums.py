@@ -225,7 +225,7 @@ class _Ladder:
         progress: Progress | None = None,
     ) -> None:
         self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
-        self.semi_rigid = effects == SEMI_RIGID and top.states is None
+        self.semi_rigid = effects == SEMI_RIGID and top.states is None and top.internal_rotation is None
         self._rigid = self.semi_rigid and top.level_table is None and not centrifugal_operators(top.constants)
         self.longest = (MOST_J if self._rigid else MOST_J_DISTORTED).get(top.kind, JMAX_LIMIT)
         self._below_mhz = math.inf

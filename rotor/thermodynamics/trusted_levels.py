@@ -83,7 +83,7 @@ def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
     Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them; of one
     with further states those of a J without a level below the ground.
     """
-    if "irrep" in levels.quanta or not centrifugal_operators(top.constants):
+    if "irrep" in levels.quanta or "species" in levels.quanta or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
     if "v" in levels.quanta:
         return _above_the_ground(levels)

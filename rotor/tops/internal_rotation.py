@@ -68,7 +68,7 @@ class InternalRotationConstants:
     def __post_init__(self) -> None:
         if self.frame not in FRAMES:
             raise ValueError(
-                f"internal rotation in the frame {self.frame or 'that is not stated'!r}: expected RAM (z along rho); constants of the "
+                f"internal rotation in the frame {self.frame or '(not stated)'}: expected RAM (z along rho); constants of the "
                 "principal-axis frame are converted by rotor.quantum.internal_rotation.frames"
             )
         for name in self.values:

@@ -59,6 +59,12 @@
     weights = { 0 = { 0even = 0, 0odd = 4, 1 = 1, 2 = 1 }, 1 = { 0even = 4, 0odd = 0, 1 = 1, 2 = 1 } }
     dipoles = { 0 = [0, 0, 0], 1 = [0, 0, 0], "0,1" = [0, 0, 1.47] }  # (μa, μb, μc) in D; else that of [dipole] in each
 
+    [internal_rotation]                 # a methyl group that turns, see rotor.formats.molecules.internal_rotation_table
+    frame = "RAM"
+    F = "7.57 cm-1"
+    rho = 0.3286
+    V3 = "407.6 cm-1"
+
     [spins]                             # constants of nuclear and electron spins, see rotor.formats.molecules.spin_table
     source = "..."
 
@@ -95,6 +101,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rotor.formats.magnetic_table import magnetic_of_table
+from rotor.formats.molecules.internal_rotation_table import internal_rotation_of
 from rotor.formats.molecules.molecule_tables import (
     MeasuredLines,
     Served,
@@ -120,6 +127,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.tops.components import Tensor
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
+from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -138,6 +146,7 @@ _TABLES = (
     "magnetic",
     "spin_weights",
     "states",
+    "internal_rotation",
     "spins",
     "levels",
     "catalogue",
@@ -166,6 +175,7 @@ class MoleculeFile:
     states : further states of the top
     spin_constants : of nuclear and electron spins
     magnetic : what a magnetic field acts on
+    internal_rotation : constants of an internal rotor
     """
 
     name: str
@@ -186,6 +196,7 @@ class MoleculeFile:
     states: StateConstants | None = None
     spin_constants: SpinConstants | None = None
     magnetic: MagneticTensors | None = None
+    internal_rotation: InternalRotationConstants | None = None
 
     def cited(self, table: str) -> str:
         """The source of a table, with what in it is unverified said first."""
@@ -251,6 +262,7 @@ def parse_molecule_file(
     polarizability = polarizability_of(tables.get("polarizability"), constants, molecule)
     states = states_of(tables.get("states"), constants)
     spins = spins_of_table(tables.get("spins"), molecule)
+    internal = internal_rotation_of(tables.get("internal_rotation"), constants)
     return MoleculeFile(
         name=top.text("name", default_name),
         names=top.texts("names"),
@@ -266,8 +278,9 @@ def parse_molecule_file(
         levels=level_table_of(tables.get("levels"), folder),
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
-        covariance=covariance_of(tables.get("covariance"), constants, states, spins),
+        covariance=covariance_of(tables.get("covariance"), constants, states, spins, internal),
         states=states,
         spin_constants=spins,
         magnetic=magnetic_of_table(tables.get("magnetic"), kind_of(constants, molecule)),
+        internal_rotation=internal,
     )

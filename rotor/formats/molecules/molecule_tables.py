@@ -18,6 +18,7 @@ from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.components import Tensor
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
+from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -253,7 +254,7 @@ def constants_of(table: TableReader | None) -> Constants | None:
 
 
 def covariance_of(
-    table: TableReader | None, *parts: Constants | StateConstants | SpinConstants | None
+    table: TableReader | None, *parts: Constants | StateConstants | SpinConstants | InternalRotationConstants | None
 ) -> Covariance | None:
     """From the lower triangle of the correlations and the uncertainties of the constants, those of states and spins too."""
     if table is None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.magnetic_table import magnetic_table
+from rotor.formats.molecules.internal_rotation_table import internal_rotation_table
 from rotor.formats.molecules.level_table import write_level_table
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.spin_table import spin_tables, uncertain_entry
@@ -53,6 +54,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         "magnetic": magnetic_table(molecule.magnetic),
         "spin_weights": molecule.spin_weights.to_mapping(),
         "states": _states(molecule.states),
+        "internal_rotation": internal_rotation_table(molecule.internal_rotation),
         "catalogue": _catalogue(molecule),
         "serves": vars(molecule.serves) if molecule.serves else {},
     }

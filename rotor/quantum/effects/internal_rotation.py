@@ -46,8 +46,8 @@ class InternalRotation(QuantumEffect):
 
         return species_splitting(self.constants, j)
 
-    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int) -> Levels:
-        """Levels of both species with v_t up to the highest of the constants.
+    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Levels:
+        """Levels of both species with v_t up to the highest of the constants; without vectors those of all n_v torsional functions.
 
         Raises ValueError for effects that have no elements between torsional functions.
         """
@@ -56,6 +56,7 @@ class InternalRotation(QuantumEffect):
                 raise ValueError(
                     f"{effect.name or type(effect).__name__} beside internal rotation: not computed together; leave one of them out"
                 )
-        from rotor.quantum.internal_rotation.levels import torsion_rotation_levels
+        from rotor.quantum.internal_rotation.levels import energies_alone, torsion_rotation_levels
 
-        return torsion_rotation_levels(top, self.constants, tuple(effects), jmin, jmax)
+        solve = torsion_rotation_levels if vectors else energies_alone
+        return solve(top, self.constants, tuple(effects), jmin, jmax)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, elements_between
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.spins.method import are_with_spins
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock
@@ -79,6 +79,8 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
+    if levels.blocks and isinstance(levels.blocks[0], MomentBlock):
+        return np.concatenate([block.slopes(names) for block in levels.blocks])[rows]
     if "f" in levels.quanta or are_with_spins(levels):
         from rotor.quantum.spins.derivatives import derivatives
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -39,6 +39,7 @@ class SpeciesMoments:
     """Reduced elements of molecule-fixed tensors between the blocks of one species, made when first used."""
 
     levels: SpeciesLevels
+    model: RamModel
     _known: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
 
     def between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
@@ -47,6 +48,12 @@ class SpeciesMoments:
         if components not in self._known:
             self._known[components] = self._elements(components, tensors[0, 0].rank)
         return self._known[components]
+
+    def slopes(self, rows: Ints, names: Sequence[str]) -> Floats:
+        """∂E/∂c (rows, names) of levels at rows of the solved blocks."""
+        known = list(self.model.values)
+        slopes = self.levels.solved.slopes(rows) @ self.model.jacobian
+        return np.asarray(slopes[:, [known.index(name) for name in names]])
 
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
         linear = self.levels.solved.linear
@@ -83,6 +90,7 @@ class TorsionBlock(MomentBlock):
     start: int
     moments: SpeciesMoments
     components: int
+    rows: Ints
 
     @property
     def twice_f(self) -> int:
@@ -105,6 +113,10 @@ class TorsionBlock(MomentBlock):
         matrix[entries.rows, entries.columns] = entries.values
         reduced = self.vectors.conj().T @ (matrix @ low.vectors)
         return np.asarray(np.sqrt(self.components) * np.abs(reduced))
+
+    def slopes(self, names: Sequence[str]) -> Floats:
+        """∂E/∂c (n, names) of the states, by the constants of the top and of the internal rotor."""
+        return self.moments.slopes(self.rows, names)
 
 
 def torsion_rotation_levels(
@@ -133,11 +145,7 @@ def torsion_rotation_levels(
     ValueError
         For a top that is not asymmetric in the representation Iʳ.
     """
-    if top.kind != "asymmetric" or top.constants.representation != REPRESENTATION:
-        raise ValueError(
-            f"internal rotation of a top of kind {top.kind} in {top.constants.representation}: expected A, B, C of the rho-axis frame in "
-            "the representation Ir (z, x, y = a, b, c)"
-        )
+    _refuse_axes(top)
     model = ram_model(top, constants)
     blocks: list[TorsionBlock] = []
     quanta: dict[str, list[NDArray[Any]]] = {}
@@ -146,7 +154,7 @@ def torsion_rotation_levels(
         species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
-        made = _blocks(species, start, 1 if sigma == 0 else 2)
+        made = _blocks(species, model, start, 1 if sigma == 0 else 2)
         columns = {
             "species": np.full(len(species.rows), name),
             **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
@@ -156,19 +164,61 @@ def torsion_rotation_levels(
         start += len(species.rows)
         blocks += made
     joined = {name: np.concatenate(columns) for name, columns in quanta.items()}
-    weight = np.where(joined["species"] == "A", *reduced_weights(constants))
+    energies = np.concatenate([block.energies_mhz for block in blocks])
+    return _table(top, constants, effects, jmax, joined, energies, tuple(blocks))
+
+
+def energies_alone(
+    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
+) -> Levels:
+    """The energies of all n_v torsional functions, for sums over states: J is right, v_t, Ka and Kc are those of a function."""
+    _refuse_axes(top)
+    model, pieces, energies = ram_model(top, constants), [], []
+    for name, sigma in SPECIES.items():
+        linear = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).linear
+        energies.append(linear.energies(model.coefficients))
+        k = linear.labels["K"]
+        ka = np.abs(k)
+        kc = linear.labels["J"] - ka + np.where((k > 0) & (linear.labels["s"] >= 0), 1, 0)
+        columns = {
+            "species": np.full(len(k), name),
+            "vt": linear.labels["t"],
+            "j": linear.labels["J"],
+            "ka": ka,
+            "kc": kc,
+        }
+        pieces.append(columns)
+    quanta = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    return _table(top, constants, effects, jmax, quanta, np.concatenate(energies), ())
+
+
+def _table(
+    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmax: int,
+    quanta: dict[str, NDArray[Any]], energies: Floats, blocks: tuple[TorsionBlock, ...],
+) -> Levels:  # fmt: skip
+    """Levels with the degeneracies of both species."""
+    is_a = quanta["species"] == "A"
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
         jmax=jmax,
-        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
-        quanta=joined,
-        multiplicity=2 * joined["j"] + 1,
-        components=np.where(joined["species"] == "A", 1, 2),
-        weight=np.asarray(weight, dtype=np.int64),
+        energy_mhz=energies,
+        quanta=quanta,
+        multiplicity=2 * quanta["j"] + 1,
+        components=np.where(is_a, 1, 2),
+        weight=np.where(is_a, *reduced_weights(constants)).astype(np.int64),
         effects=effects,
-        blocks=tuple(blocks),
+        blocks=blocks,
     )
+
+
+def _refuse_axes(top: Top) -> None:
+    """ValueError for a top whose constants are not those of an asymmetric one with a along z."""
+    if top.kind != "asymmetric" or top.constants.representation != REPRESENTATION:
+        raise ValueError(
+            f"internal rotation of a top of kind {top.kind} in {top.constants.representation}: expected A, B, C of the rho-axis frame in "
+            "the representation Ir (z, x, y = a, b, c)"
+        )
 
 
 def ram_model(top: Top, constants: InternalRotationConstants) -> RamModel:
@@ -183,9 +233,9 @@ def reduced_weights(constants: InternalRotationConstants) -> tuple[int, int]:
     return weights[0] // divisor, weights[1] // divisor
 
 
-def _blocks(species: SpeciesLevels, start: int, components: int) -> list[TorsionBlock]:
+def _blocks(species: SpeciesLevels, model: RamModel, start: int, components: int) -> list[TorsionBlock]:
     """The blocks of one species with the states that are levels, in the order of its rows."""
-    moments, made = SpeciesMoments(species), []
+    moments, made = SpeciesMoments(species, model), []
     linear = species.solved.linear
     chosen = linear.block[species.rows]
     for number in species.blocks:
@@ -194,7 +244,7 @@ def _blocks(species: SpeciesLevels, start: int, components: int) -> list[Torsion
         if len(rows):
             kept = vectors[:, linear.rank[rows]]
             j = int(linear.labels["J"][members[0]])
-            made.append(TorsionBlock(j, number, species.solved.energies[rows], kept, start, moments, components))
+            made.append(TorsionBlock(j, number, species.solved.energies[rows], kept, start, moments, components, rows))
             start += len(rows)
     return made
 

@@ -5,6 +5,7 @@
 | size 1 | the element itself |
 | small matrices, many of them | one stacked call |
 | large, and only the lowest few states wanted | LAPACK's relatively robust representations, for these states alone |
+| large, banded, energies alone | LAPACK's banded reduction |
 | other | LAPACK's divide and conquer |
 """
 
@@ -19,6 +20,7 @@ from rotor.arrays import Floats
 
 FEW = 0.34  # share of the states up to which computing these alone is faster
 LARGE = 100  # size from which it is
+NARROW = 15  # bandwidths in a size from which a banded solver is faster
 
 
 def eigenstates(matrices: NDArray[Any], lowest: int | None = None) -> tuple[Floats, NDArray[Any]]:
@@ -51,4 +53,22 @@ def eigenstates(matrices: NDArray[Any], lowest: int | None = None) -> tuple[Floa
 
 def eigenvalues(matrices: NDArray[Any]) -> Floats:
     """Energies (blocks, size), rising."""
-    return matrices[:, 0].real.copy() if matrices.shape[1] == 1 else np.linalg.eigvalsh(matrices)
+    size = matrices.shape[1]
+    if size == 1:
+        return matrices[:, 0].real.copy()
+    if size < LARGE:
+        return np.linalg.eigvalsh(matrices)
+    return np.stack([_eigenvalues_of_large(matrix) for matrix in matrices])
+
+
+def _eigenvalues_of_large(matrix: NDArray[Any]) -> Floats:
+    """Energies (size,) of one matrix, as a banded one where its elements lie near the diagonal."""
+    rows, columns = np.nonzero(np.tril(matrix))
+    width = int((rows - columns).max(initial=0))
+    if NARROW * width > len(matrix):
+        return np.linalg.eigvalsh(matrix)
+    from scipy.linalg import eigvals_banded
+
+    bands = np.zeros((width + 1, len(matrix)), dtype=matrix.dtype)
+    bands[rows - columns, columns] = matrix[rows, columns]
+    return np.asarray(eigvals_banded(bands, lower=True, check_finite=False))

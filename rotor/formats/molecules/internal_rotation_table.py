@@ -1,0 +1,58 @@
+"""The table of an internal rotor of a molecule file: its frame, constants, and how its levels are computed.
+
+[internal_rotation]
+frame = "RAM"                       # z along rho, A beside F (p - rho Pa)^2; [constants] are those of this frame then
+unit = "cm-1"
+F = 7.5670818
+rho = 0.328632673
+V3 = { value = 407.59768, uncertainty = 0.0002 }
+Dab = 0.122669
+vt_max = 1                          # the highest torsional state of the levels
+functions = 9                       # torsional functions kept for each K
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
+from rotor.formats.molecules.spin_table import uncertain_entry
+from rotor.tops.constants import Constants
+from rotor.tops.internal_rotation import InternalRotationConstants
+
+SETTINGS = ("vt_max", "functions", "spin_states")
+KEYS = ("source", "unverified", "unit", "frame", "names", *SETTINGS)
+
+
+def internal_rotation_of(table: TableReader | None, constants: Constants | None) -> InternalRotationConstants | None:
+    """The constants of an internal rotor; ValueError, with file and table, for unknown names and a frame that is not stated."""
+    if table is None:
+        return None
+    if constants is None:
+        raise ValueError(f"{table.place}: needs the rotational constants of the same frame, [constants]")
+    unit, values, errors = table.text("unit", "MHz"), dict[str, float](), dict[str, float]()
+    for key in table.content:
+        if key not in KEYS:
+            values[key], error = uncertain_number(table, key, "MHz" if key == "rho" else unit)
+            if error is not None:
+                errors[key] = error
+    settings = {key: number for key in SETTINGS if (number := table.whole(key)) is not None}
+    names = table.text("names", "K")
+    try:
+        return InternalRotationConstants(
+            values, table.text("frame"), **settings, names=names, uncertainties=errors, source=table.text("source")
+        )
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def internal_rotation_table(constants: InternalRotationConstants | None) -> Mapping[str, Any]:
+    """What a file says of an internal rotor, in MHz."""
+    if constants is None:
+        return {}
+    values = {
+        name: uncertain_entry(value, constants.uncertainties.get(name)) for name, value in constants.values.items()
+    }
+    settings = {key: getattr(constants, key) for key in SETTINGS}
+    return {"frame": constants.frame, "unit": "MHz", **values, **settings, "names": constants.names}

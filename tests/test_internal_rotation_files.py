@@ -1,0 +1,111 @@
+"""Internal rotation in molecule files and on the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.formats.molecules.molecule_file import read_molecule_file
+from rotor.formats.molecules.molecule_writer import write_molecule_file
+
+CM = rotor.units.MHZ_PER_CM
+ACETALDEHYDE = """
+name = "acetaldehyde"
+[constants]
+unit = "cm-1"
+A = 1.8848813
+B = 0.3487065
+C = 0.303184
+reduction = "A"
+representation = "Ir"
+[dipole]
+a = 2.423
+b = 1.266
+[internal_rotation]
+source = "Astron. Astrophys. 579 (2015) A46, table 1"
+frame = "RAM"
+unit = "cm-1"
+F = 7.567082
+rho = { value = 0.328632673, uncertainty = 2e-8 }
+V3 = 407.59768
+V6 = -11.63964
+Dab = 0.122669
+"""
+
+
+@pytest.fixture
+def acetaldehyde(tmp_path) -> Path:
+    path = tmp_path / "ch3cho.toml"
+    path.write_text(ACETALDEHYDE)
+    return path
+
+
+def test_a_molecule_file_has_the_constants_of_an_internal_rotor(acetaldehyde, tmp_path):
+    file = read_molecule_file(acetaldehyde)
+    assert file.internal_rotation.values["V3"] == pytest.approx(407.59768 * CM)
+    assert file.internal_rotation.values["rho"] == 0.328632673
+    assert dict(file.internal_rotation.uncertainties) == {"rho": 2e-8}
+    write_molecule_file(file, tmp_path / "again.toml")
+    again = rotor.read(tmp_path / "again.toml")
+    assert dict(again.internal_rotation.values) == dict(file.internal_rotation.values)
+    assert again.internal_rotation.uncertainties == file.internal_rotation.uncertainties
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "text"),
+    [
+        ('frame = "RAM"', "", "not stated"),
+        ('frame = "RAM"', 'frame = "PAM"', "expected RAM"),
+        ("V6 =", "V5 =", "no constant of an internal rotor"),
+        ("Dab =", "vt_max = 20\nDab =", "at least v_t"),
+    ],
+)
+def test_mistakes_in_a_molecule_file_are_named(acetaldehyde, line, wrong, text):
+    acetaldehyde.write_text(ACETALDEHYDE.replace(line, wrong))
+    with pytest.raises(ValueError, match=text) as error:
+        rotor.read(acetaldehyde)
+    assert "ch3cho.toml, [internal_rotation]" in str(error.value)
+
+
+def test_the_partition_function_is_that_of_the_lille_database(acetaldehyde):
+    """https://lsd.univ-lille.fr/table/5: Q with A and E levels of v_t up to 8 alike, as here; its constants have higher orders."""
+    found = rotor.partition_function(rotor.read(acetaldehyde), [9.375, 37.5])
+    assert found.q.tolist() == pytest.approx([135.028, 1077.01], rel=1.5e-3)
+
+
+def test_lines_on_the_command_line_have_species_and_torsional_states(acetaldehyde, tmp_path, call):
+    table = tmp_path / "lines.json"
+    code, _, _ = call("spectrum", str(acetaldehyde), "--temperature", "10", "--jmax", "2", "--json", str(table))
+    assert code == 0
+    content = json.loads(table.read_text())
+    assert content["line_count"] > 20
+
+
+def test_a_fit_on_the_command_line_finds_the_constants_of_butynoic_acid(tmp_path, call):
+    rows = np.loadtxt(Path(__file__).parent / "oracles" / "2ba.txt")
+    names = [f"{name}_{side}" for side in ("upper", "lower") for name in ("j", "ka", "kc", "species")]
+    lines = [",".join([*names, "vt_upper", "vt_lower", "frequency_mhz", "error_mhz"])]
+    for row in rows.tolist():
+        labels = [str(int(x)) for x in row[:8]]
+        labels[3], labels[7] = ("AE"[int(row[place])] for place in (3, 7))
+        lines.append(",".join([*labels, "0", "0", str(row[8]), str(row[9])]))
+    (tmp_path / "lines.csv").write_text("\n".join(lines))
+    (tmp_path / "start.toml").write_text(
+        "[constants]\nA = 11268.9\nB = 1752.18585\nC = 1529.58084\nDeltaJ = 4.367e-5\nDeltaJK = 0.01135\nDeltaK = 0.00264\n"
+        'deltaJ = 1.183e-5\nJpm4 = -1.495e-5\nreduction = "A"\nrepresentation = "Ir"\n[internal_rotation]\nframe = "RAM"\n'
+        'names = "energy"\nvt_max = 0\nF = "5.66 cm-1"\nrho = 0.0715287\nV3 = "1.009 cm-1"\nDab = -16.185\nFJ = -0.03726\n'
+        "rhoJ = 0.0352\nrhoK = 0.01502\nJz1Jpm2p1 = -0.000376\n"
+    )
+    free = "A,B,C,DeltaJ,DeltaJK,DeltaK,deltaJ,Jpm4,rho,V3,Dab,FJ,rhoJ,rhoK,Jz1Jpm2p1"
+    files = [str(tmp_path / name) for name in ("lines.csv", "start.toml", "fitted")]
+    code, out, _ = call("fit", files[0], "--start", files[1], "--free", free, "--out", files[2])
+    assert code == 0
+    assert "A 0 - " in out  # species by letters in the report
+    fitted = rotor.read(tmp_path / "fitted.toml")
+    assert fitted.internal_rotation.values["V3"] / CM == pytest.approx(
+        1.00901, abs=4.1e-4
+    )  # westerfit's value and error
+    lines_with_errors = rotor.line_list(fitted, jmax=2, q=1.0, min_lgint=None)
+    assert np.isfinite(lines_with_errors.error_mhz).all()
