@@ -94,7 +94,8 @@ def test_a_fit_on_the_command_line_finds_the_constants_of_butynoic_acid(tmp_path
     (tmp_path / "lines.csv").write_text("\n".join(lines))
     (tmp_path / "start.toml").write_text(
         "[constants]\nA = 11268.9\nB = 1752.18585\nC = 1529.58084\nDeltaJ = 4.367e-5\nDeltaJK = 0.01135\nDeltaK = 0.00264\n"
-        'deltaJ = 1.183e-5\nJpm4 = -1.495e-5\nreduction = "A"\nrepresentation = "Ir"\n[internal_rotation]\nframe = "RAM"\n'
+        'deltaJ = 1.183e-5\nJpm4 = -1.495e-5\nreduction = "A"\nrepresentation = "Ir"\n[dipole]\na = 2.3\nb = 1.4\n'
+        '[internal_rotation]\nframe = "RAM"\n'
         'names = "energy"\nvt_max = 0\nF = "5.66 cm-1"\nrho = 0.0715287\nV3 = "1.009 cm-1"\nDab = -16.185\nFJ = -0.03726\n'
         "rhoJ = 0.0352\nrhoK = 0.01502\nJz1Jpm2p1 = -0.000376\n"
     )
