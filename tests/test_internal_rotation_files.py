@@ -57,7 +57,7 @@ def test_a_molecule_file_has_the_constants_of_an_internal_rotor(acetaldehyde, tm
     ("line", "wrong", "text"),
     [
         ('frame = "RAM"', "", "not stated"),
-        ('frame = "RAM"', 'frame = "PAM"', "expected RAM"),
+        ('frame = "RAM"', 'frame = "PAM"', "F0, delta missing"),
         ("V6 =", "V5 =", "no constant of an internal rotor"),
         ("Dab =", "vt_max = 20\nDab =", "at least v_t"),
     ],

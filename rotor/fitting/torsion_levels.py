@@ -84,6 +84,10 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     """
     internal = constants.top.internal_rotation
     assert internal is not None
+    if internal.frame != "RAM":
+        raise ValueError(
+            f"fits of constants in the frame {internal.frame}: convert them to the rho-axis frame (RAM) first"
+        )
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j", "vt", "ka", "kc")])
     sigma = columns["species"]

@@ -4,8 +4,9 @@ In the rho-axis frame (RAM) z is along ρ and the rotational constants of the to
 
     H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ...,
 
-A beside F (p - ρPa)². The names of further terms are in `rotor.quantum.internal_rotation.terms`. Constants without a stated frame are
-refused: those of the principal-axis frame have other values.
+A beside F (p - ρPa)². In the principal-axis frame (PAM, as XIAM has it) the rotational constants and distortion are those of the principal
+axes, F0 = ħ²/2I_α of the top alone, and delta is the angle of its axis from a, in the plane ab. The names of further terms are in
+`rotor.quantum.internal_rotation.terms`. Constants without a stated frame are refused.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ NAMED = (
 SPELLED = re.compile(
     r"(?:J(?P<j>\d+))?(?:Jz(?P<z>\d*))?(?:J(?P<kind>pm|mi)(?P<n>\d+))?(?:p(?P<p>\d*))?(?:(?P<wave>cos|sin)(?P<multiple>\d+))?"
 )
-FRAMES = ("RAM",)
+FRAMES = ("RAM", "PAM")
+NEEDED = {"RAM": ("F", "rho", "V3"), "PAM": ("F0", "delta", "V3")}
+BARE = ("rho", "delta")  # without a unit, radians
 
 
 def is_torsional(name: str) -> bool:
@@ -35,7 +38,7 @@ def is_torsional(name: str) -> bool:
     >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
     [True, True, False, False]
     """
-    if name in ("F", "rho", *BARRIERS, *NAMED):
+    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED):
         return True
     match = SPELLED.fullmatch(name)
     return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
@@ -45,11 +48,11 @@ def is_torsional(name: str) -> bool:
 class InternalRotationConstants:
     """Constants of one threefold top: MHz by name, rho without a unit.
 
-    values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM". vt_max: the
-    highest torsional state of the levels. functions: n_v, the torsional functions kept for each K. spin_states: 2I + 1 of each nucleus
-    that turns, 2 of hydrogen. names: "K", of E levels by the signed K that they mostly are; "energy", Ka and Kc counted by energy inside
-    each v_t, as westerfit and BELGI (A levels) do, which is another order for a top that turns nearly freely. uncertainties: in MHz (of
-    rho without a unit). source: where the values are from.
+    values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
+    vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions kept for each K. spin_states: 2I + 1 of
+    each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
+    "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
+    uncertainties: in MHz (of rho without a unit). source: where the values are from.
 
     >>> constants = InternalRotationConstants({"F": "7.6 cm-1", "rho": 0.33, "V3": "408 cm-1"}, "RAM")
     >>> round(constants.values["V3"]), constants.weights
@@ -68,8 +71,8 @@ class InternalRotationConstants:
     def __post_init__(self) -> None:
         if self.frame not in FRAMES:
             raise ValueError(
-                f"internal rotation in the frame {self.frame or '(not stated)'}: expected RAM (z along rho); constants of the "
-                "principal-axis frame are converted by rotor.quantum.internal_rotation.frames"
+                f"internal rotation in the frame {self.frame or '(not stated)'}: expected RAM (z along rho; F, rho) or PAM (principal "
+                "axes; F0, delta), which have other values of A, B, C"
             )
         for name in self.values:
             if not is_torsional(name):
@@ -77,13 +80,18 @@ class InternalRotationConstants:
                 raise ValueError(
                     f"{name!r} is no constant of an internal rotor: known are {known}, and terms such as J2p2"
                 )
-        if missing := [name for name in ("F", "rho", "V3") if name not in self.values]:
-            raise ValueError(f"internal rotation: {', '.join(missing)} missing; expected F, rho and V3 at least")
-        numbers = {
-            name: float(value) if name == "rho" else parse_quantity(value, "MHz") for name, value in self.values.items()
-        }
-        if not numbers["F"] > 0:
-            raise ValueError(f"F = {numbers['F']:g} MHz: expected a number above 0")
+        needed, others = NEEDED[self.frame], NEEDED["PAM" if self.frame == "RAM" else "RAM"]
+        if missing := [name for name in needed if name not in self.values]:
+            raise ValueError(
+                f"internal rotation: {', '.join(missing)} missing; expected {', '.join(needed)} in the frame {self.frame}"
+            )
+        if strange := [name for name in others if name in self.values and name not in needed]:
+            raise ValueError(
+                f"internal rotation: {', '.join(strange)} in the frame {self.frame}: expected {', '.join(needed)}"
+            )
+        numbers = {n: float(value) if n in BARE else parse_quantity(value, "MHz") for n, value in self.values.items()}
+        if not numbers[needed[0]] > 0:
+            raise ValueError(f"{needed[0]} = {numbers[needed[0]]:g} MHz: expected a number above 0")
         if not 0 <= self.vt_max <= self.functions - 2 <= 18:
             raise ValueError(
                 f"torsional states up to v_t = {self.vt_max} from n_v = {self.functions} functions: expected n_v of at least v_t + 2 "

@@ -19,7 +19,7 @@ from typing import Any
 from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
 from rotor.formats.molecules.spin_table import uncertain_entry
 from rotor.tops.constants import Constants
-from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.tops.internal_rotation import BARE, InternalRotationConstants
 
 SETTINGS = ("vt_max", "functions", "spin_states")
 KEYS = ("source", "unverified", "unit", "frame", "names", *SETTINGS)
@@ -34,7 +34,7 @@ def internal_rotation_of(table: TableReader | None, constants: Constants | None)
     unit, values, errors = table.text("unit", "MHz"), dict[str, float](), dict[str, float]()
     for key in table.content:
         if key not in KEYS:
-            values[key], error = uncertain_number(table, key, "MHz" if key == "rho" else unit)
+            values[key], error = uncertain_number(table, key, "MHz" if key in BARE else unit)
             if error is not None:
                 errors[key] = error
     settings = {key: number for key in SETTINGS if (number := table.whole(key)) is not None}

@@ -44,7 +44,7 @@ class InternalRotation(QuantumEffect):
         """The largest difference of the torsional ground states of A and E for |K| ≤ J, from that at K = 0."""
         from rotor.quantum.internal_rotation.levels import species_splitting
 
-        return species_splitting(self.constants, j)
+        return species_splitting(top, self.constants, j)
 
     def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Levels:
         """Levels of both species with v_t up to the highest of the constants; without vectors those of all n_v torsional functions.

@@ -25,6 +25,10 @@ from rotor.quantum.basis.labelled import Basis
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
+NEARLY_FREE = (
+    5.0  # reduced barrier: between a torsion of 20 cm-1 (1.7) and methyl groups behind a barrier (17 and more)
+)
+
 
 class Product(NamedTuple):
     """An operator of the rotation times one of the torsion, which acts on the labels k of exp i(3k + σ)α; None is the unit operator."""
@@ -45,6 +49,11 @@ class Torsion:
     potential: TorsionalPotential
     fold: int = 3
 
+    @property
+    def is_near_free(self) -> bool:
+        """Whether the reduced barrier s = 4 V3/9F is so low that levels of E go with signed K."""
+        return 4 * abs(self.potential.cosines.get(self.fold, 0.0)) < 9 * NEARLY_FREE * self.f_mhz
+
 
 @dataclass(frozen=True, eq=False)
 class ContractedTorsion:
@@ -60,6 +69,7 @@ class ContractedTorsion:
     energies: Floats
     vectors: Floats
     parity: Ints
+    is_near_free: bool
 
     @property
     def count(self) -> int:
@@ -117,7 +127,9 @@ def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, wav
         vectors[:k_max] = vectors[:k_max:-1, ::-1]
         energies[k_max], vectors[k_max], parity = _states_of_parity(energies[k_max], vectors[k_max])
     waves_k = np.arange(-waves, waves + 1)
-    return ContractedTorsion(sigma, k_max, waves_k, energies[:, :count], vectors[:, :, :count], parity[:count])
+    return ContractedTorsion(
+        sigma, k_max, waves_k, energies[:, :count], vectors[:, :, :count], parity[:count], torsion.is_near_free
+    )
 
 
 def _states_of_parity(energies: Floats, vectors: Floats) -> tuple[Floats, Floats, Ints]:

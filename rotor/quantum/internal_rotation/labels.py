@@ -2,9 +2,10 @@
 
 Of the states of one block, v_t = 0 are those with the largest share of the torsional functions t = 0, as many as the block has of these
 functions; then v_t = 1 of the rest, and so on. Inside one v_t the state of rank n by energy is named after the function of rank n by
-zeroth-order energy, ⟨J K t|H|J K t⟩. Where these energies rise with K this is the rule of BELGI, K counted by energy inside v_t; where
-they do not (methanol, signed K of E levels) names follow the curves of the torsion instead of largest coefficients, which change at every
-avoided crossing.
+zeroth-order energy, ⟨J K t|H|J K t⟩ without what couples K and -K. Where these energies rise with K this is the rule of a rigid top, K
+counted by energy; where they do not (methanol) names follow the curves of the torsion instead of largest coefficients, which change at
+every avoided crossing. E levels of a top that turns nearly freely have the signed K that they mostly are, one to one: their curves cross
+without interaction.
 
 Levels of σ = 0 have Kc from their parity: C2 about the axis across the plane of symmetry is (-1)^Kc = s p (-1)^J, p being the parity of the
 torsional function at K = 0. E levels have signed K; of the pair ±K the lower one is called Kc = J - K + 1, the upper one Kc = J - K, as

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Product, contracted_torsion
+from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.species import SpeciesLevels
 from rotor.quantum.levels import Levels, MomentBlock
@@ -57,7 +58,8 @@ class SpeciesMoments:
 
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
         linear = self.levels.solved.linear
-        elements = self.levels.functions.elements([[Product(body_tensor(_plain(components)))]], rank)
+        turned = _turned(np.array(components), self.model.angle)
+        elements = self.levels.functions.elements([[Product(body_tensor(turned))]], rank)
         pair = linear.block[elements.rows] * (int(linear.block.max()) + 1) + linear.block[elements.columns]
         order = np.argsort(pair, kind="stable")
         starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
@@ -70,10 +72,16 @@ class SpeciesMoments:
         return blocks
 
 
-def _plain(components: tuple[complex, ...]) -> NDArray[Any]:
-    """Components T_q as real numbers where they are, complex ones otherwise."""
-    parts = np.array(components)
-    return parts.real if not parts.imag.any() else parts
+def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
+    """T_q of a vector along the axes of ρ, which lie at an angle (radians) from those of the vector; real where they can be."""
+    if angle:
+        if len(components) != 3:
+            raise ValueError("tensors of rank 2 with internal rotation: give the constants in the rho-axis frame (RAM)")
+        down, along, up = components
+        x, y = (down - up) / np.sqrt(2), 1j * (down + up) / np.sqrt(2)
+        z, x = np.cos(angle) * along + np.sin(angle) * x, np.cos(angle) * x - np.sin(angle) * along
+        components = np.array([(x - 1j * y) / np.sqrt(2), z, -(x + 1j * y) / np.sqrt(2)])
+    return components.real if not np.abs(components.imag).max() else components
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +231,12 @@ def _refuse_axes(top: Top) -> None:
 
 def ram_model(top: Top, constants: InternalRotationConstants) -> RamModel:
     """The constants of the top and of the internal rotor together."""
-    return RamModel({**top.constants.values, **constants.values})
+    if constants.frame == "RAM":
+        return RamModel({**top.constants.values, **constants.values})
+    others = {name: value for name, value in constants.values.items() if name not in ("F0", "delta")}
+    rotor = rho_axis(top.rotational_constants_mhz, constants.values["F0"], axis_of_angles(constants.values["delta"]))
+    angle = float(np.arctan2(rotor.rho_abc[1], rotor.rho_abc[0]))
+    return RamModel({**top.constants.values, "F": rotor.f, "rho": rotor.rho, **others}, angle=angle)
 
 
 def reduced_weights(constants: InternalRotationConstants) -> tuple[int, int]:
@@ -249,9 +262,9 @@ def _blocks(species: SpeciesLevels, model: RamModel, start: int, components: int
     return made
 
 
-def species_splitting(constants: InternalRotationConstants, j: int) -> float:
+def species_splitting(top: Top, constants: InternalRotationConstants, j: int) -> float:
     """The largest |E_E(K) - E_A(K) - E_E(0) + E_A(0)| of the torsional ground state for |K| ≤ J, MHz."""
-    torsion = RamModel({"A": 0.0, "B": 0.0, "C": 0.0, **constants.values}).torsion
+    torsion = ram_model(top, constants).torsion
     ground = [contracted_torsion(torsion, sigma, j, 1).energies[:, 0] for sigma in SPECIES.values()]
     difference = ground[1] - ground[0]
     return float(np.abs(difference - difference[j]).max())

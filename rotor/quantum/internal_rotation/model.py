@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -13,7 +13,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Terms, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, species_blocks
-from rotor.quantum.internal_rotation.terms import products_of, torsional_products
+from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
 
@@ -25,11 +25,13 @@ DEFAULT_COUNT = 9  # n_v: 1 Hz for v_t = 0 at J = 25 of methanols and methyl for
 class RamModel:
     """Constants in the rho-axis frame: MHz by name, rho without a unit. See `terms` for the names.
 
-    values: A, B, C, F, rho and any others. fold: of the top.
+    values: A, B, C, F, rho and any others. fold: of the top. angle: of ρ from the axis a of A, B, C and distortion towards b, radians; 0
+    where these are the axes of the rho-axis frame.
     """
 
     values: Mapping[str, float]
-    fold: int = field(default=3)
+    fold: int = 3
+    angle: float = 0.0
 
     def __post_init__(self) -> None:
         missing = [name for name in ("A", "B", "C", "F", "rho") if name not in self.values]
@@ -56,7 +58,9 @@ class RamModel:
 
     def terms(self, sigma: int) -> Terms:
         """Sums of products by coefficient: the linear constants, then F, -2Fρ and Fρ²."""
-        return {name: products_of(name, sigma) for name in self.linear_names} | torsional_products(sigma)
+        return {name: products_of(name, sigma, Axes(self.angle)) for name in self.linear_names} | torsional_products(
+            sigma
+        )
 
     @property
     def coefficients(self) -> Floats:

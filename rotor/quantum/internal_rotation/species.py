@@ -32,14 +32,19 @@ class SpeciesBlocks:
     def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
         """Levels with v_t up to `vt_max`; with `by_energy` Ka and Kc are counted by energy inside v_t."""
         values = np.asarray(coefficients, dtype=float)
-        return SpeciesLevels(self.functions, self.linear.solve(values), self._diagonal(values), vt_max, by_energy)
+        return SpeciesLevels(self.functions, self.linear.solve(values), self._zeroth_order(values), vt_max, by_energy)
 
-    def _diagonal(self, coefficients: Floats) -> Floats:
-        """Zeroth-order energies ⟨f|H|f⟩ of the functions."""
+    def _zeroth_order(self, coefficients: Floats) -> Floats:
+        """⟨J K t|H|J K t⟩ of the functions: of combined ones the mean of s = ±1, without what couples K and -K."""
         linear = self.linear
         diagonal = np.zeros(len(linear.block))
         here = np.flatnonzero(linear.rows == linear.columns)
         diagonal[linear.rows[here]] = (coefficients @ linear.values[:, here]).real
+        labels = linear.labels
+        minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
+        plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
+        if len(minus) == len(plus) > 0:  # in one order of J, K, t
+            diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
         return diagonal
 
 
@@ -70,10 +75,10 @@ class SpeciesLevels:
         for block in self.blocks:
             members, vectors = self.solved.vectors(block)
             v = torsional_numbers(vectors, t[members])
-            if self.functions.folded:
-                name = named_by_energy(v, t[members], self.zeroth_order[members])
-            else:
+            if self.functions.torsion.sigma and self.functions.torsion.is_near_free:
                 name = named_by_overlap(v, t[members], vectors)
+            else:
+                name = named_by_energy(v, t[members], self.zeroth_order[members])
             kept = np.flatnonzero((v >= 0) & (v <= self.vt_max))
             rows.append(members[kept])
             numbers.append(v[kept])

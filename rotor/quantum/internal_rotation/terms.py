@@ -22,30 +22,70 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import reduce
+
+import numpy as np
 
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.tops.internal_rotation import BARRIERS, NAMED, SPELLED
-from rotor.tops.operators import distortion_terms
+from rotor.tops.operators import Operators, distortion_terms
 
 
-def products_of(name: str, sigma: int) -> tuple[Product, ...]:
-    """The sum of products that a constant multiplies, for the species σ.
+@dataclass(frozen=True)
+class Axes:
+    """Components of P along a, b, c, as operators in the frame whose z is along ρ, which lies at `angle` (radians) from a towards b."""
+
+    angle: float = 0.0
+
+    @property
+    def a(self) -> Operator:
+        """Pa = cos θ Pz - sin θ Px."""
+        return j_z() if not self.angle else np.cos(self.angle) * j_z() - np.sin(self.angle) * j_x()
+
+    @property
+    def b(self) -> Operator:
+        """Pb = sin θ Pz + cos θ Px."""
+        return j_x() if not self.angle else np.sin(self.angle) * j_z() + np.cos(self.angle) * j_x()
+
+    @property
+    def c(self) -> Operator:
+        """Pc = Py."""
+        return j_y()
+
+    def distortion(self, operators: Operators) -> Operator:
+        """Σ c P^2p ½[Pa^2q, P₊^2n + P₋^2n]₊ over a table {(p, q, n): c}, P± = Pb ∓ i Pc stepping along a."""
+        if not self.angle:
+            return sum_of_powers(operators)
+        up, down = self.b - 1j * self.c, self.b + 1j * self.c
+        total = Operator()
+        for (p, q, n), factor in operators.items():
+            axial = self.a ** (2 * q)
+            steps = half_anticommutator(axial, up ** (2 * n) + down ** (2 * n)) if n else axial
+            total = total + factor * (j_squared(p) @ steps)
+        return total
+
+
+PRINCIPAL = Axes()
+
+
+def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product, ...]:
+    """The sum of products that a constant multiplies, for the species σ; axes: those that A, B, C and the letters of the name belong to.
 
     Raises ValueError for an unknown name.
 
     >>> len(products_of("V3bc", 0)), len(products_of("FJ", 1))
     (1, 1)
     """
-    table = _named(sigma)
+    table = _named(sigma, axes)
     if name in table:
         return (table[name],)
-    distortion = distortion_terms("asymmetric", "A")
+    distortion = distortion_terms("asymmetric", "S") | distortion_terms("asymmetric", "A")
     if name in distortion:
-        return (Product(sum_of_powers(distortion[name])),)
+        return (Product(axes.distortion(distortion[name])),)
     if name in BARRIERS:
         return (Product(UNIT, 0.5 * (UNIT - cosine(int(name[1:]) // 3))),)
     match = SPELLED.fullmatch(name)
@@ -54,11 +94,13 @@ def products_of(name: str, sigma: int) -> tuple[Product, ...]:
         raise ValueError(
             f"{name!r} is no term of internal rotation: known are {known}, and operators such as J2p2 or Jz1p1cos3"
         )
+    if axes.angle:
+        raise ValueError(f"{name}: terms that are spelled as operators belong to the rho-axis frame")
     return (_spelled(match, sigma),)
 
 
-def _named(sigma: int) -> dict[str, Product]:
-    a, b, c = j_z(), j_x(), j_y()
+def _named(sigma: int, axes: Axes) -> dict[str, Product]:
+    a, b, c = axes.a, axes.b, axes.c
     plane = b @ b - c @ c
     p, p2 = p_alpha(sigma), p_alpha(sigma, 2)
     hindering = UNIT - cosine(1)
@@ -83,11 +125,11 @@ def _named(sigma: int) -> dict[str, Product]:
         "Fbc": Product(plane, p2),
         "Fab": Product(ab, p2),
         "rhoJ": Product(j_squared() @ a, p),
-        "rhoK": Product(j_z(3), p),
+        "rhoK": Product(a**3, p),
         "rhobc": Product(half_anticommutator(a, plane), p),
         "rhoab": Product(half_anticommutator(a @ a, b), p),
         "DabJ": Product(j_squared() @ ab),
-        "DabK": Product(half_anticommutator(j_z(3), b)),
+        "DabK": Product(half_anticommutator(a**3, b)),
     }
 
 
