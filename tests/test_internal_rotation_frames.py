@@ -27,7 +27,7 @@ CYCLOTENE = {
 }
 CYCLOTENE_DERIVED = (161.632715565, 0.018904615, 0.216558561)
 QUARTIC = {
-    "mtbe": {"DJ": 0.323517e-3, "DJK": 4.212895e-3, "DK": -3.657421e-3},  # S reduction; d1, d2 of 1e-8 GHz are left out
+    "mtbe": {"DJ": 0.323517e-3, "DJK": 4.212895e-3, "DK": -3.657421e-3, "d1": -5.111316e-6, "d2": -11.765429e-6},
     "cyclotene": {
         "DeltaJ": 0.070680e-3,
         "DeltaJK": 0.302973e-3,
