@@ -1,6 +1,7 @@
 """Internal rotation in molecule files and on the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +111,35 @@ def test_a_fit_on_the_command_line_finds_the_constants_of_butynoic_acid(tmp_path
     )  # westerfit's value and error
     lines_with_errors = rotor.line_list(fitted, jmax=2, q=1.0, min_lgint=None)
     assert np.isfinite(lines_with_errors.error_mhz).all()
+
+
+def test_acetaldehyde_from_smiles_has_its_splittings(call):
+    code, out, err = call(
+        "spectrum", "SMILES:CC=O", "--internal-rotation", "geometry", "--jmax", "2", "--temperature", "5"
+    )
+    assert code == 0
+    assert "407.6 cm-1 is that of acetaldehyde" in err
+    frequency = {
+        species: float(row.split()[0])
+        for row in out.splitlines()
+        for species in "AE"
+        if row.endswith(f"{species}  0  2  0  2   {species}  0  1  0  1")
+    }
+    assert frequency["E"] - frequency["A"] == pytest.approx(
+        38506.03 - 38512.08, abs=1.5
+    )  # JPL's catalogue; V3 within 10 %
+
+
+def test_constants_of_an_internal_rotor_on_the_command_line(call):
+    constants = "A=56507.3198 B=10453.9579 C=9089.2277 MHz"
+    text = "RAM F=7.567082cm-1 rho=0.328632673 V3=407.59768cm-1 Dab=0.122669cm-1 vt_max=0"
+    code, out, _ = call("levels", "--constants", constants, "--internal-rotation", text, "--jmax", "1")
+    assert code == 0
+    assert re.search(r"E  0  1  0  1 +0.70561[56]", out)  # as from the file
+    code, _, err = call("levels", "--constants", constants, "--internal-rotation", "F=7cm-1 rho=0.3 V3=400cm-1")
+    assert code == 2
+    assert "--internal-rotation" in err
+    assert "expected RAM" in err
+    code, _, err = call("levels", "--constants", constants, "--internal-rotation", "geometry")
+    assert code == 2
+    assert "no geometry" in err

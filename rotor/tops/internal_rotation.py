@@ -106,6 +106,30 @@ class InternalRotationConstants:
         others = (self.vt_max, self.functions, self.spin_states, self.names, dict(self.uncertainties), self.source)
         return type(self), (dict(self.values), self.frame, *others)
 
+    @classmethod
+    def parse(cls, text: str) -> InternalRotationConstants:
+        """Constants from a text such as "RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.12cm-1 vt_max=1".
+
+        Raises ValueError for a frame that is not stated first, and for items that are not NAME=VALUE.
+
+        >>> InternalRotationConstants.parse("PAM F0=158.6GHz delta=0.322 V3=11100GHz vt_max=0").vt_max
+        0
+        """
+        frame, *items = text.split()
+        values: dict[str, Any] = {}
+        for item in items:
+            name, equals, value = item.partition("=")
+            if not (name and equals and value):
+                raise ValueError(
+                    f"internal rotation: {item!r}: expected NAME=VALUE, such as V3=407.6cm-1, without spaces"
+                )
+            values[name] = value
+        settings: dict[str, Any] = {
+            k: int(values.pop(k)) for k in ("vt_max", "functions", "spin_states") if k in values
+        }
+        names = values.pop("names", "K")
+        return cls(values, frame, **settings, names=names)
+
     @property
     def weights(self) -> tuple[int, int]:
         """Spin weights of A, and of E with both components, of three equal nuclei with n = 2I + 1 states each.

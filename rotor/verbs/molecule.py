@@ -101,6 +101,10 @@ class MoleculeInput:
         panel=SPINS,
         example="0+,0-",
     )
+    internal_rotation: str | None = declared(
+        None, Text(), 'A methyl group that turns: "geometry" (barrier of a similar molecule), or "RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
+        "molecule.internal_rotation", panel=SPINS, example="RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.1227cm-1",
+    )  # fmt: skip
     calculator: str | None = declared(
         None, Text(metavar="NAME"), "Refine the geometry with an ASE calculator of that name, such as xtb or psi4",
         "molecule.calculator", example="xtb",
@@ -186,7 +190,7 @@ def top_of(reading: Reading) -> Top:
     if given.spin_weights is not None:
         weights = given.spin_weights
         top = reading.within("spin_weights", lambda: top.with_weights(dict(weights), reading.source("spin_weights")))
-    top = _with_states(_with_spins(top, reading), reading)
+    top = _with_states(_with_spins(_with_internal_rotation(top, reading), reading), reading)
     from rotor.tops.plausible import implausible
 
     _refuse_weights_of_another_kind(top)
@@ -363,6 +367,21 @@ def _with_spins(top: Top, reading: Reading) -> Top:
         return constants
 
     return replace(top, spin_constants=reading.within("spin_constants", read))
+
+
+def _with_internal_rotation(top: Top, reading: Reading) -> Top:
+    """The top with a methyl group that turns, by its geometry or by constants."""
+    text = reading.given.internal_rotation
+    if text is None:
+        return top
+    if text.strip() == "geometry":
+        from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
+
+        return reading.within("internal_rotation", lambda: with_internal_rotation(top))
+    from rotor.tops.internal_rotation import InternalRotationConstants
+
+    constants = reading.within("internal_rotation", lambda: InternalRotationConstants.parse(text))
+    return replace(top, internal_rotation=constants)
 
 
 def _with_states(top: Top, reading: Reading) -> Top:

@@ -242,7 +242,7 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
     from rotor.quantum.estimates.methyl_groups import bonded_atoms, methyl_groups
 
     found, bonds = [], bonded_atoms(molecule)
-    if groups := methyl_groups(molecule, bonds):
+    if "internal rotation" not in present and (groups := methyl_groups(molecule, bonds)):
         found.append(_internal_rotation(top, groups, j))
     if (nitrogens := _pyramidal_nitrogens(molecule, bonds)) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
