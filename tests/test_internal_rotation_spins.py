@@ -1,0 +1,118 @@
+"""Internal rotation with a nuclear spin, against the direct product |J K M⟩|m⟩|I M_I⟩ written out here."""
+
+import numpy as np
+import pytest
+import qutip
+
+import rotor
+from rotor.quantum.contraction import contracted_elements, coupled, spin_space
+from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.operators.algebra import half_anticommutator
+from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
+from rotor.quantum.tensors import spherical_components
+
+CM = rotor.units.MHZ_PER_CM
+CONSTANTS = {"A": 9000.0, "B": 4200.0, "C": 3100.0, "Dab": 700.0, "F": 5.2 * CM, "rho": 0.08, "V3": 40.0 * CM}
+CHI = np.array([[-40.0, 25.0, 0.0], [25.0, 15.0, 0.0], [0.0, 0.0, 25.0]])  # MHz, along a, b, c
+ROTATION = np.diag([30.0, -20.0, 10.0]) * 0.1  # C_gg, MHz
+JMAX, SPIN, WAVES = 2, 1, 3
+
+
+def symbol(j1, j2, j3, m1, m2, m3):
+    """The 3j symbol from QuTiP's Clebsch-Gordan coefficients."""
+    if m1 + m2 + m3 or abs(m1) > j1 or abs(m3) > j3 or not abs(j1 - j2) <= j3 <= j1 + j2:
+        return 0.0
+    return (-1) ** int(j1 - j2 - m3) / np.sqrt(2 * j3 + 1) * qutip.clebsch(j1, j2, j3, m1, m2, -m3)
+
+
+def cosines(states, rank):
+    """D^k*_pq between |J K M⟩ = ⟨J'K'M'|D^k*_pq|J K M⟩, all p and q, as (2k+1, 2k+1, n, n)."""
+    n = len(states)
+    out = np.zeros((2 * rank + 1, 2 * rank + 1, n, n))
+    for r, (jj, kk, mm) in enumerate(states):
+        for c, (j, k, m) in enumerate(states):
+            if abs(jj - j) > rank:
+                continue
+            p, q = mm - m, kk - k
+            if abs(p) <= rank and abs(q) <= rank:
+                root = (-1) ** (mm - kk) * np.sqrt((2 * jj + 1) * (2 * j + 1))
+                out[p + rank, q + rank, r, c] = root * symbol(jj, rank, j, -mm, p, m) * symbol(jj, rank, j, -kk, q, k)
+    return out
+
+
+def spherical(matrix_xyz):
+    """T²_q, q = -2 ... 2, of a symmetric traceless matrix along x, y, z; entries may be matrices."""
+    t = matrix_xyz
+    two = 0.5 * (t[0][0] - t[1][1])
+    return [two - 1j * t[0][1], t[0][2] - 1j * t[1][2], (2 * t[2][2] - t[0][0] - t[1][1]) / np.sqrt(6), -(t[0][2] + 1j * t[1][2]),
+            two + 1j * t[0][1]]  # fmt: skip
+
+
+def direct_product(sigma):
+    """Energies of all states with J ≤ 2, all M, all M_I."""
+    states = [(j, k, m) for j in range(JMAX + 1) for k in range(-j, j + 1) for m in range(-j, j + 1)]
+    n = len(states)
+    raising, along = np.zeros((n, n)), np.diag([float(k) for _, k, _ in states])
+    for c, (j, k, m) in enumerate(states):
+        if k < j:
+            raising[states.index((j, k + 1, m)), c] = np.sqrt(j * (j + 1) - k * (k + 1))
+    pa, pb, pc = along.astype(complex), (raising + raising.T) / 2, 0.5j * (raising - raising.T)
+
+    m = 3.0 * np.arange(-WAVES, WAVES + 1) + sigma
+    p, one = np.diag(m), np.eye(len(m))
+    cos3 = (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2
+    c = CONSTANTS
+    rotation = c["A"] * pa @ pa + c["B"] * pb @ pb + c["C"] * pc @ pc + c["Dab"] * (pa @ pb + pb @ pa)
+    slip = np.kron(np.eye(n), p) - c["rho"] * np.kron(pa, one)
+    free = np.kron(rotation, one) + c["F"] * slip @ slip + np.kron(np.eye(n), c["V3"] / 2 * (one - cos3))
+
+    ix, iy, iz = (qutip.jmat(SPIN, axis).full() for axis in "xyz")
+    spins = (ix, iy, iz)
+    product = [[(a @ b + b @ a) / 2 - (SPIN * (SPIN + 1) / 3 * np.eye(len(ix)) if i == k else 0) for k, b in enumerate(spins)]
+               for i, a in enumerate(spins)]  # fmt: skip
+    of_spin = [part / (2 * SPIN * (2 * SPIN - 1)) for part in spherical(product)]
+    order = [1, 2, 0]  # x, y, z = b, c, a
+    of_body = spherical(CHI[np.ix_(order, order)])
+    coupling = np.zeros((n * len(ix),) * 2, dtype=complex)
+    turned = cosines(states, 2)
+    for space in range(-2, 3):
+        tensor = sum(of_body[q + 2] * turned[space + 2, q + 2] for q in range(-2, 3))
+        coupling += (-1) ** space * np.kron(tensor, of_spin[2 - space])
+    vector = cosines(states, 1)
+    body = {"a": [0, 1, 0], "b": [1 / np.sqrt(2), 0, -1 / np.sqrt(2)], "c": [-1j / np.sqrt(2), 0, -1j / np.sqrt(2)]}
+    spin_vector = [(ix - 1j * iy) / np.sqrt(2), iz, -(ix + 1j * iy) / np.sqrt(2)]
+    for letter, component, value in zip("abc", (pa, pb, pc), np.diag(ROTATION), strict=True):
+        for space in (-1, 0, 1):
+            cosine = sum(body[letter][q + 1] * vector[space + 1, q + 1] for q in (-1, 0, 1))
+            half = (cosine @ component + component @ cosine) / 2
+            coupling += value * (-1) ** space * np.kron(half, spin_vector[1 - space])
+    whole = np.kron(free, np.eye(len(ix)))
+    lifted = np.einsum("aibk,cd->acibdk", coupling.reshape(n, len(ix), n, len(ix)), one).reshape(whole.shape)
+    return np.linalg.eigvalsh(whole + lifted)
+
+
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma):
+    ram = RamModel(CONSTANTS)
+    blocks = ram.blocks(sigma, JMAX, count=2 * WAVES + 1, waves=WAVES)
+    along = {"a": j_z(), "b": j_x(), "c": j_y()}
+    unit = dict(zip("abc", np.eye(3), strict=True))
+    vector = sum(
+        (
+            ROTATION[i, i] * half_anticommutator(body_tensor(spherical_components(unit[g], 1, "Ir")), along[g])
+            for i, g in enumerate("abc")
+        ),
+        start=0.0 * j_z(),
+    )
+    tensors = {
+        "chi": (2, blocks.functions.elements([[Product(body_tensor(spherical_components(CHI, 2, "Ir")))]], 2)),
+        "C": (1, blocks.functions.elements([[Product(vector)]], 1)),
+    }
+    space = contracted_elements(blocks.linear.solve(ram.coefficients), tensors)
+    both = coupled(space, spin_space(2 * SPIN), {"chi": ("chi", "Q"), "C": ("C", "I")}, {}, range(0, 2 * JMAX + 3, 2))
+    solved = both.solve({"chi": 1.0, "C": 1.0})
+    ours = np.sort(np.concatenate([np.repeat(sector.energies, sector.twice_j + 1) for sector in solved.sectors]))
+    theirs = direct_product(sigma)
+    assert len(ours) == len(theirs)
+    assert np.abs(ours - theirs).max() < 1e-6  # MHz; rounding of energies up to 2e7 MHz is 1e-7
