@@ -107,7 +107,7 @@ def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma):
     )
     tensors = {
         "chi": (2, blocks.functions.elements([[Product(body_tensor(spherical_components(CHI, 2, "Ir")))]], 2)),
-        "C": (1, blocks.functions.elements([[Product(vector)]], 1)),
+        "C": (1, blocks.functions.elements([[Product(vector)]], 1, time_odd=True)),
     }
     space = contracted_elements(blocks.linear.solve(ram.coefficients), tensors)
     both = coupled(space, spin_space(2 * SPIN), {"chi": ("chi", "Q"), "C": ("C", "I")}, {}, range(0, 2 * JMAX + 3, 2))

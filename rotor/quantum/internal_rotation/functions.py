@@ -72,13 +72,17 @@ class TorsionRotation:
         rows[(labels["s"] < 0).astype(int), place, labels["t"]] = np.arange(len(place))
         return rows
 
-    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0) -> Elements:
-        """Elements of sums of products on their common pattern, reduced ones of tensors of a rank."""
+    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
+        """Elements of sums of products on their common pattern, reduced ones of tensors of a rank.
+
+        time_odd: whether time reversal changes the sign of the tensor, as that of Σ ½{Φ_i, N_j} of rank 1; it then has the phases of the
+        next rank.
+        """
         plain = self.rotation.elements([factor.rotation for term in terms for factor in term])
         if self.folded:
             if np.iscomplexobj(plain.values):
                 raise ValueError("functions of K and -K are combined for real operators alone")
-            return self._gathered(len(terms), *self._folded(terms, plain, rank))
+            return self._gathered(len(terms), *self._folded(terms, plain, (rank + time_odd) % 2))
         tables = _Tables(self.torsion)
         change = self._k(plain.rows) - self._k(plain.columns)
         values = self._values(terms, plain, np.arange(len(change)), change, tables)
@@ -107,7 +111,7 @@ class TorsionRotation:
         return values
 
     def _folded(
-        self, terms: Sequence[Sequence[Product]], plain: Elements, rank: int
+        self, terms: Sequence[Sequence[Product]], plain: Elements, parity: int
     ) -> tuple[Ints, Ints, NDArray[Any]]:
         """Rows and columns (entries, t), and values, between combined functions.
 
@@ -121,7 +125,7 @@ class TorsionRotation:
         values = self._values(terms, plain, chosen, k_row - k_column, _Tables(self.torsion))
         weight = np.where(k_column > 0, np.sqrt(2), 1.0) * np.where(k_row != 0, np.sqrt(0.5), 1.0)
         target = self.rotation.rows({"J": j_row, "K": np.abs(k_row)})
-        odd = (j_row + j_column + rank) % 2  # whether the sign s changes
+        odd = (j_row + j_column + parity) % 2  # whether the sign s changes
         phase = (j_column - j_row) % 4
         pairs, slots = np.unique(target * len(self.rotation) + columns, return_inverse=True)
         first, second = pairs // len(self.rotation), pairs % len(self.rotation)
@@ -130,7 +134,7 @@ class TorsionRotation:
             row_sign = np.where(odd, -column_sign, column_sign)
             reflected = np.where(k_row < 0, row_sign * np.where(k_row % 2, -1, 1), 1)
             turns = (
-                phase + (column_sign < 0) - (row_sign < 0) - rank % 2
+                phase + (column_sign < 0) - (row_sign < 0) - parity
             ) % 4  # powers of i; of odd rank one is left out
             factor = weight * reflected * np.where(turns == 0, 1.0, -1.0)
             if (turns % 2).any():
