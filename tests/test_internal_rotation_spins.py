@@ -11,6 +11,7 @@ from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.operators.algebra import half_anticommutator
 from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
 from rotor.quantum.tensors import spherical_components
+from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
 CONSTANTS = {"A": 9000.0, "B": 4200.0, "C": 3100.0, "Dab": 700.0, "F": 5.2 * CM, "rho": 0.08, "V3": 40.0 * CM}
@@ -116,3 +117,54 @@ def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma):
     theirs = direct_product(sigma)
     assert len(ours) == len(theirs)
     assert np.abs(ours - theirs).max() < 1e-6  # MHz; rounding of energies up to 2e7 MHz is 1e-7
+
+
+# Levels and lines of a top
+
+
+SPINS = "chi_aa(14N)=-40 chi_bb-cc(14N)=-10 chi_ab(14N)=25 C_aa(14N)=0.3 C_bb(14N)=-0.2 MHz"
+
+
+def turning_top(spins=SPINS, **others):
+    values = {"F": 5.2 * CM, "rho": 0.0, "V3": 400.0 * CM}
+    internal = InternalRotationConstants(values, "RAM", vt_max=0)
+    constants = rotor.Constants(A=9000.0, B=4200.0, C=3100.0, reduction="A", representation="Ir")
+    return rotor.Top.from_constants(
+        constants, dipole_abc_debye=(1.5, 0.8, 0.0), spin_constants=spins, internal_rotation=internal
+    )
+
+
+@pytest.mark.parametrize("spins", [SPINS, SPINS.replace(" MHz", " chi_aa(35Cl)=-57 chi_bb-cc(35Cl)=-4 MHz")])
+def test_without_coupling_to_the_rotation_both_species_have_the_hyperfine_structure_of_a_rigid_top(spins):
+    """ρ = 0: torsion and rotation are apart, and every level and line of the other engine comes out in A and in E."""
+    top = turning_top(spins)
+    rigid = rotor.Top.from_constants(top.constants, dipole_abc_debye=(1.5, 0.8, 0.0), spin_constants=spins)
+    lines, expected = (
+        rotor.line_list(t, jmax=3, q=1.0, min_lgint=None, effects=rotor.effects_of(t, True)) for t in (top, rigid)
+    )
+    assert lines.levels.quanta_names == ("species", "vt", *expected.levels.quanta_names)
+    quanta = expected.levels.quanta_names
+
+    def strong(table, copies):
+        """Frequency, strength and names of both levels of lines that symmetry does not forbid, by frequency."""
+        table = table[table.strength_debye2 > 1e-6 * copies].sorted()
+        names = [
+            np.column_stack([table.levels.quanta[name][rows] for name in quanta]) for rows in (table.upper, table.lower)
+        ]
+        return table.frequency_mhz, table.strength_debye2 / copies, np.hstack(names)
+
+    known = strong(expected, 1)
+    for species, copies in (("A", 1), ("E", 2)):
+        found = strong(lines[lines.levels.quanta["species"][lines.upper] == species], copies)
+        assert len(found[0]) == len(known[0])
+        assert np.abs(found[0] - known[0]).max() < 1e-5  # rounding of 1e7 MHz
+        assert np.allclose(
+            np.sort(found[1]), np.sort(known[1]), rtol=1e-4, atol=1e-6
+        )  # levels a few Hz apart mix by rounding
+        assert sorted(map(tuple, found[2].tolist())) == sorted(map(tuple, known[2].tolist()))
+
+
+def test_what_is_not_computed_beside_internal_rotation_is_refused():
+    top = turning_top("chi_aa(14N)=-4 chi_aa_J(14N)=0.001 MHz")
+    with pytest.raises(ValueError, match="chi_aa_J"):
+        rotor.solve_levels(top, 1, effects=rotor.effects_of(top, True))

@@ -26,6 +26,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import Elements, merged
 from rotor.quantum.basis.phases import with_real_phases
 from rotor.quantum.blocks import Functions, LinearBlocks, SolvedBlocks, blocks_of_elements, connected_parts
+from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.solvers.hermitian import eigenstates
 from rotor.quantum.wigner import nine_j, six_j, three_j
@@ -119,16 +120,20 @@ def contracted(solved: SolvedBlocks, functions: Functions, tensors: Mapping[str,
     return contracted_elements(solved, elements)
 
 
-def contracted_elements(solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]]) -> Space:
-    """The same, of reduced elements that are written already."""
+def contracted_elements(
+    solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]], kept: Mapping[int, Ints] | None = None
+) -> Space:
+    """The same, of reduced elements that are written already; kept: by block the ranks of the states to take, all by default."""
     linear = solved.linear
-    present = [int(n) for n in np.unique(linear.block) if n >= 0]
+    present = [int(n) for n in np.unique(linear.block) if n >= 0 and (kept is None or len(kept.get(int(n), ())))]
     number = {block: i for i, block in enumerate(present)}
     states = [solved.vectors(block) for block in present]
+    ranks = [np.arange(v.shape[1]) if kept is None else kept[n] for n, (_, v) in zip(present, states, strict=True)]
+    states = [(rows, vectors[:, rank]) for (rows, vectors), rank in zip(states, ranks, strict=True)]
     sectors = []
-    for block, (rows, vectors) in zip(present, states, strict=True):
-        energies = solved.energies[rows[: vectors.shape[1]]]
-        labels = {"block": block, "functions": rows[: vectors.shape[1]]}
+    for block, (rows, _), rank in zip(present, states, ranks, strict=True):
+        energies = solved.energies[rows[rank]]
+        labels = {"block": block, "functions": rows[rank]}
         sectors.append(Sector(2 * int(linear.labels["J"][rows[0]]), energies, labels))
     reduced = {
         name: Tensor(rank, _between_blocks(linear, states, number, elements))
@@ -142,7 +147,8 @@ def _between_blocks(
 ) -> dict[Pair, NDArray[Any]]:
     """V† O V of each pair of blocks that an operator connects."""
     rows, columns, values = elements.rows, elements.columns, elements.values[0]
-    kept = (linear.block[rows] >= 0) & (linear.block[columns] >= 0)
+    taken = np.isin(linear.block, list(number))
+    kept = taken[rows] & taken[columns]
     rows, columns, values = rows[kept], columns[kept], values[kept]
     pair = linear.block[rows] * (int(linear.block.max()) + 1) + linear.block[columns]
     order = np.argsort(pair, kind="stable")
@@ -381,9 +387,17 @@ def _solved_parts(
     for numbers in by_size.values():
         energies, vectors = eigenstates(np.stack([matrices[number] for number in numbers]), lowest)
         for number, e, v in zip(numbers, energies, vectors, strict=True):
-            labels = {"sectors": tuple(parts[number])}
+            labels = {"sectors": tuple(parts[number]), "functions": _named_functions(space, parts[number], v)}
             solved[number] = Sector(space.sectors[parts[number][0]].twice_j, e, labels), v
     return [solved[number] for number in range(len(parts))], where
+
+
+def _named_functions(space: CoupledSpace, part: Sequence[int], vectors: NDArray[Any]) -> Ints:
+    """(sector, rank) (states, 2) of the product function that each state mostly is: one to one where all states are there."""
+    places = np.array([(sector, rank) for sector in part for rank in range(len(space.sectors[sector]))])
+    shares = np.abs(vectors) ** 2
+    whole = vectors.shape[0] == vectors.shape[1]
+    return np.asarray(places[one_to_one(shares) if whole else shares.argmax(axis=0)])
 
 
 def _moved(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
+SPINS = ("nuclear quadrupole", "spin-rotation")  # effects of spins that have elements between torsional functions
 ROTATION = ("rigid rotor", "centrifugal distortion")  # effects whose constants are coefficients of the same blocks
 
 
@@ -51,11 +52,16 @@ class InternalRotation(QuantumEffect):
 
         Raises ValueError for effects that have no elements between torsional functions.
         """
+        spins = [effect for effect in effects if effect.name in SPINS]
         for effect in effects:
-            if effect.name not in (*ROTATION, self.name):
+            if effect.name not in (*ROTATION, *SPINS, self.name):
                 raise ValueError(
                     f"{effect.name or type(effect).__name__} beside internal rotation: not computed together; leave one of them out"
                 )
+        if spins:
+            from rotor.quantum.internal_rotation.hyperfine import hyperfine_levels
+
+            return hyperfine_levels(top, self.constants, tuple(effects), jmin, jmax)
         from rotor.quantum.internal_rotation.levels import energies_alone, torsion_rotation_levels
 
         solve = torsion_rotation_levels if vectors else energies_alone
