@@ -143,3 +143,18 @@ def test_constants_of_an_internal_rotor_on_the_command_line(call):
     code, _, err = call("levels", "--constants", constants, "--internal-rotation", "geometry")
     assert code == 2
     assert "no geometry" in err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("stark", "--field", "0:50kV/cm:3"),
+        ("zeeman", "--g", "0,0,0.1", "--field", "0:1T"),
+        ("convert", "case.var"),
+    ],
+)
+def test_what_knows_no_internal_rotation_refuses_it(acetaldehyde, call, command):
+    verb, *options = command
+    code, _, err = call(verb, str(acetaldehyde), *options)
+    assert code == 2
+    assert "internal rotation" in err

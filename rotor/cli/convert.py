@@ -119,6 +119,9 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         _refuse_unreadable(file, source)
         return lambda path: write_molecule_file(file, path)
 
+    from rotor.tops.top import without_internal_rotation
+
+    without_internal_rotation(top, f"a {Path(target).suffix} file")
     if top.level_table is not None:
         note(
             f"a {Path(target).suffix} file has no place for the table of level energies, which count before the constants"

@@ -427,10 +427,20 @@ def one_state(top: Top, what: str) -> Top:
     >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
     'linear'
     """
+    without_internal_rotation(top, what)
     if top.states is not None:
         names = ", ".join(top.states.name_of(v) for v in range(top.states.count))
         raise ValueError(
             f"{what} of {top.name or 'this top'}: computed for tops of one state, and this one has {top.states.count} ({names}); "
             "give the constants of one of them alone"
+        )
+    return top
+
+
+def without_internal_rotation(top: Top, what: str) -> Top:
+    """The top itself where nothing in it turns; ValueError, with what cannot be computed, where something does."""
+    if top.internal_rotation is not None:
+        raise ValueError(
+            f"{what} of {top.name or 'this top'}: not computed with internal rotation; leave its constants out for those of a rigid top"
         )
     return top

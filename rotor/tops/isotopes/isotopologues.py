@@ -21,7 +21,7 @@ from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
 from rotor.tops.allowed import invariant_vector
 from rotor.tops.isotopes.isotopic_scaling import carried_over, matched_axes, turned_degrees
 from rotor.tops.isotopes.isotopic_spins import carried_spins
-from rotor.tops.top import Top
+from rotor.tops.top import Top, without_internal_rotation
 
 Changes = Mapping[int | str, str] | str
 
@@ -227,7 +227,7 @@ class _Ancestor:
     """A parent, its rigid top and the permutations of its bare geometry, found once for all its isotopologues."""
 
     def __init__(self, parent: Top) -> None:
-        molecule, dipole = _geometry(parent), parent.dipole_abc_debye
+        molecule, dipole = _geometry(without_internal_rotation(parent, "isotopologues")), parent.dipole_abc_debye
         symmetry = _bare_symmetry(molecule)
         self.permutations = _permutations(symmetry)
         if dipole is not None and parent.frame is not None:
