@@ -127,7 +127,9 @@ def measured(name: str, shared: Path) -> list[Point]:
     top, jmax = rotor.read(name), int(seen.quanta_upper[:, 0].max())
     points = []
     for order in sorted({2, *(order_of(one, top) for one in top.constants.values)}):
-        lines, seconds, _ = timed(lambda o=order: rotor.line_list(to_order(top, o), jmax=jmax, min_lgint=None, q=1.0))
+        lines, seconds, _ = timed(
+            lambda o=order: rotor.api.line_list(to_order(top, o), jmax=jmax, min_lgint=None, q=1.0)
+        )
         found = compare(seen, catalogue(lines))
         points.append(Point(f"J^{order}", seconds, float(np.median(np.abs(found.differences("frequency_mhz"))))))
     return points

@@ -91,7 +91,7 @@ def unit_strengths(name: str, axis: int) -> dict[Line, float]:
     """S of every line for a dipole of 1 D along one axis, per component of the upper state's degeneracy 2J'+1."""
     top = rotor.read(name)
     top = rotor.Top.from_constants(top.constants, dipole_abc_debye=np.eye(3)[axis])  # no weights: all levels
-    lines = rotor.line_list(top, jmax=HIGHEST_J, min_lgint=None, q=1.0)
+    lines = rotor.api.line_list(top, jmax=HIGHEST_J, min_lgint=None, q=1.0)
     columns, names = lines.columns, NAMES[top.kind]
     ends = [np.stack([columns[f"{n}_{end}"] for n in names], axis=1).tolist() for end in ("upper", "lower")]
     components = lines.levels.components[lines.upper]
@@ -110,7 +110,7 @@ def axis_of(upper: tuple[int, ...], lower: tuple[int, ...], kind: str) -> int:
 def dipoles(name: str, shared: Path) -> list[tuple[str, float, int, float]]:
     """Component, value in D, number of lines, and the relative spread of a single one, for each axis that has lines."""
     top, tag = rotor.read(name), CATALOGUES[name]
-    q = rotor.partition_function(top, 300.0).q if name in OWN_Q else q_of_catalogue(shared, tag)
+    q = rotor.api.partition_function(top, 300.0).q if name in OWN_Q else q_of_catalogue(shared, tag)
     highest = LIGHT_J if name in LIGHT else HIGHEST_J
     seen = line_strengths(read_catalogue(shared, tag), q, len(NAMES[top.kind]), highest)
     found = []

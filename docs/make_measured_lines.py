@@ -104,7 +104,7 @@ def hyperfine_row(sample: Sample) -> str:
         rows = list(csv.DictReader(handle))
     ends = [tuple(tuple(map(int, row[side].split())) for side in ("upper", "lower")) for row in rows]
     n_max = max(up[0] for up, _ in ends)
-    lines = rotor.line_list(top, jmax=n_max, effects=effects_of(top, True), min_lgint=None)
+    lines = rotor.api.line_list(top, jmax=n_max, effects=effects_of(top, True), min_lgint=None)
     width = len(ends[0][0])
     quanta = np.hstack([_rounded_up(lines, lines.upper), _rounded_up(lines, lines.lower)])
     place = {(tuple(q[:width]), tuple(q[width:])): i for i, q in enumerate(quanta.tolist())}
@@ -136,7 +136,7 @@ def comparison_of(molecule: MoleculeFile, shared: Path) -> Comparison:
     reference = read_cat(next(path for path in names if path.exists()))
     measured = reference.take(reference.tag < 0)
     top = rotor.read(molecule.name)
-    lines = rotor.line_list(top, jmax=int(measured.quanta_upper[:, 0].max()), min_lgint=None, q=1.0)
+    lines = rotor.api.line_list(top, jmax=int(measured.quanta_upper[:, 0].max()), min_lgint=None, q=1.0)
     return compare(measured, catalogue(lines))
 
 

@@ -40,7 +40,7 @@ def beside(lines, file):
 
 # %%
 water = rotor.read("water")
-lines = rotor.line_list(water, temperature_k=300, jmax=20)
+lines = rotor.api.line_list(water, temperature_k=300, jmax=20)
 print(f"{water.name}: {water.kind} top, κ = {water.kappa:.3f}, {len(lines)} lines, Q(300 K) = {lines.q:.2f}")
 print(lines.strongest(5))
 
@@ -92,7 +92,7 @@ assert np.abs(strength).max() < 0.026  # 6 %: JPL's dipole depends on J and K, o
 
 # %%
 ocs = rotor.read("OCS")
-matched = beside(rotor.line_list(ocs, temperature_k=300, jmax=80), "c060503_part.cat")
+matched = beside(rotor.api.line_list(ocs, temperature_k=300, jmax=80), "c060503_part.cat")
 found, error = agreement(matched), matched.reference.error_mhz[matched.of_reference]
 off = matched.differences("frequency_mhz")
 print(
@@ -125,7 +125,7 @@ for table in tables.values():
     kelvin = np.array(table["temperature_k"])
     for name in [key for key in table if key not in ("source", "temperature_k")]:
         top = rotor.read(name)
-        ours = np.array([math.log10(float(rotor.partition_function(top, t).q)) for t in kelvin.tolist()])
+        ours = np.array([math.log10(float(rotor.api.partition_function(top, t).q)) for t in kelvin.tolist()])
         differences[name] = ours - np.array(table[name])
         print(
             f"{name:5}",

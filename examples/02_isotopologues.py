@@ -119,7 +119,7 @@ for file in ("c050007_part.cat", "c052009_part.cat"):
 grid = np.linspace(25.9e3, 26.9e3, 4001)
 parts, places = [], []
 for one, centre in zip(chlorides, centres, strict=True):
-    lines = rotor.line_list(one.top, temperature_k=300, jmax=2)
+    lines = rotor.api.line_list(one.top, temperature_k=300, jmax=2)
     places.append(float(lines.frequency_mhz[lines.levels.quanta["j"][lines.upper] == 1][0]))
     parts.append(one.abundance * rotor.Spectrum.from_lines(lines, grid, fwhm_mhz=5.0).intensity)
     print(
@@ -154,7 +154,7 @@ tops = [isotopologue(water, changes) for changes in ("O=16O", "O=18O", "2=2H", "
 figure, panels = plt.subplots(len(tops), 1, figsize=(8, 6), sharex=True, layout="constrained")
 strongest = {}
 for panel, one in zip(panels, tops, strict=True):
-    lines = rotor.line_list(one.top, temperature_k=300, jmax=12)
+    lines = rotor.api.line_list(one.top, temperature_k=300, jmax=12)
     panel.vlines(lines.frequency_mhz / 1e6, 0, lines.intensity_nm2_mhz, linewidth=0.7)
     panel.set_title(one.formula, loc="left", fontsize=9)
     panel.set_ylim(bottom=0)

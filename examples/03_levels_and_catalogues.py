@@ -32,7 +32,7 @@ kappas = np.linspace(-0.9999, 0.9999, 101)
 curves = []
 for kappa in kappas:
     top = rotor.Top(rotor.Constants(A=A, B=(A + C + kappa * (A - C)) / 2, C=C, representation="Ir"))
-    levels = rotor.solve_levels(top, J, jmin=J)
+    levels = rotor.api.solve_levels(top, J, jmin=J)
     curves.append(levels.energy_mhz)
 curves = np.array(curves)
 
@@ -69,7 +69,7 @@ off = {}
 for case in cases:
     top, printed = rotor.read(oracles / case / f"{case}.var"), read_egy(oracles / case / "sample.egy")
     j, ka, kc = printed.quanta.T
-    levels = rotor.solve_levels(top, int(j.max()))
+    levels = rotor.api.solve_levels(top, int(j.max()))
     rows = levels.rows_of(j=j, ka=ka, kc=kc)
     off[case] = levels.energy_mhz[rows] / MHZ_PER_CM - printed.energy_cm
     print(f"{case:18} {len(j)} levels to J = {j.max():3}, largest difference {np.abs(off[case]).max():.1e} cm⁻¹")
@@ -109,7 +109,7 @@ off = {}
 for order, names in orders.items():
     taken += names
     part = {name: value for name, value in water.constants.values.items() if name in taken}
-    levels = rotor.solve_levels(rotor.Top(rotor.Constants(**part, reduction="S", representation="Ir")), 10)
+    levels = rotor.api.solve_levels(rotor.Top(rotor.Constants(**part, reduction="S", representation="Ir")), 10)
     calculated = levels.energy_mhz[levels.rows_of(**upper)] - levels.energy_mhz[levels.rows_of(**lower)]
     off[order] = np.abs(calculated - measured.frequency_mhz)
     print(f"{order:8} median {np.median(off[order]):12.3f} MHz, worst {off[order].max():14.3f} MHz")
@@ -135,7 +135,7 @@ assert medians[-1] < 1.0
 
 # %%
 so2 = rotor.read("SO2")
-levels = rotor.solve_levels(so2, 20)
+levels = rotor.api.solve_levels(so2, 20)
 exists = levels.weight > 0
 print(f"SO2 to J = 20: {int(exists.sum())} of {len(levels)} levels exist")
 
@@ -159,4 +159,4 @@ assert ((published.quanta_upper[:, 1] + published.quanta_upper[:, 2]) % 2 == 0).
 # %%
 mixed = rotor.read("SO2", isotopes="2=18O")
 assert mixed.spin_weights.to_mapping() == {}
-assert (rotor.solve_levels(mixed, 20).weight > 0).all()
+assert (rotor.api.solve_levels(mixed, 20).weight > 0).all()

@@ -37,7 +37,7 @@ turn_per_s = 2 * math.pi
 for axis, fixed in enumerate(fixed_axes(book, 1.0)):
     spin = book[axis] * turn_per_s * np.cos(0.01) * np.eye(3)[axis]
     aside = book[axis] * turn_per_s * np.sin(0.01) * (1 - np.eye(3)[axis]) / math.sqrt(2)
-    motion = rotor.free_motion(book, spin + aside)
+    motion = rotor.api.free_motion(book, spin + aside)
     momentum, attitude = motion.at(np.linspace(0, 60, 6001))  # a minute
     direction = momentum / np.linalg.norm(momentum[0])
     tipped = np.degrees(np.arccos(np.clip(direction[:, axis], -1, 1)).max())
@@ -60,7 +60,7 @@ for axis, fixed in enumerate(fixed_axes(book, 1.0)):
 # %%
 for axis in (0, 2):
     size = book[axis] * turn_per_s  # of L: one turn per second
-    nudged = rotor.free_motion(book, size * (np.eye(3)[axis] + 1e-5 * (1 - np.eye(3)[axis])))
+    nudged = rotor.api.free_motion(book, size * (np.eye(3)[axis] + 1e-5 * (1 - np.eye(3)[axis])))
     later, _ = nudged.at([0.0, 0.5 * nudged.period, nudged.period])
     assert np.allclose(later[2], later[0], atol=1e-15 * size)  # back after a period,
     assert np.abs(later[1] - later[0]).max() > 1e-5 * size  # and not before
@@ -71,7 +71,7 @@ for axis in (0, 2):
 size = book[1] * turn_per_s
 sigma = float(growth_rate(book, size))
 out = np.array([math.sqrt(1 / book[1] - 1 / book[2]), 0, -math.sqrt(1 / book[0] - 1 / book[1])])  # the way it leaves
-leaving = rotor.free_motion(book, size * (np.eye(3)[1] + 1e-7 * out / np.linalg.norm(out)))
+leaving = rotor.api.free_motion(book, size * (np.eye(3)[1] + 1e-7 * out / np.linalg.norm(out)))
 times = np.linspace(0, math.log(1e3) / sigma, 50)
 apart = np.linalg.norm(leaving.at(times)[0][:, [0, 2]], axis=1)
 slope = np.polyfit(times, np.log(apart), 1)[0]
@@ -86,7 +86,7 @@ assert abs(sigma / turn_per_s - math.sqrt(1 / 3)) < 1e-14  # a factor of 37.6 in
 # intermediate axis, parts the curves about the first axis (blue) from those about the third (green).
 
 # %%
-tumbling = rotor.free_motion(book, off_intermediate_axis(book, book[1] * turn_per_s, math.radians(0.5)))
+tumbling = rotor.api.free_motion(book, off_intermediate_axis(book, book[1] * turn_per_s, math.radians(0.5)))
 seconds = np.linspace(0, 2 * tumbling.period, 400)
 polhode_figure(tumbling, seconds, time_label="$t$ (s)", title="A book, half a degree off")
 
@@ -108,7 +108,7 @@ problems = {
 }
 figure, panels = plt.subplots(2, 1, figsize=(8, 5), sharex=True, layout="constrained")
 for panel, (moments, (expected, expected_period)) in zip(panels, problems.items(), strict=True):
-    motion = rotor.free_motion(moments, (1.8, 0.4, -0.9))
+    motion = rotor.api.free_motion(moments, (1.8, 0.4, -0.9))
     error = np.abs(motion.at(10.0)[0] - expected).max()
     print(f"I = {moments}: error of L at t = 10 {error:.1e}, of the period {abs(motion.period - expected_period):.1e}")
     assert error < 2e-14  # roundings, 2e-16 each, of numbers near 2 in some forty operations
@@ -120,7 +120,7 @@ panels[0].legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1
 panels[1].set_xlabel("t")
 
 racket = np.array([0.3, 0.35, 0.4])
-period = float(rotor.free_motion(racket, racket * [0.1, 15.0, 0.1]).period)
+period = float(rotor.api.free_motion(racket, racket * [0.1, 15.0, 0.1]).period)
 print(f"racket: it turns over every {period / 2:.6f} s")
 assert abs(period - 12.3349458093386) < 1e-9
 
@@ -139,7 +139,7 @@ assert np.allclose(
     again[1], again[0], atol=1e-6 * np.linalg.norm(again[0])
 )  # the period rounds: 1e-16 times 1e6 and σT
 
-neighbour = rotor.free_motion(book, tumbling.momentum0 * (1 + 1e-12))
+neighbour = rotor.api.free_motion(book, tumbling.momentum0 * (1 + 1e-12))
 gaps = []
 for periods in (100, 1000, 10000):
     window = (periods + np.linspace(0, 1, 1000)) * float(tumbling.period)
@@ -157,7 +157,7 @@ assert np.allclose(np.array(gaps) / gaps[0], np.array([101, 1001, 10001]) / 101,
 water = rotor.read("water")
 moments = np.array(water.moments_u_angstrom2)
 size = float(mean_thermal_momentum(moments, EV_PER_K * 300))
-molecule = rotor.free_motion(moments, off_intermediate_axis(moments, size, math.radians(0.5)))
+molecule = rotor.api.free_motion(moments, off_intermediate_axis(moments, size, math.radians(0.5)))
 period_ps = float(molecule.period) * ASE_TIME_PS
 polhode_figure(
     molecule, np.linspace(0, 2 * molecule.period, 400), axis_names=("a", "b", "c"), time_label="$t$ (ps)",

@@ -63,7 +63,7 @@ for name, ends_at in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
 # %%
 for name, top in tops.items():
     for kelvin in (300, 30):
-        total = lines_area(rotor.line_list(top, temperature_k=kelvin, min_lgint=-14))
+        total = lines_area(rotor.api.line_list(top, temperature_k=kelvin, min_lgint=-14))
         print(f"{name:6s} {kelvin:4d} K: all lines over the closed form {total / dipole_band_area(top):.7f}")
         assert abs(total / dipole_band_area(top) - 1) < 3e-6  # lines below the cut
 
@@ -84,7 +84,7 @@ found, pairs = {}, []
 with ThreadPoolExecutor(2) as pool:
     for name, kelvin, width, end, corrections, molecules in cases:
         top, grid = tops[name], np.linspace(0, end, 901) * MHZ_PER_CM
-        lines = rotor.line_list(top, temperature_k=kelvin, min_lgint=-14)
+        lines = rotor.api.line_list(top, temperature_k=kelvin, min_lgint=-14)
         quantum = rotor.Spectrum.from_lines(lines, grid, fwhm_mhz=width * MHZ_PER_CM)
         bands = {}
         for correction in corrections:

@@ -63,7 +63,7 @@ fit_figure(fit, "OCS")
 
 # %%
 top = rotor.Top.from_constants(fit.constants, dipole_abc_debye=(0.715, 0, 0), covariance=fit.covariance)
-predicted = rotor.line_list(top, jmax=140, min_lgint=None)
+predicted = rotor.api.line_list(top, jmax=140, min_lgint=None)
 upper = predicted.levels.quanta["j"][predicted.upper]
 for j in (1, 30, 90, 140):
     print(f"J = {j}: {predicted.frequency_mhz[upper == j][0]:.4f} ± {predicted.error_mhz[upper == j][0]:.4f} MHz")
@@ -99,7 +99,7 @@ assert abs(co.weighted_rms - 0.90566) < 5e-6  # as SPFIT prints it
 
 # %%
 prolate = Constants(A=158099.0, B=9198.9, DJ=3.8e-3, DJK=0.177, DK=2.8)
-made = rotor.line_list(rotor.Top.from_constants(prolate, dipole_abc_debye=(1, 0, 0)), jmax=8, min_lgint=None)
+made = rotor.api.line_list(rotor.Top.from_constants(prolate, dipole_abc_debye=(1, 0, 0)), jmax=8, min_lgint=None)
 labels = np.stack([made.levels.quanta[name] for name in ("j", "k")], axis=1)
 noise = 0.002 * np.random.default_rng(0).normal(size=len(made))
 seen = assignments(("j", "k"), labels[made.upper], labels[made.lower], made.frequency_mhz + noise, 0.002)
@@ -116,7 +116,7 @@ assert abs(blind.constants["B"] - 9198.9) < 5 * blind.constants.uncertainties["B
 
 # %%
 chain = Constants(A=300e3, B=4600.0, C=4500.0, DeltaJ=1e-3, DeltaJK=0.05, reduction="A")
-made = rotor.line_list(rotor.Top.from_constants(chain, dipole_abc_debye=(1, 0, 0)), jmax=11, min_lgint=None)
+made = rotor.api.line_list(rotor.Top.from_constants(chain, dipole_abc_debye=(1, 0, 0)), jmax=11, min_lgint=None)
 labels = np.stack([made.levels.quanta[name] for name in ("j", "ka", "kc")], axis=1)
 up, low = labels[made.upper], labels[made.lower]
 chosen = (up[:, 0] == low[:, 0] + 1) & (low[:, 0] >= 1) & (up[:, 1] <= 2) & (up[:, 1] == low[:, 1])

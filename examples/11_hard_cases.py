@@ -39,7 +39,9 @@ A, B, J = 10_000.0, 3_000.0, 20
 deltas = np.concatenate([np.logspace(-1, -16, 31), [0.0]])
 splitting, joined = {1: [], 2: [], 3: []}, []
 for delta in deltas:
-    levels = rotor.solve_levels(rotor.Top(rotor.Constants(A=A, B=B, C=B * (1 - delta), kind="asymmetric")), J, jmin=J)
+    levels = rotor.api.solve_levels(
+        rotor.Top(rotor.Constants(A=A, B=B, C=B * (1 - delta), kind="asymmetric")), J, jmin=J
+    )
     energy = {
         (int(a), int(c)): e for a, c, e in zip(levels.quanta["ka"], levels.quanta["kc"], levels.energy_mhz, strict=True)
     }
@@ -81,7 +83,7 @@ assert joined[-1] < 4 * round_off  # at δ = 0 the closed form of the symmetric 
 near_symmetric = rotor.read(oracles / "hard_nearsym_j150" / "hard_nearsym_j150.var")
 printed = read_egy(oracles / "hard_nearsym_j150" / "sample.egy")
 j, ka, kc = printed.quanta.T
-levels = rotor.solve_levels(near_symmetric, 150)
+levels = rotor.api.solve_levels(near_symmetric, 150)
 worst = np.abs(levels.energy_mhz[levels.rows_of(j=j, ka=ka, kc=kc)] / MHZ_PER_CM - printed.energy_cm).max()
 print(f"κ + 1 = {near_symmetric.kappa + 1:.1e}; {len(j)} levels, largest difference {worst:.1e} cm⁻¹")
 assert worst < 5.1e-7  # half of the last digit printed
@@ -96,7 +98,7 @@ assert worst < 5.1e-7  # half of the last digit printed
 # %%
 getcontext().prec = 40
 a, b, c, J = Decimal(1000), Decimal(500), Decimal("499.9"), 1000
-levels = rotor.solve_levels(rotor.Top(rotor.Constants(A=1000.0, B=500.0, C=499.9)), J, jmin=J)
+levels = rotor.api.solve_levels(rotor.Top(rotor.Constants(A=1000.0, B=500.0, C=499.9)), J, jmin=J)
 ulp = float(np.spacing(1000.0 * J**2))
 
 
@@ -175,7 +177,7 @@ distances = np.logspace(-1, -15, 29)
 periods, drift, stepped, closed = [], [], [], []
 for d in distances:
     start = moments * [d, 1.0, d]
-    motion = rotor.free_motion(moments, start)
+    motion = rotor.api.free_motion(moments, start)
     periods.append(float(motion.period))
     later, _ = motion.at(np.linspace(0, 1e6, 2001) * motion.period / 7)
     energy = 0.5 * (later**2 / moments).sum(axis=1)
@@ -207,7 +209,7 @@ assert max(drift) < 1e-14
 assert max(closed) < 1e-12  # the period rounds to 1e-16 of itself, and L leaves the axis at a rate σ only near a turn
 assert stepped[-1] > 0.1  # the stepped motion is lost
 
-reference = rotor.free_motion(moments, moments * [1e-12, 1.0, 1e-12])  # 50 digits: Taylor integration
+reference = rotor.api.free_motion(moments, moments * [1e-12, 1.0, 1e-12])  # 50 digits: Taylor integration
 assert abs(reference.period - 207.39643991872882) < 1e-12
 assert np.allclose(
     reference.at(100.0)[0], [-1.0765111111172092e-11, -1.875, 1.7241803476116202e-11], rtol=1e-12, atol=0
@@ -219,7 +221,7 @@ assert np.allclose(
 # The attitude after t = 10⁶ against a calculation with 50 digits. Phases are held in two doubles, so that nothing is lost.
 
 # %%
-motion = rotor.free_motion(moments, [0.5, 0.75, 1.0])
+motion = rotor.api.free_motion(moments, [0.5, 0.75, 1.0])
 truth = {
     1e3: (0.89834997892268562, 0.024997933189805489, 0.10192471267223579, -0.42656039625418872),
     1e6: (0.18396472966240838, -0.12579834796681974, 0.37906201650949952, 0.89813347645481284),

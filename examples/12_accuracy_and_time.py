@@ -56,12 +56,12 @@ for color, (name, counts) in zip(
     rigid = rotor.Top(
         rotor.Constants(**dict(zip("ABC", top.constants.rigid, strict=True))), spin_weights=top.spin_weights
     )
-    everything = rotor.solve_levels(rigid, 180)
+    everything = rotor.api.solve_levels(rigid, 180)
     kelvin = (everything.energy_mhz - everything.ground_mhz) / (rotor.units.MHZ_PER_K * 300)
     population = everything.degeneracy * np.exp(-kelvin)
     lost, spent = [], []
     for jmax in counts:
-        levels, milliseconds = timed(lambda top=rigid, jmax=jmax: rotor.solve_levels(top, jmax), 1)
+        levels, milliseconds = timed(lambda top=rigid, jmax=jmax: rotor.api.solve_levels(top, jmax), 1)
         above = everything.quanta["j"] > levels.jmax
         lost.append(population[above].sum() / population.sum())
         spent.append(milliseconds)
@@ -73,8 +73,8 @@ left.set_ylim(1e-16, 2)
 left.legend(frameon=False, loc="lower left")
 
 # %% [markdown]
-# Choose J max by the population that you may lose; `rotor.line_list` does so from the cut of the intensities, and
-# `rotor.partition_function` from the error asked for.
+# Choose J max by the population that you may lose; `rotor.api.line_list` does so from the cut of the intensities, and
+# `rotor.api.partition_function` from the error asked for.
 #
 # ## Tolerance of Q
 #
@@ -86,11 +86,11 @@ asked = np.logspace(-2, -10, 5)
 left, right = two_axes("relative error asked for", "Partition functions at 300 K: error reached")
 for color, name in zip(("tab:blue", "tab:orange", "tab:green"), ("OCS", "SO2", "CH3CN"), strict=True):
     top = rotor.read(name)
-    full = float(rotor.partition_function(top, 300.0, 1e-13).q)
+    full = float(rotor.api.partition_function(top, 300.0, 1e-13).q)
     reached, spent = [], []
     for tolerance in asked:
         answer, milliseconds = timed(
-            lambda top=top, tolerance=tolerance: rotor.partition_function(top, 300.0, tolerance)
+            lambda top=top, tolerance=tolerance: rotor.api.partition_function(top, 300.0, tolerance)
         )
         reached.append(abs(float(answer.q) / full - 1))
         spent.append(milliseconds)
@@ -114,11 +114,11 @@ left.legend(frameon=False, loc="lower left")
 # %%
 cuts = np.arange(-4.0, -14.1, -1.0)
 so2 = rotor.read("SO2")
-complete = rotor.line_list(so2, min_lgint=-16, range_mhz=(0, 2e6))
+complete = rotor.api.line_list(so2, min_lgint=-16, range_mhz=(0, 2e6))
 total = complete.intensity_nm2_mhz.sum()
 missing, counts = [], []
 for cut in cuts:
-    lines, milliseconds = timed(lambda cut=cut: rotor.line_list(so2, min_lgint=float(cut), range_mhz=(0, 2e6)), 1)
+    lines, milliseconds = timed(lambda cut=cut: rotor.api.line_list(so2, min_lgint=float(cut), range_mhz=(0, 2e6)), 1)
     missing.append(abs(1 - lines.intensity_nm2_mhz.sum() / total))
     counts.append(len(lines))
     print(f"min_lgint {cut:5.1f}: {len(lines):6} lines, {milliseconds:6.0f} ms, absorption left out {missing[-1]:.1e}")
@@ -144,7 +144,7 @@ assert missing[8] < 1e-8  # the default of -12
 
 # %%
 moments, momentum, turns = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 100
-exact = rotor.free_motion(moments, momentum)
+exact = rotor.api.free_motion(moments, momentum)
 period = float(exact.period)
 end = exact.at(turns * period)[1]
 methods = {
@@ -184,7 +184,7 @@ for name, slope in slopes.items():
     assert abs(slope - int(name.split()[-1])) < 0.15 * int(name.split()[-1])  # two steps are not quite in the limit
 
 # %% [markdown]
-# A free body is never stepped: `rotor.free_motion` is exact at any time. With torques take a splitting of order 4; order 8 or
+# A free body is never stepped: `rotor.api.free_motion` is exact at any time. With torques take a splitting of order 4; order 8 or
 # Moser-Veselov where 1e-8 is asked for.
 #
 # ## Number of samples

@@ -24,8 +24,8 @@ oracles = next(folder / "tests/oracles" for folder in (Path.cwd(), *Path.cwd().p
 
 def components(top, jmax, method="exact", temperature_k=300.0):
     """The lines of a top with its spins, and for each its quanta: upper, lower."""
-    effects = rotor.effects_of(top, True, method)
-    lines = rotor.line_list(top, jmax=jmax, temperature_k=temperature_k, min_lgint=None, effects=effects)
+    effects = rotor.api.effects_of(top, True, method)
+    lines = rotor.api.line_list(top, jmax=jmax, temperature_k=temperature_k, min_lgint=None, effects=effects)
     pairs = zip(lines.quanta(lines.upper).tolist(), lines.quanta(lines.lower).tolist(), strict=True)
     return lines, [(tuple(upper), tuple(lower)) for upper, lower in pairs]
 
@@ -60,7 +60,7 @@ def casimir(f, j=1, i=1):
     return -chi * whole / (2 * i * (2 * i - 1) * (2 * j - 1) * (2 * j + 3)) + c / 2 * factor
 
 
-centre = float(rotor.line_list(hcn, jmax=1, min_lgint=None).frequency_mhz[0])
+centre = float(rotor.api.line_list(hcn, jmax=1, min_lgint=None).frequency_mhz[0])
 lines, quanta = components(hcn, 1)
 first, _ = components(hcn, 1, "first-order")
 laboratory = measured("hcn")
@@ -239,7 +239,7 @@ LAB = {(1, 1): 23694.4955, (2, 2): 23722.6333, (3, 3): 23870.1292, (2, 1): 23098
 ammonia = rotor.read("NH3")
 inversion = {}
 for kind, top in {"table": ammonia, "constants": replace(ammonia, level_table=None)}.items():
-    levels = rotor.solve_levels(top, 3)
+    levels = rotor.api.solve_levels(top, 3)
     for j, k in LAB:
         pair = [levels.energy_mhz[levels.find(v=v, j=j, k=k)] for v in (0, 1)]
         inversion[kind, j, k] = pair[1] - pair[0]
@@ -252,7 +252,7 @@ for (j, k), seen in LAB.items():
     assert abs(seen - table) < 5e-4  # MHz: rounding of two energies of the table
     assert abs(seen - alone) < 0.2  # MHz: what the file says of the constants
 
-lines = rotor.line_list(ammonia, jmax=8, temperature_k=300, range_mhz=(20e3, 27e3))
+lines = rotor.api.line_list(ammonia, jmax=8, temperature_k=300, range_mhz=(20e3, 27e3))
 up, low = lines.quanta(lines.upper), lines.quanta(lines.lower)
 assert (up[:, 0] != low[:, 0]).all()  # the dipole connects the halves of a pair and nothing else
 assert (up[:, 2] > 0).all()  # K = 0 has no pairs: protons leave one half of each
@@ -288,7 +288,7 @@ pair = rotor.Top.from_constants(
     {"A": a, "B": b, "C": b, "E[1]": energy, "A[1]": a, "B[1]": b + db, "C[1]": b + db, "G_a[0,1]": g},
     dipole_abc_debye=(1, 0, 0),
 )
-levels = rotor.solve_levels(pair, highest)
+levels = rotor.api.solve_levels(pair, highest)
 js = np.arange(6, highest + 1)
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 worst, gaps = 0.0, {}
@@ -337,7 +337,7 @@ assert all(2 * g * k <= gap < 2 * g * k + 5 for k, gap in gaps.items() if k)  # 
 
 # %%
 formamide = rotor.read("formamide")
-plain = rotor.line_list(formamide, jmax=4, temperature_k=20, min_lgint=None, range_mhz=(1.0, 1e7))
+plain = rotor.api.line_list(formamide, jmax=4, temperature_k=20, min_lgint=None, range_mhz=(1.0, 1e7))
 split, quanta = components(formamide, 4, temperature_k=20)
 keys = [(upper[:-1], lower[:-1]) for upper, lower in quanta]
 own = zip(plain.quanta(plain.upper).tolist(), plain.quanta(plain.lower).tolist(), strict=True)
@@ -351,7 +351,7 @@ for row, (upper, lower) in enumerate(own):
 ratios, moved, brightness = map(np.array, (ratios, moved, brightness))
 q = {
     temperature: [
-        rotor.partition_function(formamide, temperature, effects=rotor.effects_of(formamide, hyperfine)).q
+        rotor.api.partition_function(formamide, temperature, effects=rotor.api.effects_of(formamide, hyperfine)).q
         for hyperfine in (False, True)
     ]
     for temperature in (5, 20, 100)

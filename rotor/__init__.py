@@ -1,197 +1,106 @@
 """Molecular rotation: a molecule goes in, a rotational spectrum comes out.
 
     import rotor
-    top = rotor.read("water")
-    lines = rotor.line_list(top, temperature_k=300, jmax=20)
-    rotor.write(lines, "water.cat")
-    rotor.plot(lines)
+    spectrum = rotor.spectrum("water", temperature_k=100)
+    spectrum.table.strongest(5)
+    spectrum.errors
+    spectrum.write("water.cat")
+    spectrum.plot()
 
-Functions of a top take whatever `rotor.read` takes instead: `rotor.line_list("water")`. The public names stand below. They
-are loaded when first used, so that `import rotor` does no work.
+Every verb of the command line is a function whose keyword arguments are numbers in the unit of the argument, or texts with a unit.
+The building blocks behind them are in `rotor.api`. Names are loaded when they are first used, so that `import rotor` does no work.
 """
 
-from collections.abc import Callable, Iterable
-from functools import cache, wraps
+from collections.abc import Iterable
 from importlib import import_module
-from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from rotor.version import version
 
 if TYPE_CHECKING:
-    from rotor.alignment.align import AlignmentTrace as AlignmentTrace
-    from rotor.alignment.align import align as align
-    from rotor.alignment.request import AlignRequest as AlignRequest
-    from rotor.alignment.request import answer_align as answer_align
+    from rotor.calls import Result as Result
     from rotor.classical.free.free_motion import FreeMotion as FreeMotion
-    from rotor.classical.free.free_motion import free_motion as free_motion
-    from rotor.classical.tumble import TumbleRequest as TumbleRequest
-    from rotor.classical.tumble import answer_tumble as answer_tumble
-    from rotor.fluids.request import FluidRequest as FluidRequest
-    from rotor.fluids.request import NewBox as NewBox
-    from rotor.fluids.request import answer_fluid as answer_fluid
     from rotor.formats import read as read
     from rotor.formats import write as write
-    from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
-    from rotor.molecules.optimise import refine as refine
     from rotor.plots.show import plot as plot
-    from rotor.quantum.effects.of_top import effects_of as effects_of
-    from rotor.quantum.effects.stark import stark_map as stark_map
-    from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
-    from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
-    from rotor.quantum.fields.stark_request import answer_stark as answer_stark
-    from rotor.quantum.fields.zeeman_request import ZeemanRequest as ZeemanRequest
-    from rotor.quantum.fields.zeeman_request import answer_zeeman as answer_zeeman
     from rotor.quantum.levels import Levels as Levels
-    from rotor.quantum.request import LevelsRequest as LevelsRequest
-    from rotor.quantum.request import answer_levels as answer_levels
-    from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.requests.budget import ErrorBudget as ErrorBudget
     from rotor.scenes.plan import plan_of as plan_of
     from rotor.scenes.run import run_scene as run_scene
     from rotor.scenes.scene_file import read_scene as read_scene
     from rotor.scenes.scene_file import write_scene as write_scene
     from rotor.scenes.sweep import run_sweep as run_sweep
-    from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
-    from rotor.spectra.emission_request import answer_emission as answer_emission
     from rotor.spectra.lines import Lines as Lines
-    from rotor.spectra.lines import line_list as line_list
-    from rotor.spectra.raman import RamanLines as RamanLines
-    from rotor.spectra.raman import raman_lines as raman_lines
-    from rotor.spectra.raman_request import RamanRequest as RamanRequest
-    from rotor.spectra.raman_request import answer_raman as answer_raman
-    from rotor.spectra.request import GasLayer as GasLayer
-    from rotor.spectra.request import SpectrumRequest as SpectrumRequest
-    from rotor.spectra.request import answer_spectrum as answer_spectrum
     from rotor.spectra.spectrum import Spectrum as Spectrum
-    from rotor.thermodynamics import VibrationalStates as VibrationalStates
-    from rotor.thermodynamics import partition_function as partition_function
-    from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
-    from rotor.thermodynamics.classical_gas import GasRequest as GasRequest
-    from rotor.thermodynamics.classical_gas import answer_gas as answer_gas
-    from rotor.thermodynamics.request import ThermoRequest as ThermoRequest
-    from rotor.thermodynamics.request import answer_thermo as answer_thermo
-    from rotor.thermodynamics.thermal_tumble import thermal_tumble as thermal_tumble
     from rotor.tops.constants import Constants as Constants
     from rotor.tops.spins.spin_constants import SpinConstants as SpinConstants
     from rotor.tops.states.state_constants import StateConstants as StateConstants
     from rotor.tops.top import Top as Top
 
+VERBS = ("spectrum", "levels", "raman", "thermo", "gas", "stark", "zeeman")  # each a function of that name
+
 _MODULES = {
-    "AlignRequest": "rotor.alignment.request",
-    "AlignmentTrace": "rotor.alignment.align",
+    "ErrorBudget": "rotor.requests.budget",
+    "Result": "rotor.calls",
     "Constants": "rotor.tops.constants",
-    "FluidRequest": "rotor.fluids.request",
     "FreeMotion": "rotor.classical.free.free_motion",
-    "GasLayer": "rotor.spectra.request",
-    "GasRequest": "rotor.thermodynamics.classical_gas",
     "Levels": "rotor.quantum.levels",
-    "LevelsRequest": "rotor.quantum.request",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
-    "NewBox": "rotor.fluids.request",
-    "RamanLines": "rotor.spectra.raman",
-    "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
-    "EmissionRequest": "rotor.spectra.emission_request",
     "SpinConstants": "rotor.tops.spins.spin_constants",
     "StateConstants": "rotor.tops.states.state_constants",
-    "SpectrumRequest": "rotor.spectra.request",
-    "StarkRequest": "rotor.quantum.fields.stark_request",
-    "ThermoRequest": "rotor.thermodynamics.request",
     "Top": "rotor.tops.top",
-    "TumbleRequest": "rotor.classical.tumble",
-    "VibrationalStates": "rotor.thermodynamics",
-    "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
-    "align": "rotor.alignment.align",
-    "answer_align": "rotor.alignment.request",
-    "answer_fluid": "rotor.fluids.request",
-    "answer_gas": "rotor.thermodynamics.classical_gas",
-    "answer_levels": "rotor.quantum.request",
-    "answer_raman": "rotor.spectra.raman_request",
-    "answer_emission": "rotor.spectra.emission_request",
-    "answer_spectrum": "rotor.spectra.request",
-    "answer_stark": "rotor.quantum.fields.stark_request",
-    "answer_thermo": "rotor.thermodynamics.request",
-    "answer_tumble": "rotor.classical.tumble",
-    "answer_zeeman": "rotor.quantum.fields.zeeman_request",
-    "effects_of": "rotor.quantum.effects.of_top",
-    "free_motion": "rotor.classical.free.free_motion",
-    "line_list": "rotor.spectra.lines",
-    "partition_function": "rotor.thermodynamics",
     "plot": "rotor.plots.show",
     "plan_of": "rotor.scenes.plan",
-    "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
     "read_scene": "rotor.scenes.scene_file",
-    "refine": "rotor.molecules.optimise",
     "run_scene": "rotor.scenes.run",
     "run_sweep": "rotor.scenes.sweep",
-    "solve_levels": "rotor.quantum.solve",
-    "stark_map": "rotor.quantum.effects.stark",
-    "stream_lines": "rotor.formats.streamed_lines",
-    "thermal_tumble": "rotor.thermodynamics.thermal_tumble",
-    "thermodynamic_functions": "rotor.thermodynamics",
     "write": "rotor.formats",
     "write_scene": "rotor.scenes.scene_file",
-    "zeeman_map": "rotor.quantum.effects.zeeman",
 }
 
-_OF_TOPS = frozenset(
-    {
-        "align", "effects_of", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
-        "thermal_tumble", "thermodynamic_functions", "zeeman_map",
-    }
-)  # fmt: skip  # functions whose first argument is a top
-
-__all__ = [*sorted(_MODULES), "__version__"]
+__all__ = [*sorted([*_MODULES, *VERBS]), "__version__", "api"]
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return version()
+    if name in VERBS:
+        from rotor.calls import function_of
+
+        return function_of(name)
+    if name == "api":
+        return import_module("rotor.api")
     if name in _MODULES:
-        found = getattr(import_module(_MODULES[name]), name)
-        return _taking_words(found) if name in _OF_TOPS else found
-    raise AttributeError(f"module 'rotor' has no attribute {name!r}{_near(name, _MODULES)}")
+        return getattr(import_module(_MODULES[name]), name)
+    if name.startswith("_"):
+        raise AttributeError(f"module 'rotor' has no attribute {name!r}")
+    return _moved(name)
 
 
-@cache
-def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function of a top, given a top or whatever `read` makes one of."""
+def _moved(name: str) -> Any:
+    """A name that has left for `rotor.api`, with a warning; AttributeError for others."""
+    from rotor import api
 
-    @wraps(function)
-    def call(top: Any, *args: Any, **options: Any) -> Any:
-        from rotor.formats import read
-        from rotor.tops.top import Top
+    if name not in api.MODULES:
+        raise AttributeError(f"module 'rotor' has no attribute {name!r}{_near(name, [*__all__, *api.MODULES])}")
+    import warnings
 
-        _refuse_arguments(function, (top, *args), options)
-        found = top if isinstance(top, Top) else read(top)
-        if not isinstance(found, Top):
-            raise ValueError(f"{top}: holds a {type(found).__name__}, not a molecule or constants")
-        return function(found, *args, **options)
-
-    return call
-
-
-def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
-    """TypeError, with the names that would do, for arguments that the function does not take."""
-    taken = signature(function)
-    try:
-        taken.bind(*args, **options)
-    except TypeError as error:
-        unknown = next((name for name in options if name not in taken.parameters), None)
-        names = [name for name in taken.parameters if name not in ("top", *options)]
-        which = _near(unknown, names) if unknown else ""
-        raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None
+    warnings.warn(
+        f"rotor.{name} is rotor.api.{name} from version 0.3 on; see docs/migration.md", DeprecationWarning, stacklevel=3
+    )
+    return getattr(api, name)
 
 
 def _near(name: str, known: Iterable[str]) -> str:
-    """The names that are like one that is not known, as the end of a message."""
+    """The names that are like an unknown one, as the end of a message."""
     from difflib import get_close_matches
 
-    found = get_close_matches(name, known, n=3)
-    return f"; did you mean {', '.join(found)}?" if found else ""
+    matches = get_close_matches(name, known, n=3)
+    return f"; did you mean {', '.join(matches)}?" if matches else ""
 
 
 def __dir__() -> list[str]:

@@ -14,27 +14,31 @@ from rotor.cli.shared import process
 
 @pytest.fixture(scope="module")
 def lines():
-    return rotor.line_list("CO", jmax=3)
+    return rotor.api.line_list("CO", jmax=3)
 
 
 @pytest.mark.parametrize(
     ("call", "kind", "said"),
     [
-        (lambda: rotor.line_list("CO", temperature=300), TypeError, "did you mean temperature_k"),
-        (lambda: rotor.line_list("CO", 300), TypeError, "by name it takes temperature_k, jmax"),
+        (lambda: rotor.api.line_list("CO", temperature=300), TypeError, "did you mean temperature_k"),
+        (lambda: rotor.api.line_list("CO", 300), TypeError, "by name it takes temperature_k, jmax"),
         (lambda: rotor.lines_list, AttributeError, "did you mean line_list"),
-        (lambda: rotor.line_list("CO", temperature_k="300 K"), ValueError, "temperature_k: '300 K': expected a number"),
-        (lambda: rotor.line_list("CO", jmax=2.5), ValueError, "jmax: 2.5: expected a whole number"),
         (
-            lambda: rotor.line_list("CO", jmax=3, range_mhz=(5, 1)),
+            lambda: rotor.api.line_list("CO", temperature_k="300 K"),
+            ValueError,
+            "temperature_k: '300 K': expected a number",
+        ),
+        (lambda: rotor.api.line_list("CO", jmax=2.5), ValueError, "jmax: 2.5: expected a whole number"),
+        (
+            lambda: rotor.api.line_list("CO", jmax=3, range_mhz=(5, 1)),
             ValueError,
             "range_mhz: 5 to 1 MHz: expected a range",
         ),
-        (lambda: rotor.line_list("CO", min_lgint=float("nan")), ValueError, "min_lgint: nan"),
-        (lambda: rotor.line_list(""), ValueError, "an empty text names no molecule"),
-        (lambda: rotor.SpectrumRequest("CO"), ValueError, "top: 'CO': expected a Top; rotor.read"),
-        (lambda: rotor.GasRequest("CO"), ValueError, "top: 'CO': expected a Top; rotor.read"),
-        (lambda: rotor.LevelsRequest(rotor.read("CO"), jmax="5"), ValueError, "jmax: '5': expected a whole number"),
+        (lambda: rotor.api.line_list("CO", min_lgint=float("nan")), ValueError, "min_lgint: nan"),
+        (lambda: rotor.api.line_list(""), ValueError, "an empty text names no molecule"),
+        (lambda: rotor.api.SpectrumRequest("CO"), ValueError, "top: 'CO': expected a Top; rotor.read"),
+        (lambda: rotor.api.GasRequest("CO"), ValueError, "top: 'CO': expected a Top; rotor.read"),
+        (lambda: rotor.api.LevelsRequest(rotor.read("CO"), jmax="5"), ValueError, "jmax: '5': expected a whole number"),
     ],
 )
 def test_a_wrong_argument_is_named(call, kind, said):
@@ -59,7 +63,7 @@ def test_threads_agree():
 
     def work(first: int) -> dict[str, bytes]:
         order = names[first:] + names[:first]
-        return {name: rotor.line_list(name, jmax=4).columns["lgint"].tobytes() for name in order}
+        return {name: rotor.api.line_list(name, jmax=4).columns["lgint"].tobytes() for name in order}
 
     switch = sys.getswitchinterval()
     sys.setswitchinterval(1e-5)

@@ -43,7 +43,7 @@ def linear_band(top: Top, grid, fwhm, correction="harmonic", temperature_k=300.0
 def test_the_area_of_a_rigid_band_is_a_number(name, temperature_k):
     """Double commutator against the sum over all lines, spin weights and all; the cut leaves out 1e-6."""
     top = rigid(rotor.read(name))
-    lines = rotor.line_list(top, temperature_k=temperature_k, min_lgint=-14)
+    lines = rotor.api.line_list(top, temperature_k=temperature_k, min_lgint=-14)
     assert lines_area(lines) == pytest.approx(dipole_band_area(top), rel=3e-6, abs=0)
 
 
@@ -90,13 +90,13 @@ def test_egelstaffs_time_is_shifted():
 def test_ocs_at_300_k_over_its_lines():
     """No random numbers: the closed classical band against the quantum lines, smoothed alike, 2 cm-1."""
     grid = np.linspace(0, 120, 1201) * CM
-    quantum = Spectrum.from_lines(rotor.line_list(OCS, temperature_k=300, min_lgint=-14), grid, fwhm_mhz=2 * CM)
+    quantum = Spectrum.from_lines(rotor.api.line_list(OCS, temperature_k=300, min_lgint=-14), grid, fwhm_mhz=2 * CM)
     beside = compare_bands(linear_band(OCS, grid, 2 * CM), quantum)
     assert beside.area == pytest.approx(1.0, abs=1e-4)  # the cut of the lines and the end of the grid
     assert beside.mean == pytest.approx(1.0, abs=2e-3)  # hB/kT = 1e-3
     assert beside.largest < 5e-4  # (hB/kT) of 1e-3, smoothed
     few = np.linspace(0, 12, 1201) * CM  # at 0.6 K, hB/kT = ½, four levels are there
-    lines = rotor.line_list(OCS, temperature_k=0.6, min_lgint=-14)
+    lines = rotor.api.line_list(OCS, temperature_k=0.6, min_lgint=-14)
     cold = compare_bands(linear_band(OCS, few, CM, temperature_k=0.6), Spectrum.from_lines(lines, few, fwhm_mhz=CM))
     assert cold.largest > 0.03
 
@@ -105,7 +105,7 @@ def test_water_agrees_at_300_k_and_parts_at_30_k():
     found = {}
     for temperature_k, fwhm, end in ((300.0, 60.0, 900.0), (30.0, 20.0, 400.0)):
         grid = np.linspace(0, end, 901) * CM
-        lines = rotor.line_list(WATER, temperature_k=temperature_k, min_lgint=-14)
+        lines = rotor.api.line_list(WATER, temperature_k=temperature_k, min_lgint=-14)
         quantum = Spectrum.from_lines(lines, grid, fwhm_mhz=fwhm * CM)
         gas = {"temperature_k": temperature_k, "molecules": 50_000, "rng": np.random.default_rng(2)}
         found[temperature_k] = compare_bands(classical_band(WATER, grid, fwhm_mhz=fwhm * CM, **gas), quantum)
@@ -157,7 +157,7 @@ def test_spectra_on_different_grids_are_not_compared():
 def test_ocs_at_0_6_k_in_the_limit_of_narrow_smoothing():
     """The figures of docs/gas.md: smoothed to 1 cm-1 a part of the lowest line, at 0.4 cm-1, falls below ν = 0."""
     grid = np.linspace(0, 12, 4801) * CM
-    lines = rotor.line_list(OCS, temperature_k=0.6, min_lgint=-14)
+    lines = rotor.api.line_list(OCS, temperature_k=0.6, min_lgint=-14)
     beside = compare_bands(
         linear_band(OCS, grid, 0.05 * CM, temperature_k=0.6), Spectrum.from_lines(lines, grid, fwhm_mhz=0.05 * CM)
     )

@@ -55,7 +55,7 @@ def test_water_has_its_lines(call):
     assert err.count("\n") == 1
     assert out.splitlines()[0] == "water, H2O: asymmetric top (κ = -0.4367)"
     top = rotor.read("water")
-    lines = rotor.line_list(top)
+    lines = rotor.api.line_list(top)
     for name, beginning in (
         ("constants", "A 835852.4057, B 435264.025, C 278212.2207 MHz, and "),
         ("dipole", "μa 0, μb 1.8507, μc 0 D"),
@@ -101,7 +101,7 @@ def test_info_of_water(call):
     rows = {row.split()[0]: row.split()[1:] for row in out.splitlines() if row.strip()}
     assert float(rows["A"][0]) == pytest.approx(835852.4057, abs=1e-4)  # the library has more digits than its error
     assert rows["A"][1] == "0.26"
-    q = rotor.partition_function(rotor.read("water"), 300.0)
+    q = rotor.api.partition_function(rotor.read("water"), 300.0)
     assert rows["300"][0] == f"{q.q:.6g}"
     assert "the geometry is asymmetric by Ia/Ic = 0.348" in re.sub(r"\s+", " ", out)
     assert len([row for row in out.splitlines() if re.match(r" *(100|300) ", row)]) == 2
@@ -253,7 +253,7 @@ def test_json_has_the_documented_keys(call, verb, keys, source):
 
 def test_json_lines_are_those_of_the_list(call):
     _, out, _ = call("spectrum", "water", "--jmax", "4", "--top", "3", "--json", "-")
-    content, lines = json.loads(out), rotor.line_list(rotor.read("water"), jmax=4)
+    content, lines = json.loads(out), rotor.api.line_list(rotor.read("water"), jmax=4)
     assert content["line_count"] == len(lines) == len(content["lines"])
     assert list(content["lines"][0]) == list(lines.columns)
     for name, column in lines.columns.items():
@@ -562,7 +562,7 @@ def test_hitran_records_are_written(call, tmp_path):
     assert call("spectrum", "CO", "--hitran", "co.hitran", "--hitran-id", "5:1", "--jmax", "20")[0] == 0
     found = rotor.read(str(tmp_path / "co.hitran"))
     assert set(found.molecule.tolist()) == {5}
-    lines = rotor.line_list(rotor.read("CO"), temperature_k=296, jmax=20)
+    lines = rotor.api.line_list(rotor.read("CO"), temperature_k=296, jmax=20)
     assert found.wavenumber_cm == pytest.approx(lines.frequency_mhz / 29979.2458, abs=6e-7)  # six decimals
     for extra in (("--hitran-id", "x"), ("--hitran-id", "5", "--temperature", "300"), ()):
         code, _, err = call("spectrum", "CO", "--hitran", "b.hitran", *extra)

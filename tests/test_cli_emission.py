@@ -26,7 +26,7 @@ def test_a_thin_line_has_the_area_of_the_closed_form(call):
     code, out, err = call(*THIN, "--json", "-")
     assert (code, err) == (0, "")
     (line,) = json.loads(out)["lines"]
-    mhz, q = line["frequency_mhz"], rotor.partition_function(rotor.read("CO"), 20.0).q
+    mhz, q = line["frequency_mhz"], rotor.api.partition_function(rotor.read("CO"), 20.0).q
     photon = H_OVER_K * mhz / 20.0
     depth_m_per_s = (
         2.99792458e8**3 / (8 * math.pi * (mhz * 1e6) ** 3) * line["einstein_a_per_s"] * line["g_upper"] * 1e17 / q

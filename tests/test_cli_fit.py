@@ -77,7 +77,7 @@ def test_the_covariance_reaches_the_errors_of_predicted_lines(call, folder):
     assert file.covariance.names == ("B", "D", "H")
     assert abs(file.covariance.correlations[1, 2]) > 0.9
     top = rotor.read(str(folder / "new.toml")).with_dipole((0.11, 0, 0), "a test")
-    lines = rotor.line_list(top, jmax=30, min_lgint=None)
+    lines = rotor.api.line_list(top, jmax=30, min_lgint=None)
     alone = math.sqrt(
         sum((s * d) ** 2 for s, d in zip(file.constants.uncertainties.values(), (60, -4 * 30**3, 0), strict=True))
     )

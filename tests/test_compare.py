@@ -125,7 +125,7 @@ def test_a_catalogue_with_quadrupole_splitting_meets_an_unsplit_prediction(share
     reference = read_cat(shared / "reference" / "library_lines" / "c052009.cat.gz")  # 6438 components of CH3-37Cl
     # round constants that its own lines of low J and K give
     top = rotor.Top.from_constants("A=156051.5 B=13088.168 DJ=0.01753 DJK=0.1937 MHz", dipole_abc_debye=(1.9, 0, 0))
-    ours = catalogue(rotor.line_list(top, jmax=82, min_lgint=-99.0, untrusted=True))
+    ours = catalogue(rotor.api.line_list(top, jmax=82, min_lgint=-99.0, untrusted=True))
     found = compare(reference, ours)
     assert found.collapsed
     assert (len(found.of_ours), len(found.missing)) == (1186, 0)  # every line of the catalogue has its partner
@@ -141,7 +141,7 @@ def test_the_temperature_of_intensities_is_found():
     import rotor
 
     top = rotor.read("OCS")
-    cold, warm = (catalogue(rotor.line_list(top, temperature_k=t, jmax=40, min_lgint=-20.0)) for t in (75.0, 300.0))
+    cold, warm = (catalogue(rotor.api.line_list(top, temperature_k=t, jmax=40, min_lgint=-20.0)) for t in (75.0, 300.0))
     assert likely_temperature_k(compare(cold, warm), 300.0) == pytest.approx(75.0, rel=0.011)  # steps of 1 %
     assert likely_temperature_k(compare(warm, warm), 300.0) == pytest.approx(300.0, rel=0.011)
     assert np.isnan(likely_temperature_k(compare(cold.take([0]), warm), 300.0))

@@ -70,9 +70,9 @@ def test_a_wrong_value_is_one_line(call, folder, verb, text, said):
 def test_a_cut_that_no_intensity_has(cut, tmp_path):
     top = rotor.read("CO")
     calls = [
-        lambda: rotor.line_list(top, min_lgint=cut),
-        lambda: rotor.SpectrumRequest(top, min_lgint=cut),
-        lambda: rotor.stream_lines(top, tmp_path / "a.cat", min_lgint=cut),
+        lambda: rotor.api.line_list(top, min_lgint=cut),
+        lambda: rotor.api.SpectrumRequest(top, min_lgint=cut),
+        lambda: rotor.api.stream_lines(top, tmp_path / "a.cat", min_lgint=cut),
     ]
     for make in calls:
         with pytest.raises(ValueError, match=r"min_lgint: .*expected a (number|finite number)"):

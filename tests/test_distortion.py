@@ -161,7 +161,7 @@ def test_the_levels_of_the_unreduced_hamiltonian_come_back(reduction, representa
     worst = []
     for epsilon in (1e-2, 1e-3):
         scaled = full.replace(**{n: v * epsilon for n, v in full.values.items() if n not in "ABC"})
-        ours = rotor.solve_levels(rotor.Top.from_constants(scaled), 6)
+        ours = rotor.api.solve_levels(rotor.Top.from_constants(scaled), 6)
         found = {j: np.sort(ours.energy_mhz[ours.quanta["j"] == j]) for j in range(1, 7)}
         rows, misses = [], []
         for j in range(1, 7):

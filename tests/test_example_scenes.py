@@ -289,5 +289,5 @@ def test_scene(folder, name):
 
 def test_the_same_numbers_without_a_scene(folder):
     lines = run_scene(read_scene(FOLDER / "cyanoacetylene.toml"), folder=FOLDER).table
-    direct = rotor.line_list(rotor.read("HC3N"), temperature_k=30.0, range_mhz=(0.0, 300e3))
+    direct = rotor.api.line_list(rotor.read("HC3N"), temperature_k=30.0, range_mhz=(0.0, 300e3))
     assert np.array_equal(lines.frequency_mhz, direct.frequency_mhz)

@@ -193,7 +193,7 @@ FREE = ["A", "B", "C", "chi_aa(35Cl)", "chi_bb-cc(35Cl)"]
 def chloride(folder: Path) -> Path:
     (folder / "start.toml").write_text(CHLORIDE)
     top = rotor.read("start.toml")
-    lines = line_list(top, effects=rotor.effects_of(top, True), jmax=4, min_lgint=-9.0, q=1.0)
+    lines = line_list(top, effects=rotor.api.effects_of(top, True), jmax=4, min_lgint=-9.0, q=1.0)
     quanta, names = lines.levels.quanta, ("n", "ka", "kc", "f")
 
     def labels(row: int) -> list[str]:

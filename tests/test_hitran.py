@@ -58,7 +58,7 @@ def test_intensities_of_the_two_databases():
 
 def test_lines_of_co_are_those_of_hitran(tmp_path):
     """J = 2 - 1 of 12C16O, whose abundance HITRAN has as 0.986544: frequency, S, A, E″, weights and labels."""
-    lines = rotor.line_list(rotor.read("CO"), temperature_k=296.0, jmax=30)
+    lines = rotor.api.line_list(rotor.read("CO"), temperature_k=296.0, jmax=30)
     rotor.write(lines, tmp_path / "co.hitran", settings={"molecule": 5, "isotopologue": 1, "abundance": 0.986544})
     made, theirs = rotor.read(tmp_path / "co.hitran").record(1), read_hitran(SAMPLE).record(9)
     assert made["wavenumber_cm"] == pytest.approx(theirs["wavenumber_cm"], abs=1.1e-6)  # print
@@ -72,17 +72,17 @@ def test_lines_of_co_are_those_of_hitran(tmp_path):
 
 
 def test_labels_of_other_tops():
-    water = hitran_lines(rotor.line_list(rotor.read("H2O"), temperature_k=296.0, jmax=2), molecule=1)
+    water = hitran_lines(rotor.api.line_list(rotor.read("H2O"), temperature_k=296.0, jmax=2), molecule=1)
     assert water.local_upper[0] == "  1  1  0      "
     assert water.local_lower[0] == "  1  0  1      "
     assert water.global_upper[0].strip() == "GROUND"
     assert (np.diff(water.wavenumber_cm) >= 0).all()
-    cyanide = hitran_lines(rotor.line_list(rotor.read("CH3CN"), temperature_k=296.0, jmax=2), molecule=41)
+    cyanide = hitran_lines(rotor.api.line_list(rotor.read("CH3CN"), temperature_k=296.0, jmax=2), molecule=41)
     assert sorted(cyanide.local_upper) == ["  1  0         ", "  2  0         ", "  2  1         "]
 
 
 def test_inversion_states_are_called_by_their_names():
-    lines = rotor.line_list(rotor.read("NH3"), temperature_k=296.0, jmax=2)
+    lines = rotor.api.line_list(rotor.read("NH3"), temperature_k=296.0, jmax=2)
     found = hitran_lines(lines, molecule=11)
     pairs = set(zip(map(str.strip, found.global_upper), map(str.strip, found.global_lower), strict=True))
     assert pairs == {("0-", "0+"), ("0+", "0-")}
@@ -113,14 +113,14 @@ def test_what_has_no_place_in_a_record_is_refused():
 
 
 def test_what_is_no_list_for_hitran_is_refused(tmp_path):
-    lines = rotor.line_list(rotor.read("CO"), jmax=3)
+    lines = rotor.api.line_list(rotor.read("CO"), jmax=3)
     with pytest.raises(ValueError, match="296 K, the list was made for 300 K"):
         hitran_lines(lines, molecule=5)
-    at_296 = rotor.line_list(rotor.read("CO"), jmax=3, temperature_k=296.0)
+    at_296 = rotor.api.line_list(rotor.read("CO"), jmax=3, temperature_k=296.0)
     with pytest.raises(ValueError, match="number of the molecule"):
         rotor.write(at_296, tmp_path / "co.hitran")
     split = rotor.read("CH3Cl")
-    split = rotor.line_list(split, jmax=2, temperature_k=296.0, effects=effects_of(split, True))
+    split = rotor.api.line_list(split, jmax=2, temperature_k=296.0, effects=effects_of(split, True))
     with pytest.raises(ValueError, match="lines split by spins"):  # F = 5/2 has no place among whole numbers
         hitran_lines(split, molecule=24)
     with pytest.raises(ValueError, match=r"abundance 1\.2"):

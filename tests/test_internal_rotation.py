@@ -159,7 +159,7 @@ def test_without_a_barrier_the_top_turns_freely(sigma):
 
 
 def test_behind_a_high_barrier_a_symmetric_top_is_rigid():
-    rigid = rotor.solve_levels(rotor.Top.from_constants("A=9000 B=4000 MHz"), 4)
+    rigid = rotor.api.solve_levels(rotor.Top.from_constants("A=9000 B=4000 MHz"), 4)
     ram = RamModel({"A": 9000.0, "B": 4000.0, "C": 4000.0, "F": 160e3, "rho": 0.1, "V3": 160e3 * 600})
     for sigma in (0, 1):
         levels = solved(ram, sigma, 4, 0, count=7, waves=18)
@@ -175,7 +175,7 @@ def test_behind_a_high_barrier_a_symmetric_top_is_rigid():
 def test_an_asymmetric_top_becomes_rigid_as_the_root_of_the_barrier():
     """⟨K±2|K⟩ overlaps of the torsion differ from 1 by terms of order ρ² √(F/V3): the slope is -1/2."""
     constants = {"A": 9000.0, "B": 5000.0, "C": 3000.0}
-    rigid = rotor.solve_levels(rotor.Top.from_constants(constants), 3)
+    rigid = rotor.api.solve_levels(rotor.Top.from_constants(constants), 3)
     barriers, errors = [1e3, 4e3, 16e3], []
     for ratio in barriers:
         levels = solved(RamModel(constants | {"F": 160e3, "rho": 0.1, "V3": 160e3 * ratio}), 0, 3, 0, count=7, waves=24)
@@ -211,7 +211,7 @@ def acetaldehyde(**settings):
 
 
 def test_levels_of_a_top_have_species_and_torsional_states():
-    levels = rotor.solve_levels(acetaldehyde(), 4)
+    levels = rotor.api.solve_levels(acetaldehyde(), 4)
     assert levels.quanta_names == ("species", "vt", "j", "ka", "kc")
     assert len(levels) == 2 * 2 * 25  # every (J, Ka, Kc) once in A and E, v_t = 0 and 1
     assert len({tuple(row) for row in zip(*levels.quanta.values(), strict=True)}) == len(levels)
@@ -223,8 +223,8 @@ def test_levels_of_a_top_have_species_and_torsional_states():
 def test_strengths_obey_the_sum_rule_over_all_torsional_states():
     """Σ S over the lines of a level is (2J + 1) μ² times its components, with all torsional functions kept."""
     top = acetaldehyde(vt_max=18, functions=20)
-    levels = rotor.solve_levels(top, 3)
-    lines = rotor.line_list(top, jmax=3, min_lgint=None, q=1.0)
+    levels = rotor.api.solve_levels(top, 3)
+    lines = rotor.api.line_list(top, jmax=3, min_lgint=None, q=1.0)
     total = np.zeros(len(levels))
     np.add.at(total, lines.upper, lines.strength_debye2)
     np.add.at(total, lines.lower, lines.strength_debye2)
@@ -246,7 +246,7 @@ def test_strengths_obey_the_sum_rule_over_all_torsional_states():
 
 
 def test_lines_of_both_species_come_close_behind_a_high_barrier():
-    lines = rotor.line_list(acetaldehyde(), jmax=2, q=1.0, min_lgint=None)
+    lines = rotor.api.line_list(acetaldehyde(), jmax=2, q=1.0, min_lgint=None)
     upper, lower = (lines.levels.quanta_columns(rows, "") for rows in (lines.upper, lines.lower))
     same = (upper["vt_"] == 0) & (lower["vt_"] == 0) & (upper["j_"] == 1) & (lower["j_"] == 0) & (upper["ka_"] == 0)
     frequencies = dict(zip(upper["species_"][same].tolist(), lines.frequency_mhz[same].tolist(), strict=True))
@@ -255,8 +255,8 @@ def test_lines_of_both_species_come_close_behind_a_high_barrier():
 
 
 def test_partition_function_counts_torsional_states():
-    cold = rotor.partition_function(acetaldehyde(), 5.0)
-    rigid = rotor.partition_function(rotor.Top.from_constants("A=56.5 B=10.46 C=9.1 GHz"), 5.0)
+    cold = rotor.api.partition_function(acetaldehyde(), 5.0)
+    rigid = rotor.api.partition_function(rotor.Top.from_constants("A=56.5 B=10.46 C=9.1 GHz"), 5.0)
     assert cold.q == pytest.approx(
         2 * rigid.q, rel=0.06
     )  # A and E weigh alike, E lies 2 GHz above A, the axes are others
@@ -275,4 +275,6 @@ def test_wrong_constants_are_refused():
     top = acetaldehyde()
     spins = rotor.Top.from_constants("A=9 B=4 C=3 GHz", spin_constants="chi_aa(14N)=-4 MHz")
     with pytest.raises(ValueError, match="not computed together"):
-        rotor.solve_levels(top, 2, effects=(*rotor.effects_of(top, False), *rotor.effects_of(spins, True)[2:]))
+        rotor.api.solve_levels(
+            top, 2, effects=(*rotor.api.effects_of(top, False), *rotor.api.effects_of(spins, True)[2:])
+        )

@@ -76,7 +76,7 @@ def test_a_plan_says_where_the_distortion_series_ends():
 @pytest.mark.parametrize("name", ["H2CO", "SO2", "water", "HCONH2", "CH2CHCN"])
 def test_the_shift_of_an_asymmetric_top_in_a_stray_field(name):
     top = rotor.read(name)
-    found = rotor.stark_map(top, [0.0, 1e-3], j_highest=1, m_values=(1,), tolerance_mhz=1e-6)
+    found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=1, m_values=(1,), tolerance_mhz=1e-6)
     energy = found.energy_mhz.reshape(-1, 2)  # both fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
     assert 1 / 3 < left_out.stray_field(top).size / shift < 3  # the other levels of J = 0 and 2 are left out

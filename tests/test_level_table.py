@@ -44,7 +44,7 @@ def test_every_measured_line_is_where_it_was_measured(shared, name, tag, jmax):
     folders = (shared / "reference" / folder for folder in ("catalogues", "library_lines"))
     path = next(folder / f"{tag}.cat.gz" for folder in folders if (folder / f"{tag}.cat.gz").is_file())
     found = read_cat(gzip.decompress(path.read_bytes()))
-    lines = rotor.line_list(rotor.read(name), jmax=jmax, min_lgint=None, q=1.0)
+    lines = rotor.api.line_list(rotor.read(name), jmax=jmax, min_lgint=None, q=1.0)
     ends = [
         np.stack([lines.columns[f"{n}_{end}"] for n in ("j", "ka", "kc")], axis=1).tolist()
         for end in ("upper", "lower")
@@ -63,7 +63,7 @@ def test_every_measured_line_is_where_it_was_measured(shared, name, tag, jmax):
 @pytest.mark.parametrize("name", ["water", "D2O", "HDO"])
 def test_lines_of_a_tabulated_molecule_are_between_tabulated_levels(name):
     top = rotor.read(name)
-    lines = rotor.line_list(top)
+    lines = rotor.api.line_list(top)
     assert top.level_table is not None
     for states in (lines.upper, lines.lower):
         labels = {label: lines.levels.quanta[label][states] for label in ("j", "ka", "kc")}
@@ -71,11 +71,11 @@ def test_lines_of_a_tabulated_molecule_are_between_tabulated_levels(name):
     assert not any("does not converge" in text for text in lines.warnings)
     assert any("left out" in text for text in lines.warnings) == (lines.untrusted > 0)
     given = top.with_constants(top.constants)  # without the table
-    assert any("does not converge" in text for text in rotor.line_list(given).warnings)
+    assert any("does not converge" in text for text in rotor.api.line_list(given).warnings)
 
 
 def test_lines_between_tabulated_levels_have_no_error_of_the_constants():
-    lines = rotor.line_list("water", jmax=3)
+    lines = rotor.api.line_list("water", jmax=3)
     assert lines.error_mhz is None
     assert lines.errors_from == "none: the energies are from a table"
-    assert rotor.line_list("SO2", jmax=3).errors_from.startswith("covariance of A, B, C")
+    assert rotor.api.line_list("SO2", jmax=3).errors_from.startswith("covariance of A, B, C")

@@ -125,7 +125,7 @@ def test_levels_of_an_asymmetric_top_are_those_of_wang_blocks(real):
     blocks = linear_blocks(functions(30, real), terms)
     energies = blocks.energies(values)
     assert len(np.unique(blocks.block)) == (120 if real else 61)  # Wang blocks, none empty; even and odd K otherwise
-    levels = rotor.solve_levels(rotor.Top.from_constants(CONSTANTS), 30)
+    levels = rotor.api.solve_levels(rotor.Top.from_constants(CONSTANTS), 30)
     for j in range(1, 31):
         ours = np.sort(energies[blocks.labels["J"] == j])
         theirs = np.sort(levels.energy_mhz[levels.quanta["j"] == j])
@@ -170,7 +170,7 @@ def test_two_coupled_states_are_those_of_the_engine_of_states():
     more = {"E": 9000.0, "A": 9390.0, "B": 3110.0, "C": 2490.0}
     text = " ".join(f"{name}[1]={value}" for name, value in more.items())
     top = rotor.Top.from_constants(RIGID, states=f"{text} G_c[0,1]=400 F_ab[0,1]=12 MHz")
-    levels = rotor.solve_levels(top, 12, effects=rotor.effects_of(top, False))
+    levels = rotor.api.solve_levels(top, 12, effects=rotor.api.effects_of(top, False))
 
     a, b, c = j_z(), j_x(), j_y()  # the representation Ir: z, x, y are a, b, c
     between = 1.0 * (ket_bra(1, 0) + ket_bra(0, 1))
@@ -200,7 +200,7 @@ def test_two_coupled_states_are_those_of_the_engine_of_states():
 def test_one_quadrupole_nucleus_is_that_of_the_engine_of_spins(real, more):
     values = CL | more
     top = rotor.Top.from_constants(CONSTANTS | values)
-    levels = rotor.solve_levels(top, 10, effects=rotor.effects_of(top, True))
+    levels = rotor.api.solve_levels(top, 10, effects=rotor.api.effects_of(top, True))
     space = rotation(9, {"chi": quadrupole(values, "35Cl")}, real)
     totals = range(1, 16, 2)
     solved = coupled(space, spin_space(3), {"chi": ("chi", "Q")}, {}, totals)
@@ -209,7 +209,7 @@ def test_one_quadrupole_nucleus_is_that_of_the_engine_of_spins(real, more):
 
 def test_two_nuclei_are_those_of_the_engine_of_spins():
     top = rotor.Top.from_constants(CONSTANTS | CL | N14)
-    levels = rotor.solve_levels(top, 8, effects=rotor.effects_of(top, True))
+    levels = rotor.api.solve_levels(top, 8, effects=rotor.api.effects_of(top, True))
     space = rotation(8, {"Cl": quadrupole(CL, "35Cl"), "N": quadrupole(N14, "14N")})
     first = coupled(space, spin_space(3), {"Cl": ("Cl", "Q")}, {"N": ("N", None, 2)}, range(1, 14, 2)).solve(
         {"Cl": 1.0}
@@ -232,7 +232,7 @@ def nuclear_spin_rotation(matrix):
 def test_spin_rotation_beside_a_quadrupole_is_that_of_the_engine_of_spins():
     named = {"C_aa(35Cl)": 20.0, "C_bb(35Cl)": 50.0, "C_cc(35Cl)": -30.0}
     top = rotor.Top.from_constants(CONSTANTS | CL | named)
-    levels = rotor.solve_levels(top, 8, effects=rotor.effects_of(top, True))
+    levels = rotor.api.solve_levels(top, 8, effects=rotor.api.effects_of(top, True))
     space = rotation(8, {"chi": quadrupole(CL, "35Cl"), "C": (1, nuclear_spin_rotation(np.diag([50.0, -30.0, 20.0])))})
     totals = range(1, 12, 2)
     both = coupled(space, spin_space(3), {"chi": ("chi", "Q"), "C": ("C", "I")}, {}, totals)
@@ -260,7 +260,7 @@ def test_levels_in_an_electric_field_are_those_of_stark_maps(dipole):
     space = rotation(12, {"mu": (1, body_tensor(spherical_components(dipole, 1, "Ir")))})
     strengths = [5.0, 40.0]
     for m in (0, 1, 2):
-        theirs = rotor.stark_map(top, strengths, j_highest=3, m_values=[m], jmax=12)
+        theirs = rotor.api.stark_map(top, strengths, j_highest=3, m_values=[m], jmax=12)
         blocks = field_blocks(space, 2 * m)
         assert np.iscomplexobj(blocks.values) == bool(dipole[2] and m)  # three components and M: no real functions
         for strength in strengths:
@@ -281,7 +281,7 @@ def test_a_toy_effect_of_one_operator_reaches_levels_slopes_spins_and_fields():
     toy = (float(axis[1]) * j_x() + float(axis[2]) * j_y() + float(axis[0]) * j_z()) ** 4
     top = rotor.Top.from_constants(RIGID)
     effect = AxisPower(c_mhz=2.0, axis_abc=tuple(axis.tolist()))
-    levels = rotor.solve_levels(top, 8, effects=(*rotor.effects_of(top, False), effect))
+    levels = rotor.api.solve_levels(top, 8, effects=(*rotor.api.effects_of(top, False), effect))
     terms, values = watson(RIGID)
     basis = functions(8)
     blocks = linear_blocks(basis, terms | {"toy": toy})

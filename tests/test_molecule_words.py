@@ -103,7 +103,7 @@ def test_spcat_input_is_a_top(shared):
 
 
 def co_lines():
-    return rotor.line_list(rotor.read("CO"), temperature_k=100, jmax=8)
+    return rotor.api.line_list(rotor.read("CO"), temperature_k=100, jmax=8)
 
 
 @pytest.mark.parametrize("suffix", [".cat", ".cat.gz", ".csv", ".parquet", ".json"])
@@ -137,7 +137,7 @@ def test_long_lists_are_written_in_the_same_bytes_as_short_ones(tmp_path, monkey
     from rotor.formats import line_tables
 
     top = rotor.Top.from_constants("A=9 B=5 C=3 GHz", dipole_abc_debye=(1, 1, 1))
-    lines = rotor.line_list(top, jmax=14)
+    lines = rotor.api.line_list(top, jmax=14)
     rotor.write(lines, tmp_path / "whole.cat")
     monkeypatch.setattr(line_tables, "PIECE", 700)
     rotor.write(lines, tmp_path / "pieces.cat")
@@ -181,6 +181,6 @@ def test_csv_and_parquet_hold_the_same_table(call, folder, verb):
 
 
 def test_levels_are_a_table_too(tmp_path):
-    levels = rotor.solve_levels(rotor.read("CO"), 2)
+    levels = rotor.api.solve_levels(rotor.read("CO"), 2)
     rotor.write(levels, tmp_path / "levels.json")
     assert len(json.loads((tmp_path / "levels.json").read_text())["rows"]) == len(levels) == 3

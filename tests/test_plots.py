@@ -18,7 +18,7 @@ START = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 @pytest.fixture(scope="module")
 def water():
-    return rotor.line_list(rotor.read("water"), jmax=12)
+    return rotor.api.line_list(rotor.read("water"), jmax=12)
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_the_suffix_names_the_format_and_the_same_picture_is_the_same_file(water
 @pytest.mark.parametrize("source", ["water", "CO", "CH3CN", "H2CO"])
 @pytest.mark.parametrize("fwhm", [None, 2000.0])
 def test_names_lie_on_nothing(figure, tmp_path, source, fwhm):
-    drawn = rotor.line_list(rotor.read(source), temperature_k=100.0, jmax=25)
+    drawn = rotor.api.line_list(rotor.read(source), temperature_k=100.0, jmax=25)
     if fwhm:
         drawn = Spectrum.from_lines(drawn, resolving_grid(drawn, fwhm_mhz=fwhm), fwhm_mhz=fwhm)
     plot_spectrum(drawn, tmp_path / "a.png")
@@ -74,7 +74,7 @@ def test_the_strongest_line_of_water_is_named(water, figure, tmp_path):
 
 
 def test_an_axis_over_decades_is_logarithmic(figure, tmp_path):
-    lines = rotor.line_list(rotor.read("water"), range_mhz=(0.0, 5e5))
+    lines = rotor.api.line_list(rotor.read("water"), range_mhz=(0.0, 5e5))
     plot_spectrum(lines, tmp_path / "a.png")
     axes = figure[0].axes[0]
     assert axes.get_yscale() == "log"

@@ -86,7 +86,7 @@ def test_short_and_long_tables_become_the_same_characters(tmp_path, monkeypatch)
 
 
 def test_a_long_list_of_lines_is_the_same_csv_by_both_ways(tmp_path, monkeypatch):
-    lines = rotor.line_list(PROPANEDIOL, jmax=20, q=1e5)
+    lines = rotor.api.line_list(PROPANEDIOL, jmax=20, q=1e5)
     monkeypatch.setattr(tables, "LONG_TABLE", len(lines) + 1)
     rotor.write(lines, tmp_path / "a.csv")
     monkeypatch.setattr(tables, "LONG_TABLE", 0)
@@ -113,7 +113,7 @@ def test_parquet_and_json_hold_what_the_table_has(tmp_path):
 
 
 def test_a_record_is_what_the_table_knows_and_what_is_said_besides():
-    lines = rotor.line_list(rotor.read("CO"), jmax=3, min_lgint=None)
+    lines = rotor.api.line_list(rotor.read("CO"), jmax=3, min_lgint=None)
     record = record_of(lines, {"command": "by hand"})
     assert (record["program"], record["version"], record["command"]) == ("rotor", rotor.__version__, "by hand")
     assert (record["min_lgint"], record["range_mhz"], record["lines"]) == (None, [0.0, None], 3)
@@ -137,14 +137,14 @@ def test_parquet_needs_neither_pandas_nor_polars(tmp_path):
         "            raise ModuleNotFoundError(name, name=name)\n"
         "sys.meta_path.insert(0, Nowhere())\n"
         "import rotor\n"
-        "rotor.write(rotor.line_list(rotor.read('NH3'), jmax=4), sys.argv[1])\n"
+        "rotor.write(rotor.api.line_list(rotor.read('NH3'), jmax=4), sys.argv[1])\n"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], check=True)
     assert pl.read_parquet(tmp_path / "a.parquet").columns[:3] == ["frequency_mhz", "error_mhz", "lgint"]
 
 
 def test_texts_of_tables_are_short():
-    lines = rotor.line_list(rotor.read("water"), jmax=6)
+    lines = rotor.api.line_list(rotor.read("water"), jmax=6)
     assert 4 <= len(repr(lines).splitlines()) <= 10
     assert max(map(len, repr(lines).splitlines())) <= 120
     assert repr(lines).splitlines()[0].startswith(f"{len(lines)} lines of water at 300 K")
@@ -157,7 +157,7 @@ def test_texts_of_tables_are_short():
 def test_the_text_of_lines_sums_no_partition_function(monkeypatch):
     from rotor.spectra import lines as module
 
-    lines = rotor.line_list(rotor.read("CO"), jmax=5, min_lgint=None)
+    lines = rotor.api.line_list(rotor.read("CO"), jmax=5, min_lgint=None)
     monkeypatch.setattr(module, "partition_function", None)
     assert "lgint" not in repr(lines)
 
@@ -170,7 +170,7 @@ def test_measured_lines_and_levels_are_read(tmp_path, shared):
 
 
 def test_a_catalogue_that_was_read_becomes_any_table(tmp_path):
-    rotor.write(rotor.line_list(rotor.read("water"), jmax=4), tmp_path / "w.cat")
+    rotor.write(rotor.api.line_list(rotor.read("water"), jmax=4), tmp_path / "w.cat")
     again = rotor.read(tmp_path / "w.cat")
     assert isinstance(again, Catalogue)
     rotor.write(again, tmp_path / "w.csv")
@@ -194,7 +194,7 @@ def test_a_packed_file_that_would_fill_the_memory_is_refused(tmp_path, monkeypat
 
 
 def test_packed_members_one_after_another_are_one_file(tmp_path):
-    rotor.write(rotor.line_list(rotor.read("CO"), jmax=9), tmp_path / "co.cat")
+    rotor.write(rotor.api.line_list(rotor.read("CO"), jmax=9), tmp_path / "co.cat")
     text = (tmp_path / "co.cat").read_bytes()
     packed_text = gzip.compress(text[:162]) + gzip.compress(text[162:])
     (tmp_path / "two.cat.gz").write_bytes(packed_text)

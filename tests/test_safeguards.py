@@ -47,7 +47,7 @@ def test_the_scalar_part_stays_out_of_the_matrix():
 )
 def test_levels_that_do_not_exist_make_no_lines_in_closed_form(constants, dipole, weights, column, modulus, present):
     top = rotor.Top.from_constants(constants, dipole_abc_debye=dipole, spin_weights=weights)
-    lines = rotor.line_list(top, jmax=8, min_lgint=None, temperature_k=100.0)
+    lines = rotor.api.line_list(top, jmax=8, min_lgint=None, temperature_k=100.0)
     k = lines.levels.quanta[column][lines.lower]
     assert len(lines) > 8
     assert set((k % modulus).tolist()) == present

@@ -35,7 +35,9 @@ def test_the_count_of_allowed_lines_is_exact(name):
     if top.dipole_abc_debye is None:
         top = top.with_dipole((0, 0, 0), "none")
     for jmax in (1, 4, 7):
-        assert allowed_lines(top, jmax) == len(rotor.line_list(top, jmax=jmax, min_lgint=None, untrusted=True, q=1.0))
+        assert allowed_lines(top, jmax) == len(
+            rotor.api.line_list(top, jmax=jmax, min_lgint=None, untrusted=True, q=1.0)
+        )
 
 
 def truncated(top: rotor.Top, order: int) -> rotor.Top:
@@ -87,7 +89,7 @@ def test_where_the_next_order_is_missed(name, order):
 def test_the_shift_in_a_stray_field(name):
     top = rotor.read(name)
     linear = top.kind == "linear"
-    found = rotor.stark_map(top, [0.0, 1e-3], j_highest=0 if linear else 1, tolerance_mhz=1e-9)
+    found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=0 if linear else 1, tolerance_mhz=1e-9)
     energy = found.energy_mhz.reshape(-1, 2)  # all fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
     assert 1 / 3 < left_out.stray_field(top).size / shift < 3  # claimed; a closed form to second or first order
@@ -117,7 +119,7 @@ def test_known_couplings_of_spins(name, constants, effect, j):
 
 def test_the_doppler_width_is_that_of_the_profile():
     top = rotor.read("CO")
-    lines = rotor.line_list(top, jmax=1, temperature_k=300.0)
+    lines = rotor.api.line_list(top, jmax=1, temperature_k=300.0)
     grid = np.linspace(115271.0, 115273.0, 20001)
     shape = list(Spectrum.from_lines(lines, grid, profile="gaussian").columns.values())[1]
     above = grid[shape > shape.max() / 2]
@@ -128,7 +130,8 @@ def test_the_doppler_width_is_that_of_the_profile():
 def test_quantum_corrections_of_a_classical_gas(name, kelvin):
     top = rotor.read(name)
     exact = (
-        rotor.partition_function(truncated(top, 2), kelvin).q / classical_partition_function(truncated(top, 2), kelvin)
+        rotor.api.partition_function(truncated(top, 2), kelvin).q
+        / classical_partition_function(truncated(top, 2), kelvin)
         - 1
     )
     size = next(one.size for one in left_out.of_classical_gas(top, kelvin) if one.name == "quantum corrections")

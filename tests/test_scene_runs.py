@@ -150,9 +150,9 @@ def test_what_a_scene_asks_for_is_what_the_library_answers():
         vibration=VibrationSection(fundamentals="859,520x2,2062"),
     )
     lines = run_scene(scene).table
-    direct = rotor.line_list(
+    direct = rotor.api.line_list(
         rotor.read("OCS"), temperature_k=150.0, range_mhz=(10e3, 400e3), min_lgint=-6.5,
-        vibrations=rotor.VibrationalStates.parse("859,520x2,2062", harmonic=True),
+        vibrations=rotor.api.VibrationalStates.parse("859,520x2,2062", harmonic=True),
     )  # fmt: skip
     for name, column in direct.columns.items():
         assert np.array_equal(lines.columns[name], column), name

@@ -22,27 +22,27 @@ CO = "B=57635.968 D=0.1835 MHz"
 
 @pytest.fixture(scope="module")
 def things() -> dict[str, object]:
-    top, lines = rotor.read("water"), rotor.line_list("CO", jmax=8)
-    gas = rotor.answer_gas(rotor.GasRequest(rotor.read("OCS"), 2000, times_ps=(0.0, 0.1, 0.2)))
+    top, lines = rotor.read("water"), rotor.api.line_list("CO", jmax=8)
+    gas = rotor.api.answer_gas(rotor.api.GasRequest(rotor.read("OCS"), 2000, times_ps=(0.0, 0.1, 0.2)))
     return {
         "lines": lines,
         "spectrum": rotor.Spectrum.from_lines(lines, resolving_grid(lines)),
-        "spectrum answer": rotor.answer_spectrum(rotor.SpectrumRequest(top, jmax=5, fwhm_mhz=500.0)),
-        "Raman lines": rotor.raman_lines("N2"),
-        "levels": rotor.solve_levels("water", 4),
-        "levels answer": rotor.answer_levels(rotor.LevelsRequest(rotor.read("CH3CN"), jmax=4)),
-        "motion": rotor.free_motion([1.0, 2.0, 3.0], [0.1, 2.0, 0.1]),
-        "tumble answer": rotor.answer_tumble(TumbleRequest((1.0, 2.0, 3.0), (0.1, 2.0, 0.1))),
-        "thermodynamic functions": rotor.thermodynamic_functions("CO", np.linspace(5, 300, 30)),
+        "spectrum answer": rotor.api.answer_spectrum(rotor.api.SpectrumRequest(top, jmax=5, fwhm_mhz=500.0)),
+        "Raman lines": rotor.api.raman_lines("N2"),
+        "levels": rotor.api.solve_levels("water", 4),
+        "levels answer": rotor.api.answer_levels(rotor.api.LevelsRequest(rotor.read("CH3CN"), jmax=4)),
+        "motion": rotor.api.free_motion([1.0, 2.0, 3.0], [0.1, 2.0, 0.1]),
+        "tumble answer": rotor.api.answer_tumble(TumbleRequest((1.0, 2.0, 3.0), (0.1, 2.0, 0.1))),
+        "thermodynamic functions": rotor.api.thermodynamic_functions("CO", np.linspace(5, 300, 30)),
         "correlations": gas.correlations,
         "equipartition": gas.test,
         "gas answer": gas,
-        "emission answer": rotor.answer_emission(
+        "emission answer": rotor.api.answer_emission(
             EmissionRequest((rotor.read("CO"),), (Source(1e16, 20.0, 5.0),), (110e3, 120e3))
         ),
-        "stark answer": rotor.answer_stark(rotor.StarkRequest(rotor.read("OCS"), (0.0, 10.0, 20.0))),
-        "zeeman answer": rotor.answer_zeeman(
-            rotor.ZeemanRequest(
+        "stark answer": rotor.api.answer_stark(rotor.api.StarkRequest(rotor.read("OCS"), (0.0, 10.0, 20.0))),
+        "zeeman answer": rotor.api.answer_zeeman(
+            rotor.api.ZeemanRequest(
                 replace(rotor.read("OCS"), magnetic=MagneticTensors(tensor_for("linear", [-0.03]))), (0.0, 1.0)
             )
         ),
@@ -89,23 +89,29 @@ def test_tops_molecules_and_constants_are_one_line():
     assert repr(top.molecule) == "Molecule(water, H2O, 3 atoms)"
     assert repr(rotor.Top.from_constants("B=1 GHz")) == "Top(linear: B 1000 MHz; dipole not known)"
     assert "<td>DJ</td>" in top._repr_html_()
-    assert len(repr(rotor.SpectrumRequest(top))) < 800
+    assert len(repr(rotor.api.SpectrumRequest(top))) < 800
 
 
 def test_what_cannot_be_drawn_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of .*Catalogue, .*Lines"):
         rotor.plot(3)
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
-        rotor.plot(rotor.line_list("CO", jmax=3), tmp_path / "a.txt")
+        rotor.plot(rotor.api.line_list("CO", jmax=3), tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize(
     ("by_word", "by_top"),
     [
-        (lambda: rotor.line_list("water", jmax=3).frequency_mhz, lambda t: rotor.line_list(t, jmax=3).frequency_mhz),
-        (lambda: rotor.solve_levels("H2O", 2).energy_mhz, lambda t: rotor.solve_levels(t, 2).energy_mhz),
-        (lambda: rotor.partition_function("water", 100.0).q, lambda t: rotor.partition_function(t, 100.0).q),
-        (lambda: rotor.thermal_tumble("water").angular_momentum, lambda t: rotor.thermal_tumble(t).angular_momentum),
+        (
+            lambda: rotor.api.line_list("water", jmax=3).frequency_mhz,
+            lambda t: rotor.api.line_list(t, jmax=3).frequency_mhz,
+        ),
+        (lambda: rotor.api.solve_levels("H2O", 2).energy_mhz, lambda t: rotor.api.solve_levels(t, 2).energy_mhz),
+        (lambda: rotor.api.partition_function("water", 100.0).q, lambda t: rotor.api.partition_function(t, 100.0).q),
+        (
+            lambda: rotor.api.thermal_tumble("water").angular_momentum,
+            lambda t: rotor.api.thermal_tumble(t).angular_momentum,
+        ),
     ],
 )
 def test_names_of_molecules_are_tops(by_word, by_top):
@@ -113,9 +119,9 @@ def test_names_of_molecules_are_tops(by_word, by_top):
 
 
 def test_a_catalogue_is_no_top(tmp_path):
-    rotor.write(rotor.line_list("CO", jmax=3), tmp_path / "co.cat")
+    rotor.write(rotor.api.line_list("CO", jmax=3), tmp_path / "co.cat")
     with pytest.raises(ValueError, match="holds a Catalogue, not a molecule or constants"):
-        rotor.line_list(str(tmp_path / "co.cat"))
+        rotor.api.line_list(str(tmp_path / "co.cat"))
 
 
 def test_constants_from_a_mapping():
@@ -129,7 +135,7 @@ def test_constants_from_a_mapping():
     ("unit", "label", "mhz"), [("MHz", "Frequency (MHz)", 1.0), ("cm-1", "Wavenumber (cm⁻¹)", 29979.2458)]
 )
 def test_the_picture_takes_unit_scale_title_and_range(unit, label, mhz):
-    lines = rotor.line_list("CO", jmax=8)
+    lines = rotor.api.line_list("CO", jmax=8)
     axes = spectrum_figure(lines, unit=unit, log=True, title="CO", range_mhz=(1e5, 6e5)).axes[0]
     assert axes.get_xlabel() == label
     assert axes.get_xlim() == pytest.approx((1e5 / mhz, 6e5 / mhz), rel=1e-12)
@@ -142,7 +148,7 @@ def test_the_picture_takes_unit_scale_title_and_range(unit, label, mhz):
 @pytest.mark.parametrize("edge", [False, True])
 def test_the_strongest_line_is_always_named(source, edge):
     """Even where it stands at the edge of the range that is shown."""
-    lines = rotor.line_list(source, temperature_k=100.0, jmax=30)
+    lines = rotor.api.line_list(source, temperature_k=100.0, jmax=30)
     strongest = lines.strongest(1)
     place = float(strongest.frequency_mhz[0])
     figure = spectrum_figure(lines, range_mhz=(0.3 * place, 1.0001 * place) if edge else None)

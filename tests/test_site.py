@@ -62,7 +62,7 @@ def test_every_public_module_is_in_the_reference(pages):
     assert not [module for module in modules if f"## {module}\n" not in text]
     assert "{py:function} line_list(top: rotor.tops.top.Top, *, temperature_k: float = 300.0" in text
     index = (pages / "api" / "index.md").read_text(encoding="utf-8")
-    assert "{py:obj}`rotor.line_list <rotor.spectra.lines.line_list>`" in index
+    assert "{py:obj}`rotor.api.line_list <rotor.spectra.lines.line_list>`" in index
 
 
 @needs_extra

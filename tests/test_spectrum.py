@@ -25,7 +25,7 @@ SHAPES = [
 @pytest.fixture(scope="module")
 def lines():
     top = rotor.Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.0, 0.5, 0.2), mass_u=50.0)
-    return rotor.line_list(top, temperature_k=20.0, jmax=6)
+    return rotor.api.line_list(top, temperature_k=20.0, jmax=6)
 
 
 def slow(lines, grid, shape):
@@ -115,7 +115,7 @@ def test_what_makes_no_spectrum_is_refused(lines, change, rule):
 
 
 def test_doppler_without_a_mass_is_refused():
-    lines = rotor.line_list(rotor.Top.from_constants("B=10 GHz", dipole_abc_debye=(1, 0, 0)), jmax=2)
+    lines = rotor.api.line_list(rotor.Top.from_constants("B=10 GHz", dipole_abc_debye=(1, 0, 0)), jmax=2)
     with pytest.raises(ValueError, match="needs a mass"):
         Spectrum.from_lines(lines, [1.0, 2.0])
 

@@ -247,7 +247,7 @@ def test_what_a_mapping_refuses():
 def test_the_public_names_make_hyperfine_lines():
     import rotor
 
-    lines = rotor.line_list("HCN", jmax=1, effects=rotor.effects_of("HCN", True, "first-order"))
+    lines = rotor.api.line_list("HCN", jmax=1, effects=rotor.api.effects_of("HCN", True, "first-order"))
     assert lines.levels.quanta_names[-1] == "f"
     assert rotor.SpinConstants is SpinConstants
 

@@ -25,7 +25,7 @@ PROPANEDIOL = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1
 KILLED = """
 import rotor
 top = rotor.Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.2, 1.9, 0.4))
-rotor.stream_lines(top, {path!r}, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
+rotor.api.stream_lines(top, {path!r}, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
 """
 
 
@@ -49,7 +49,7 @@ def same(streamed: pl.DataFrame, whole: pl.DataFrame) -> None:
 @pytest.mark.parametrize("cut", [None, -9.0])
 def test_pieces_of_any_size_make_the_same_list(tmp_path, piece_lines, cut):
     made = stream_lines(PROPANEDIOL, tmp_path / "a.parquet", jmax=24, min_lgint=cut, q=1e5, piece_lines=piece_lines)
-    whole = rotor.line_list(PROPANEDIOL, jmax=24, min_lgint=cut, q=1e5)
+    whole = rotor.api.line_list(PROPANEDIOL, jmax=24, min_lgint=cut, q=1e5)
     same(pl.read_parquet(tmp_path / "a.parquet"), whole.to_polars())
     assert made.lines == len(whole)
     assert made.pieces_made == {1: 22, 4000: made.pieces_made, 10**9: 1}[piece_lines]
@@ -68,12 +68,12 @@ def test_pieces_of_any_size_make_the_same_list(tmp_path, piece_lines, cut):
 def test_every_kind_of_top(tmp_path, constants, dipole, weights):
     top = Top.from_constants(constants, dipole_abc_debye=dipole, spin_weights=weights)
     stream_lines(top, tmp_path / "a.parquet", jmax=15, range_mhz=(1e4, 9e5), piece_lines=500)
-    same(pl.read_parquet(tmp_path / "a.parquet"), rotor.line_list(top, jmax=15, range_mhz=(1e4, 9e5)).to_polars())
+    same(pl.read_parquet(tmp_path / "a.parquet"), rotor.api.line_list(top, jmax=15, range_mhz=(1e4, 9e5)).to_polars())
 
 
 def test_errors_of_frequencies_go_along(tmp_path):
     top = Top.from_constants("A=8572.0(1) B=3640.0(2) C=2790.0(1) MHz", dipole_abc_debye=(1.2, 1.9, 0.4))
-    whole = rotor.line_list(top, jmax=12, q=1e5)
+    whole = rotor.api.line_list(top, jmax=12, q=1e5)
     stream_lines(top, tmp_path / "a.parquet", jmax=12, q=1e5, piece_lines=500)
     same(pl.read_parquet(tmp_path / "a.parquet"), whole.to_polars())
     assert whole.error_mhz.max() > 1
@@ -84,7 +84,7 @@ def test_errors_of_frequencies_go_along(tmp_path):
 
 def test_a_catalogue_is_that_of_the_list_in_memory(tmp_path):
     stream_lines(PROPANEDIOL, tmp_path / "a.cat", jmax=20, min_lgint=-12, tag=76001, piece_lines=4000)
-    rotor.write(rotor.line_list(PROPANEDIOL, jmax=20, min_lgint=-12), tmp_path / "b.cat", settings={"tag": 76001})
+    rotor.write(rotor.api.line_list(PROPANEDIOL, jmax=20, min_lgint=-12), tmp_path / "b.cat", settings={"tag": 76001})
     ours, theirs = ((tmp_path / name).read_text().splitlines() for name in ("a.cat", "b.cat"))
     assert sorted(ours) == sorted(theirs)
     assert (np.diff(read_cat(tmp_path / "a.cat").frequency_mhz) >= 0).all()
@@ -95,7 +95,7 @@ def test_a_catalogue_is_that_of_the_list_in_memory(tmp_path):
 def test_j_max_and_q_are_found_as_in_memory(tmp_path):
     top = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11, 0, 0))
     made = stream_lines(top, tmp_path / "co.parquet")
-    whole = rotor.line_list(top)
+    whole = rotor.api.line_list(top)
     assert (made.jmax, made.lines, made.q) == (whole.jmax, len(whole), whole.q)
     metadata = json.loads(pl.read_parquet_metadata(tmp_path / "co.parquet")["provenance"])
     assert metadata["q"] == whole.q
@@ -118,7 +118,7 @@ def test_a_killed_run_goes_on(tmp_path):
     made = stream_lines(PROPANEDIOL, path, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
     assert made.pieces_found == len(left) >= 3
     assert made.pieces_made > 0
-    same(pl.read_parquet(path), rotor.line_list(PROPANEDIOL, jmax=45, min_lgint=None, q=1e5).to_polars())
+    same(pl.read_parquet(path), rotor.api.line_list(PROPANEDIOL, jmax=45, min_lgint=None, q=1e5).to_polars())
     assert not pieces.exists()
 
 
@@ -154,14 +154,14 @@ def test_pieces_are_used_not_made_anew(tmp_path):
     lost = len(pl.read_parquet(piece))
     pl.read_parquet(piece).clear().write_parquet(piece)
     made = stream_lines(PROPANEDIOL, path, jmax=15, q=1e5, piece_lines=1000)
-    assert made.lines == len(rotor.line_list(PROPANEDIOL, jmax=15, q=1e5)) - lost
+    assert made.lines == len(rotor.api.line_list(PROPANEDIOL, jmax=15, q=1e5)) - lost
     assert lost > 0
 
 
 def test_pieces_spread_over_processes(tmp_path):
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         stream_lines(PROPANEDIOL, tmp_path / "a.parquet", jmax=20, q=1e5, piece_lines=4000, executor=pool)
-    same(pl.read_parquet(tmp_path / "a.parquet"), rotor.line_list(PROPANEDIOL, jmax=20, q=1e5).to_polars())
+    same(pl.read_parquet(tmp_path / "a.parquet"), rotor.api.line_list(PROPANEDIOL, jmax=20, q=1e5).to_polars())
 
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system does not fork")

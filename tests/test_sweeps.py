@@ -350,7 +350,7 @@ def test_the_summary_shows_results(folder):
     result = run_sweep(SpectrumScene(molecule="CO", numerics=BasisNumerics(jmax=3), sweep={"molecule": ["CO", "HCl"]}))
     columns = result.columns
     for row, name in enumerate(("CO", "HCl")):
-        lines = rotor.line_list(rotor.read(name), jmax=3)
+        lines = rotor.api.line_list(rotor.read(name), jmax=3)
         best = lines.intensity_nm2_mhz.argmax()
         assert columns["lines"][row] == len(lines)
         assert columns["strongest_mhz"][row] == lines.frequency_mhz[best]

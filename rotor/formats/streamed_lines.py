@@ -151,7 +151,7 @@ def stream_lines(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> StreamedList:
-    """The lines of `rotor.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
+    """The lines of `rotor.api.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
 
     Pieces stand in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
     them; the same call goes on from there.

@@ -156,7 +156,7 @@ def force_field_from_calculator(
     Raises
     ------
     ValueError
-        Where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first (`rotor.refine`).
+        Where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first (`rotor.api.refine`).
 
     Notes
     -----
@@ -170,7 +170,7 @@ def force_field_from_calculator(
     if not rest <= most_force_ev_per_angstrom:
         raise ValueError(
             f"a force of {rest:.3g} eV/Å on an atom of {molecule.formula} (at most {most_force_ev_per_angstrom:g}): "
-            "the geometry is no minimum of this calculator; refine it first (rotor.refine)"
+            "the geometry is no minimum of this calculator; refine it first (rotor.api.refine)"
         )
     start = atoms.get_positions()
     rows = []

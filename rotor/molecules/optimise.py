@@ -130,7 +130,7 @@ def calculator_by_name(name: str) -> Any:
     except Exception as reason:  # an import, a configuration or a program that is missing: all mean that it is not here
         raise ValueError(
             f"calculator {name!r} cannot be built here ({' '.join(str(reason).split()) or type(reason).__name__}); install "
-            "and set it up, or build it in Python and give it to rotor.refine"
+            "and set it up, or build it in Python and give it to rotor.api.refine"
         ) from reason
 
 

@@ -79,7 +79,7 @@ def solve_levels(
     for effect in effects:
         if effect.resolves_m:
             raise ValueError(
-                f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.stark_map`"
+                f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.api.stark_map`"
             )
     for effect in effects:
         if (levels := effect.solve(top, effects, jmin, jmax, vectors)) is not None:

@@ -96,10 +96,9 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
     ValueError
         Where molecules are given too, and where more are needed than a run has.
     """
-    from rotor.scenes.sections import GasNumerics
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
-    if scene.numerics.molecules != GasNumerics().molecules:
+    if scene.numerics.molecules != type(scene.numerics)().molecules:
         raise ValueError("accuracy and numerics.molecules: give one of them")
     z = quantile(request.confidence)
     count = max(math.ceil((z * _spread(request, asked, unit) / asked) ** 2), 2)

@@ -34,8 +34,8 @@ SUSPECT_BELOW_MHZ = 100.0  # A of a molecule is larger, in MHz; smaller ones may
 
 
 def require_cut(min_lgint: float | None) -> None:
-    """ValueError for a cut that is no logarithm of an intensity that a double can hold; None is no cut."""
-    if min_lgint is not None and not abs(min_lgint) <= MOST_LOG10:
+    """ValueError for a cut that is no logarithm of an intensity that a double can hold; None and -inf are no cut."""
+    if min_lgint is not None and min_lgint != -math.inf and not abs(min_lgint) <= MOST_LOG10:
         raise ValueError(
             f"min_lgint: {min_lgint:g}: expected a number from {-MOST_LOG10} to {MOST_LOG10}, or None for every allowed line"
         )

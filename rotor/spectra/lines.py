@@ -322,7 +322,7 @@ def line_list(
     Notes
     -----
     Neglected: all but electric dipole, dependence of μ on J, and what the effects do not contain: nuclear hyperfine structure
-    comes with `effects=rotor.effects_of(top, True)`, of the constants of spins that the top has.
+    comes with `effects=rotor.api.effects_of(top, True)`, of the constants of spins that the top has.
 
     Examples
     --------

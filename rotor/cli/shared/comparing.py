@@ -127,7 +127,7 @@ def predicted(lines: Catalogue, given: Input, kelvin: float) -> Catalogue:
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
     frequency, _ = in_mhz(lines)
     reach = 1000.0 + 0.01 * float(frequency.max())  # lines that lie elsewhere with other constants are found too
-    made = rotor.line_list(
+    made = rotor.api.line_list(
         top,
         temperature_k=kelvin,
         jmax=highest,

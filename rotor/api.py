@@ -1,0 +1,156 @@
+"""The building blocks behind the verbs: requests with their answers, and functions of tops and levels.
+
+    from rotor.api import line_list
+    lines = line_list("water", temperature_k=300, jmax=20)
+
+Functions of a top take whatever `rotor.read` takes instead. Names are loaded when they are first used.
+"""
+
+from collections.abc import Callable, Iterable
+from functools import cache, wraps
+from importlib import import_module
+from inspect import signature
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace as AlignmentTrace
+    from rotor.alignment.align import align as align
+    from rotor.alignment.request import AlignRequest as AlignRequest
+    from rotor.alignment.request import answer_align as answer_align
+    from rotor.classical.free.free_motion import free_motion as free_motion
+    from rotor.classical.tumble import TumbleRequest as TumbleRequest
+    from rotor.classical.tumble import answer_tumble as answer_tumble
+    from rotor.fluids.request import FluidRequest as FluidRequest
+    from rotor.fluids.request import NewBox as NewBox
+    from rotor.fluids.request import answer_fluid as answer_fluid
+    from rotor.formats.streamed_lines import stream_lines as stream_lines
+    from rotor.molecules.optimise import refine as refine
+    from rotor.quantum.effects.of_top import effects_of as effects_of
+    from rotor.quantum.effects.stark import stark_map as stark_map
+    from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
+    from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
+    from rotor.quantum.fields.stark_request import answer_stark as answer_stark
+    from rotor.quantum.fields.zeeman_request import ZeemanRequest as ZeemanRequest
+    from rotor.quantum.fields.zeeman_request import answer_zeeman as answer_zeeman
+    from rotor.quantum.request import LevelsRequest as LevelsRequest
+    from rotor.quantum.request import answer_levels as answer_levels
+    from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
+    from rotor.spectra.emission_request import answer_emission as answer_emission
+    from rotor.spectra.lines import line_list as line_list
+    from rotor.spectra.raman import RamanLines as RamanLines
+    from rotor.spectra.raman import raman_lines as raman_lines
+    from rotor.spectra.raman_request import RamanRequest as RamanRequest
+    from rotor.spectra.raman_request import answer_raman as answer_raman
+    from rotor.spectra.request import GasLayer as GasLayer
+    from rotor.spectra.request import SpectrumRequest as SpectrumRequest
+    from rotor.spectra.request import answer_spectrum as answer_spectrum
+    from rotor.thermodynamics import VibrationalStates as VibrationalStates
+    from rotor.thermodynamics import partition_function as partition_function
+    from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
+    from rotor.thermodynamics.classical_gas import GasRequest as GasRequest
+    from rotor.thermodynamics.classical_gas import answer_gas as answer_gas
+    from rotor.thermodynamics.request import ThermoRequest as ThermoRequest
+    from rotor.thermodynamics.request import answer_thermo as answer_thermo
+    from rotor.thermodynamics.thermal_tumble import thermal_tumble as thermal_tumble
+
+MODULES = {
+    "AlignRequest": "rotor.alignment.request",
+    "AlignmentTrace": "rotor.alignment.align",
+    "FluidRequest": "rotor.fluids.request",
+    "GasLayer": "rotor.spectra.request",
+    "GasRequest": "rotor.thermodynamics.classical_gas",
+    "LevelsRequest": "rotor.quantum.request",
+    "NewBox": "rotor.fluids.request",
+    "RamanLines": "rotor.spectra.raman",
+    "RamanRequest": "rotor.spectra.raman_request",
+    "EmissionRequest": "rotor.spectra.emission_request",
+    "SpectrumRequest": "rotor.spectra.request",
+    "StarkRequest": "rotor.quantum.fields.stark_request",
+    "ThermoRequest": "rotor.thermodynamics.request",
+    "TumbleRequest": "rotor.classical.tumble",
+    "VibrationalStates": "rotor.thermodynamics",
+    "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
+    "align": "rotor.alignment.align",
+    "answer_align": "rotor.alignment.request",
+    "answer_fluid": "rotor.fluids.request",
+    "answer_gas": "rotor.thermodynamics.classical_gas",
+    "answer_levels": "rotor.quantum.request",
+    "answer_raman": "rotor.spectra.raman_request",
+    "answer_emission": "rotor.spectra.emission_request",
+    "answer_spectrum": "rotor.spectra.request",
+    "answer_stark": "rotor.quantum.fields.stark_request",
+    "answer_thermo": "rotor.thermodynamics.request",
+    "answer_tumble": "rotor.classical.tumble",
+    "answer_zeeman": "rotor.quantum.fields.zeeman_request",
+    "effects_of": "rotor.quantum.effects.of_top",
+    "free_motion": "rotor.classical.free.free_motion",
+    "line_list": "rotor.spectra.lines",
+    "partition_function": "rotor.thermodynamics",
+    "raman_lines": "rotor.spectra.raman",
+    "refine": "rotor.molecules.optimise",
+    "solve_levels": "rotor.quantum.solve",
+    "stark_map": "rotor.quantum.effects.stark",
+    "stream_lines": "rotor.formats.streamed_lines",
+    "thermal_tumble": "rotor.thermodynamics.thermal_tumble",
+    "thermodynamic_functions": "rotor.thermodynamics",
+    "zeeman_map": "rotor.quantum.effects.zeeman",
+}
+
+OF_TOPS = frozenset(
+    {
+        "align", "effects_of", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
+        "thermal_tumble", "thermodynamic_functions", "zeeman_map",
+    }
+)  # fmt: skip  # functions whose first argument is a top
+
+__all__ = sorted(MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    if name in MODULES:
+        found = getattr(import_module(MODULES[name]), name)
+        return _taking_words(found) if name in OF_TOPS else found
+    raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{_near(name, MODULES)}")
+
+
+@cache
+def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function of a top, given a top or whatever `read` makes one of."""
+
+    @wraps(function)
+    def call(top: Any, *args: Any, **options: Any) -> Any:
+        from rotor.formats import read
+        from rotor.tops.top import Top
+
+        _refuse_arguments(function, (top, *args), options)
+        found = top if isinstance(top, Top) else read(top)
+        if not isinstance(found, Top):
+            raise ValueError(f"{top}: holds a {type(found).__name__}, not a molecule or constants")
+        return function(found, *args, **options)
+
+    return call
+
+
+def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
+    """TypeError, with the names that would do, for arguments that the function does not take."""
+    taken = signature(function)
+    try:
+        taken.bind(*args, **options)
+    except TypeError as error:
+        unknown = next((name for name in options if name not in taken.parameters), None)
+        names = [name for name in taken.parameters if name not in ("top", *options)]
+        which = _near(unknown, names) if unknown else ""
+        raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    """The names that are like one that is not known, as the end of a message."""
+    from difflib import get_close_matches
+
+    found = get_close_matches(name, known, n=3)
+    return f"; did you mean {', '.join(found)}?" if found else ""
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

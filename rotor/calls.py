@@ -1,0 +1,195 @@
+"""Verbs as functions: `rotor.spectrum("water", temperature_k=100)`. Keyword arguments are the fields of the verb's declaration.
+
+A value is a number in the unit of the field or a text with a unit ("100 K"). What comes back is a `Result`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rotor.requests.budget import ErrorBudget
+from rotor.requests.field import Field
+from rotor.requests.fill import Given
+from rotor.table import Table
+from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, verb_of
+
+EXAMPLES = {
+    "spectrum": (
+        'rotor.spectrum("CO", temperature_k="20 K", jmax=5).table.frequency_mhz[:1].round(3).tolist()', "[115271.202]",
+    ),
+    "levels": ('rotor.levels(constants="A=10 B=6 C=4 MHz", jmax=1).table.energy_mhz[1:].tolist()', "[10.0, 16.0, 14.0]"),
+    "raman": ('len(rotor.raman("N2", jmax=4).table)', "6"),
+    "thermo": ('rotor.thermo("CO", temperatures_k="300 K").table.columns["q_rot"].round(2).tolist()', "[108.82]"),
+    "stark": (
+        'rotor.stark("OCS", fields_kv_per_cm="0:10kV/cm:3", j_highest=0).table.energy_mhz.round(1).tolist()',
+        "[0.0, -88.4, -348.0]",
+    ),
+    "zeeman": ('len(rotor.zeeman("OCS", g=[-0.0288], fields_tesla="0,1T", j_highest=1).table)', "8"),
+    "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
+}  # fmt: skip  # of each function: an expression and its value, which a test evaluates
+
+
+@dataclass(frozen=True, repr=False)
+class Result:
+    """What a verb found out: tables, errors, pictures and files.
+
+    answer: everything that the library computed; its attributes are attributes of the result too. verb, request, subject, given: how it
+    was asked for.
+    """
+
+    verb: Verb
+    request: Any
+    answer: Any
+    subject: Subject
+    given: Given
+
+    @property
+    def table(self) -> Table:
+        """The main table: lines, levels, states, ..."""
+        return self.verb.table(self.answer)
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the result can be trusted.
+
+        Raises AttributeError for verbs that state no budget yet.
+        """
+        budget = getattr(self.answer, "errors", None)
+        if not isinstance(budget, ErrorBudget):
+            raise AttributeError(f"{self.verb.name}: states no error budget; facts() has the errors that are known")
+        return budget
+
+    def facts(self) -> Mapping[str, Any]:
+        """Everything but the table, by the keys of the JSON."""
+        found: Mapping[str, Any] = self.answer.facts()
+        return found
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame."""
+        return self.table.to_pandas()
+
+    def to_polars(self) -> Any:
+        """The table as a polars DataFrame."""
+        return self.table.to_polars()
+
+    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """A matplotlib figure; with a path the picture is written too."""
+        from rotor.plots.show import plot
+
+        return plot(self.answer, path, **options)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the table or picture that the suffix names.
+
+        Raises ValueError for a suffix that the verb does not write.
+        """
+        from rotor.formats.atomic_write import write_together
+
+        target, report = Path(path), self._report()
+        outputs = [output for output in self.verb.outputs if target.name.endswith(output.suffixes) and not output.grows]
+        if not outputs:
+            known = ", ".join(dict.fromkeys(suffix for output in self.verb.outputs for suffix in output.suffixes))
+            raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {known}")
+        write_together({target: files_of(self.verb, self.answer, report)[outputs[0].name]})
+
+    def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
+        """The scene that computes the same again; `rotor.write_scene` writes it. folder: from which its files are counted."""
+        from rotor.scenes.structures import saved_scene
+
+        return saved_scene(self.verb, self.request, self.subject, Path(folder), {}, self.given)
+
+    def plan(self) -> Any:
+        """Method, cost and what is left out, as `rotor plan` of its scene states them."""
+        from rotor.scenes.plan import plan_of
+
+        return plan_of(self.scene())
+
+    def _report(self) -> Report:
+        from rotor.version import version
+
+        shown = self.verb.read_shown(self.given)
+        head = {"rotor_version": version(), "command": f"rotor.{self.verb.name}", "input": self.subject.text}
+        content = {**head, **self.facts(), **self.verb.content(self.answer, shown)}
+        return Report(content, shown, self.given, {"command": head["command"]})
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.answer, name)
+
+    def __repr__(self) -> str:
+        return f"{self.verb.name} of {self.subject.text or 'no molecule'}: {self.table!r}"
+
+    def _repr_html_(self) -> str:
+        """The table for notebooks."""
+        return self.table._repr_html_()
+
+
+def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Result:
+    """Carry out a verb with Python values by the names of its fields.
+
+    Raises TypeError for a name that the verb does not have, and ValueError for a value that cannot be.
+    """
+    fields = {field.name: field for field in verb.fields.values()}
+    unknown = [name for name in values if name not in fields]
+    if unknown:
+        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{_near(unknown[0], fields)}")
+    given = Given({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
+    request, subject = verb.read(given, Place())
+    return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(given))), subject, given)
+
+
+def _near(name: str, known: Mapping[str, Any]) -> str:
+    from difflib import get_close_matches
+
+    matches = get_close_matches(name, known, n=3)
+    return f"; did you mean {', '.join(matches)}?" if matches else f"; it takes {', '.join(known)}"
+
+
+@cache
+def function_of(name: str) -> Callable[..., Result]:
+    """The function of a verb, with a documentation made from its declaration."""
+    verb = verb_of(name)
+    has_source = "source" in {field.name for field in verb.fields.values()}
+
+    def call(source: Any = None, *, executor: Any = None, **values: Any) -> Result:
+        return result_of(verb, {"source": source, **values} if source is not None else values, executor)
+
+    def call_without_source(*, executor: Any = None, **values: Any) -> Result:
+        return result_of(verb, values, executor)
+
+    function = call if has_source else call_without_source
+    function.__name__ = function.__qualname__ = name
+    function.__module__ = "rotor"
+    function.__doc__ = documentation(verb)
+    return function
+
+
+def documentation(verb: Verb) -> str:
+    """The docstring of the function of a verb: its arguments with units, from the declaration."""
+    rows = "\n".join(_argument(field) for field in verb.fields.values() if field.name and not _is_printing(verb, field))
+    expression, value = EXAMPLES.get(verb.name, ("", ""))
+    example = f"\n\nExamples\n--------\n>>> import rotor\n>>> {expression}\n{value}" if value else ""
+    return (
+        f"{verb.about}\n\nNumbers are in the unit of the argument; a text may carry another unit.\n\n"
+        f"Parameters\n----------\n{rows}\nexecutor : concurrent.futures.Executor, optional\n    Shares the work.\n\n"
+        f"Returns\n-------\nResult\n    Table, errors, plot(), write(), to_pandas(), plan(), scene().{example}\n"
+    )
+
+
+def _is_printing(verb: Verb, field: Field) -> bool:
+    """Whether a field says how the command line prints, not what is computed."""
+    from rotor.requests.field import all_fields
+
+    return field.identity in all_fields(verb.shown) and not field.key
+
+
+def _argument(field: Field) -> str:
+    """Name, default and one line of help of an argument."""
+    default = "" if field.default is None else f", default {field.default!r}"
+    return f"{field.name} : optional{default}\n    {field.help}."
