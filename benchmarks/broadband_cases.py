@@ -102,7 +102,7 @@ def lines_of(species: Species, temperature_k: float, band: tuple[float, float], 
     )
     top = rotor.Top.from_constants(constants, dipole_abc_debye=species.dipole)
     jmax = int(np.clip(np.sqrt(16 * 20836.6 * temperature_k / species.constants[1:3].mean()), 12, 60))
-    lines = rotor.line_list(top, temperature_k=temperature_k, jmax=jmax, range_mhz=band, untrusted=True)
+    lines = rotor.api.line_list(top, temperature_k=temperature_k, jmax=jmax, range_mhz=band, untrusted=True)
     intensity = 10 ** lines.columns["lgint"]
     intensity *= 100.0 * species.strength / intensity.max()
     strong = intensity > floor

@@ -24,12 +24,15 @@ EXAMPLES = {
     ),
     "levels": ('rotor.levels(constants="A=10 B=6 C=4 MHz", jmax=1).table.energy_mhz[1:].tolist()', "[10.0, 16.0, 14.0]"),
     "raman": ('len(rotor.raman("N2", jmax=4).table)', "6"),
-    "thermo": ('rotor.thermo("CO", temperatures_k="300 K").table.columns["q_rot"].round(2).tolist()', "[108.82]"),
+    "thermo": ('rotor.thermo("CO", temperatures_k="300 K").table.columns["q_rot"].round(2).tolist()', "[108.87]"),
     "stark": (
         'rotor.stark("OCS", fields_kv_per_cm="0:10kV/cm:3", j_highest=0).table.energy_mhz.round(1).tolist()',
         "[0.0, -88.4, -348.0]",
     ),
     "zeeman": ('len(rotor.zeeman("OCS", g=[-0.0288], fields_tesla="0,1T", j_highest=1).table)', "8"),
+    "emission": (
+        'rotor.emission(["CO"], column_per_cm2="1e16", excitation_k="20 K", range_mhz="115:116GHz").table.names', "('carbon monoxide',)",
+    ),
     "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
 }  # fmt: skip  # of each function: an expression and its value, which a test evaluates
 
@@ -155,15 +158,16 @@ def _near(name: str, known: Mapping[str, Any]) -> str:
 def function_of(name: str) -> Callable[..., Result]:
     """The function of a verb, with a documentation made from its declaration."""
     verb = verb_of(name)
-    has_source = "source" in {field.name for field in verb.fields.values()}
+    names = {field.name for field in verb.fields.values()}
+    first = next((name for name in ("source", "names") if name in names), "")
 
     def call(source: Any = None, *, executor: Any = None, **values: Any) -> Result:
-        return result_of(verb, {"source": source, **values} if source is not None else values, executor)
+        return result_of(verb, values if source is None else {first: source, **values}, executor)
 
     def call_without_source(*, executor: Any = None, **values: Any) -> Result:
         return result_of(verb, values, executor)
 
-    function = call if has_source else call_without_source
+    function = call if first else call_without_source
     function.__name__ = function.__qualname__ = name
     function.__module__ = "rotor"
     function.__doc__ = documentation(verb)

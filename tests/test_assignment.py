@@ -31,7 +31,7 @@ def lines_of(
     top = rotor.Top.from_constants(
         rotor.Constants(**truth, reduction="S", representation="Ir"), dipole_abc_debye=dipole
     )
-    lines = rotor.line_list(top, temperature_k=2.0, jmax=30, range_mhz=BAND)
+    lines = rotor.api.line_list(top, temperature_k=2.0, jmax=30, range_mhz=BAND)
     intensity = 10 ** lines.columns["lgint"]
     intensity *= height / intensity.max()
     return lines.frequency_mhz[intensity > 1.0], intensity[intensity > 1.0]

@@ -1,4 +1,4 @@
-"""The table of rigid tops and its compiled loops against `rotor.line_list` and `rotor.solve_levels`."""
+"""The table of rigid tops and its compiled loops against `rotor.api.line_list` and `rotor.api.solve_levels`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_lines_are_those_of_line_list(values: tuple[float, ...]) -> None:
     top = rotor.Top.from_constants(
         rotor.Constants(**constants, reduction="S", representation="Ir"), dipole_abc_debye=(1, 1, 1)
     )
-    lines = rotor.line_list(top, temperature_k=2.0, jmax=JMAX, range_mhz=(6000, 18000), min_lgint=None)
+    lines = rotor.api.line_list(top, temperature_k=2.0, jmax=JMAX, range_mhz=(6000, 18000), min_lgint=None)
     columns = lines.columns
     seen = field_of()
     found = predict(seen, np.array(values), 2.0, 4000)

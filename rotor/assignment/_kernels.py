@@ -1,4 +1,4 @@
-"""Compiled loops of the search. Their plain forms are `rotor.line_list` (lines of a top) and the tests' own loops."""
+"""Compiled loops of the search. Their plain forms are `rotor.api.line_list` (lines of a top) and the tests' own loops."""
 
 import numpy as np
 from numba import njit
