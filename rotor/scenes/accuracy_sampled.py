@@ -183,9 +183,8 @@ def made_of(request: FluidRequest) -> FluidRequest:
 
 def _by_energy(scene: Any, request: FluidRequest, asked: float) -> Choice:
     from rotor.scenes.kind import quantity
-    from rotor.scenes.sections import FluidNumerics
 
-    given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, FluidNumerics().step))
+    given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, type(scene.numerics)().step))
     if given != usual:
         raise ValueError("accuracy and numerics.step: give one of them")
 
@@ -226,7 +225,6 @@ def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
 
 
 def _by_forces(scene: Any, request: FluidRequest, asked: float) -> Choice:
-    from rotor.scenes.sections import FluidNumerics
 
     own = request.settings
     if own.electrostatics != "ewald":
@@ -234,7 +232,7 @@ def _by_forces(scene: Any, request: FluidRequest, asked: float) -> Choice:
             f"accuracy: {asked:g} %: of the forces is that of Ewald's sum, and {own.electrostatics} is another model; give "
             'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
         )
-    if scene.numerics.ewald_tolerance != FluidNumerics().ewald_tolerance:
+    if scene.numerics.ewald_tolerance != type(scene.numerics)().ewald_tolerance:
         raise ValueError("accuracy and numerics.ewald_tolerance: give one of them")
     for tolerance in EWALD_LADDER:
         chosen = replace(request, settings=replace(own, ewald_tolerance=tolerance))
