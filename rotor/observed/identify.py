@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.observed.fit import FitChoices, SourceFit, fit_source
@@ -33,6 +34,7 @@ _UNIDENTIFIED = 5.0  # standard deviations
 _VISIBLE = 3.0
 _RIVAL = 0.7  # of the evidence of a species, from which another that is not in the model could explain it
 _RIVALS = 3
+_GUARD = 4.0  # standard deviations above the model, from which a channel counts less
 _SHARED = 0.3  # standard deviations, above which a species takes part in a channel
 
 
@@ -57,7 +59,8 @@ class IdentifyChoices:
 class Evidence:
     """A species that the spectrum needs.
 
-    component: fitted. signal: loss of χ² without it, per reduced χ². visible, expected: lines above three standard deviations in the
+    component: fitted. signal: loss of χ² without it, over the mean square of the residuals in its channels.
+    visible, expected: lines above three standard deviations in the
     spectrum at the place of those that the model has above three. rivals: species outside the model that explain nearly as much.
     """
 
@@ -279,6 +282,11 @@ class _Search:
         """Noise with what the model may be wrong by."""
         return np.asarray(np.hypot(self.spectrum.noise, self.choices.model_error * brightness_k))
 
+    def guarded(self, brightness_k: Floats) -> Floats:
+        """The same, larger where the spectrum is far above the model: lines of unknown species do not draw the others to them."""
+        above = (self.spectrum.intensity - brightness_k) / _GUARD
+        return np.asarray(np.maximum(self.sigma(brightness_k), above))
+
     def run(self) -> None:
         """Add species until none gains enough."""
         while len(self.components) < self.choices.most_species and self._add():
@@ -328,7 +336,7 @@ class _Search:
 
     def fit(self, components: Sequence[Component], iterations: int, *, alone: bool = False) -> SourceFit:
         """A fit of components with the noise of their own model; alone: velocity and width of each."""
-        noisy = replace(self.spectrum, noise=self.sigma(self.model_k(components)))
+        noisy = replace(self.spectrum, noise=self.guarded(self.model_k(components)))
         shared = () if alone else ("velocity_km_s", "fwhm_km_s")
         free = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
         return fit_source(
@@ -358,7 +366,7 @@ class _Search:
             rest = [one for i, one in enumerate(fit.components) if i != k and i not in near]
             left = fit.spectrum.intensity - self.model_k(rest) if rest else fit.spectrum.intensity
             out[k] = self._misfit(fit, left, [fit.components[i] for i in near]) - fit.chi_squared
-        return out / fit.scale**2
+        return out / _local_scatter(fit, shines)
 
     def _misfit(self, fit: SourceFit, left: Floats, near: list[Component]) -> float:
         """χ² of what is left with some species, fitted again."""
@@ -370,11 +378,17 @@ class _Search:
         ).chi_squared
 
 
+def _local_scatter(fit: SourceFit, shines: NDArray[np.bool_]) -> Floats:
+    """Mean square of the residuals over the noise in the channels of every species, at least 1: what is not fitted well is no evidence."""
+    squares = (fit.residuals_k / fit.noise) ** 2
+    return np.array([max(1.0, float(squares[part].mean())) if part.any() else 1.0 for part in shines])
+
+
 def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Search) -> Evidence:
     """What speaks for a species: lost χ², lines seen of those expected, and rivals."""
     component = fit.components[k]
     alone = model([component], fit.spectrum.frequency_mhz, fit.sight).brightness_k
-    expected, visible = _lines_seen(fit, component, alone)
+    expected, visible = _lines_seen(search.spectrum, alone)
     rest = fit.spectrum.intensity - (fit.model_k - alone)
     gain, _ = bank.best(rest, fit.noise)
     own = gain[search.numbers[k]]
@@ -384,16 +398,16 @@ def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Searc
     return Evidence(component, signal, visible, expected, rivals)
 
 
-def _lines_seen(fit: SourceFit, component: Component, alone: Floats) -> tuple[int, int]:
+def _lines_seen(spectrum: ObservedSpectrum, alone: Floats) -> tuple[int, int]:
     """Groups of channels where the species is above three standard deviations, and how many of them the spectrum has at half that."""
-    noise = fit.spectrum.noise
+    noise = spectrum.noise
     high = alone > _VISIBLE * noise
     edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int)))
     expected = visible = 0
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         expected += 1
         peak = start + int(alone[start:stop].argmax())
-        visible += bool(fit.spectrum.intensity[peak] > max(_VISIBLE * noise[peak], 0.5 * alone[peak]))
+        visible += bool(spectrum.intensity[peak] > max(_VISIBLE * noise[peak], 0.5 * alone[peak]))
     return expected, visible
 
 
