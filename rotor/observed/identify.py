@@ -4,7 +4,9 @@ Thin templates of all candidates at a few temperatures are projected on what the
 (orthogonal matching pursuit: S. Chen, S. A. Billings, W. Luo, Int. J. Control 50, 1873 (1989)). The best candidates are fitted with optical
 depth, the best of them stays if it gains more than a threshold that grows with the number of candidates, and all are fitted again. In the
 end every species is removed once and the others fitted without it: what χ² loses is its evidence. Lines that a species should show and
-does not count against it in χ² like any others. The noise has a part proportional to the model, for what LTE and one layer leave out.
+does not count against it in full, while a channel far above the model counts no more than a few standard deviations: so that species which
+match many lines win over those that match a bright one. The noise has a part proportional to the model, for what LTE and one layer
+leave out.
 """
 
 from __future__ import annotations
@@ -296,7 +298,7 @@ class _Search:
         """Add the best candidate; False where none gains enough."""
         now = self.model_k()
         residual = self.spectrum.intensity - now
-        sigma = self.sigma(now)
+        sigma = self.guarded(now)
         gain, parts = self.bank.best(residual, sigma)
         gain[[*self.numbers, *self.refused]] = 0.0
         order = np.argsort(-gain)[:_TRIED]
