@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -325,10 +325,18 @@ def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Fl
     return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
 
 
+@lru_cache(maxsize=1024)
+def _coefficients_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
+    """c(p', p) of a channel over all patterns of one F, which levels and their derivatives share; read-only."""
+    found = coefficients_of(scheme, channel, scheme.patterns(twice_f))
+    found.flags.writeable = False
+    return found
+
+
 def couplings_of(scheme: Scheme, channel: Channel, tables: dict[int, Ints]) -> dict[int, Floats]:
     """c(p', p) of a channel by F, whose patterns these are."""
     if scheme.equivalent:
-        return {f: coefficients_of(scheme, channel, own) for f, own in tables.items()}
+        return {f: _coefficients_of_f(scheme, channel, f) for f in tables}
     both = {f: (own, own) for f, own in tables.items()}
     return for_every_f(both, lambda bra, ket: _between(scheme, channel, bra, ket))
 
