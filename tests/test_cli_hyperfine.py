@@ -118,7 +118,7 @@ REFUSED = [
     (("raman", "CO2", "--hyperfine"), "no constants of spins are known"),
     (("raman", "CO2", "--hyperfine-method", "first-order"), "nothing is split"),
     (("raman", *ROD, "--spin-constants", "chi_aa(12C)=1"), "12C"),
-    (("raman", *ROD, *CHI, "--hyperfine-method", "none"), "expected one of exact"),
+    (("raman", *ROD, *CHI, "--hyperfine-method", "none"), "expected one of auto, exact"),
     (("raman", *ROD, *CHI, "--hyperfine-tolerance", "-1"), "--hyperfine-tolerance"),
 ]  # fmt: skip
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import sys
 from dataclasses import fields
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 import toy_verb
@@ -140,6 +142,43 @@ def test_a_value_is_read_and_written_back(reader, given, value):
     exact = not isinstance(value, float) and not isinstance(reader, Grid)
     assert read == (value if exact else pytest.approx(value, rel=1e-15))  # one rounding of a product
     assert reader.read(reader.write(read)) == read
+
+
+@pytest.mark.parametrize("kind", DECLARED)
+def test_every_number_takes_a_unit_and_its_errors_name_the_option(kind):
+    """Of every option with a unit: a text with it is read, another unit and a word are refused, with the option and what was typed."""
+    numbers = [
+        one
+        for one in verb_of(kind).options.values()
+        if isinstance(one.reader, Quantity | Grid | Range) and one.reader.unit
+    ]
+    assert numbers
+    for one in numbers:
+        text = f"1:2 {one.reader.unit}" if isinstance(one.reader, Range) else f"1 {one.reader.unit}"
+        assert one.read(text, "option") is not None
+        for wrong in ("1 furlong", "x"):
+            wrong = wrong.replace("1 ", "1:2 ") if isinstance(one.reader, Range) else wrong
+            with pytest.raises(ValueError, match=f"^{one.flag}: '{wrong}'"):
+                one.read(wrong, "option")
+
+
+def test_the_page_of_options_is_that_of_the_declarations():
+    """Where it is stale: python docs/make_options.py."""
+    path = Path(__file__).resolve().parents[1] / "docs" / "make_options.py"
+    spec = importlib.util.spec_from_file_location("make_options", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text(encoding="utf-8") == module.page()
+
+
+@pytest.mark.parametrize(
+    "kind", ["spectrum", "levels", "raman", "thermo", "gas", "stark", "zeeman", "align", "fluid", "emission"]
+)
+def test_help_fits_on_two_screens(call, kind):
+    assert call(kind, "--help")[1].count("\n") <= 100  # lines; two screens of 50
+    assert call(kind, "--help-all")[1].count("\n") >= call(kind, "--help")[1].count("\n")
 
 
 def test_what_is_the_default_is_not_written():

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import pairwise
 from typing import Any, cast
 
 import typer
@@ -22,6 +23,7 @@ import typer
 from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainCommand, PlainGroup, folded
 from rotor.cli.shared.output import ComputationError, release_files
+from rotor.verbs.names import declared_verbs, verb_of
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
@@ -49,8 +51,12 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "run": "A scene file run; a sweep goes on where it stopped.",
     "accuracy": "What accuracy costs in a scene: errors and times.",
 }
+VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # what is new says itself what it is
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 OTHERWISE = {"emission": "rotor.cli.shared.observed_verb"}  # verbs with options of the command line alone
+ONE_THREAD = frozenset(
+    {"spectrum", "levels", "raman", "thermo", "emission"}
+)  # small blocks; set before numpy is loaded
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -100,7 +106,7 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
 
     for verb in verbs:
         command, class_, examples = _command(verb)
-        app.command(verb, cls=class_, short_help=VERBS[verb], epilog=folded(examples))(command)
+        app.command(verb, cls=class_, short_help=VERBS[verb] or verb_of(verb).about, epilog=folded(examples))(command)
     return app
 
 
@@ -111,7 +117,6 @@ def _command(name: str) -> tuple[Any, Any, str]:
         return module.command, PlainCommand, module.EXAMPLES
     from rotor.cli.shared.command import PanelCommand, command_of
     from rotor.cli.shared.runner import run_verb
-    from rotor.verbs.verb import verb_of
 
     if name in OTHERWISE:
         module = import_module(OTHERWISE[name])
@@ -168,6 +173,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
     verbs = words[:1] if words[:1] and words[0] in VERBS else VERBS  # what is not asked for is not loaded
+    if words[:1] and words[0] in ONE_THREAD:
+        process.one_thread_of_blas(_jmax(arguments))
     command = typer.main.get_command(_application(verbs))
     provenance = _printable(shlex.join(["rotor", *arguments]))
     try:
@@ -177,6 +184,13 @@ def _run(arguments: list[str]) -> int:
         return 0
     except typer.Exit as end:
         return end.exit_code
+
+
+def _jmax(arguments: Sequence[str]) -> int | None:
+    """The highest J that was typed, before anything is read."""
+    texts = [after for word, after in pairwise(arguments) if word == "--jmax"]
+    texts += [word.partition("=")[2] for word in arguments if word.startswith("--jmax=")]
+    return int(texts[0]) if texts and texts[0].isdecimal() else None
 
 
 def _printable(text: str) -> str:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-METHODS = ("exact", "N-diagonal", "first-order", "auto")
+METHODS = ("auto", "exact", "N-diagonal", "first-order")
 _SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin"})
 _KNOWN = frozenset({"rigid rotor", "centrifugal distortion", "interacting states", "hyperfine method"})
 

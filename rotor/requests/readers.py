@@ -94,7 +94,9 @@ class Whole(Reader):
         return int(value)
 
     def check(self, value: int) -> None:
-        """ValueError for a number out of bounds."""
+        """ValueError for what is no whole number, and for one out of bounds."""
+        if not hasattr(value, "__index__"):
+            raise ValueError(f"{value!r}: expected a whole number, of type int")
         low, high = self.least, self.most
         if (low is not None and value < low) or (high is not None and value > high):
             bounds = f"of {low} or more" if high is None else f"from {low} to {high}"

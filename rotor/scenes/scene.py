@@ -9,9 +9,11 @@ import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import msgspec
 from msgspec import Struct, field
 
 from rotor.scenes.effect_sections import EffectSection
@@ -24,8 +26,9 @@ from rotor.scenes.sections import (
     TumbleNumerics,
 )
 from rotor.scenes.verbs import VERBS
+from rotor.verbs.scene_tables import tables_of
 from rotor.verbs.tables import said
-from rotor.verbs.verb import SCENE_VERBS
+from rotor.verbs.verb import SCENE_VERBS, verb_of
 
 if TYPE_CHECKING:
     from rotor.scenes.choice import Reached
@@ -111,6 +114,25 @@ _WRITTEN: Mapping[str, type[Scene]] = {
 }
 
 
+@cache
+def _scene_class(kind: str) -> Any:
+    """The structure of a kind of scene."""
+    verb = verb_of(kind)
+    found: list[Any] = []
+    for name, type_, default in verb.subject.scene_fields():
+        found.append((name, type_) if default is msgspec.NODEFAULT else (name, type_, default))
+    if verb.accuracy:
+        meta = said(verb.accuracy, verb.accuracy_example)
+        found.append(("accuracy", Annotated[str | float | None, meta], None))
+    found += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
+    scene = msgspec.defstruct(
+        f"{kind.capitalize()}Scene", found, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",
+        forbid_unknown_fields=True, omit_defaults=True, module=__name__,
+    )  # fmt: skip
+    scene.__doc__ = verb.about
+    return scene
+
+
 class Kinds(Mapping[str, type[Scene]]):
     """The structures of all kinds of scene, each made from the declaration of its verb when it is first used."""
 
@@ -119,9 +141,7 @@ class Kinds(Mapping[str, type[Scene]]):
             return _WRITTEN[kind]
         if kind not in SCENE_VERBS:
             raise KeyError(kind)
-        from rotor.scenes.structures import scene_class
-
-        found: type[Scene] = scene_class(kind)
+        found: type[Scene] = _scene_class(kind)
         return found
 
     def __iter__(self) -> Iterator[str]:

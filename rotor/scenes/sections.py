@@ -70,7 +70,7 @@ def __getattr__(name: str) -> Any:
         from rotor.verbs.align import PULSES
 
         return PULSES.structures[shape]
-    from rotor.scenes.structures import tables_of
+    from rotor.verbs.scene_tables import tables_of
     from rotor.verbs.verb import SCENE_VERBS, verb_of
 
     kind = next((one for one in SCENE_VERBS if name.startswith(one.capitalize())), "")

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,9 @@ from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
 from rotor.table import Table
+from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
+from rotor.verbs.names import declared_verbs as declared_verbs
+from rotor.verbs.names import verb_of as verb_of
 
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
@@ -287,14 +289,3 @@ def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Pat
         return rows if one.write is None else lambda path: one.write(answer, path, report)  # type: ignore[misc]
 
     return {one.name: writer(one) for one in verb.outputs if not one.grows}
-
-
-SCENE_VERBS = (
-    "spectrum", "levels", "raman", "thermo", "tumble", "gas", "fluid", "stark", "zeeman", "align", "fit", "emission",
-)  # fmt: skip
-
-
-def verb_of(name: str) -> Verb:
-    """The verb of a name; only its module is imported."""
-    found: Verb = import_module(f"rotor.verbs.{name}").VERB
-    return found

@@ -1,0 +1,28 @@
+"""Which verbs there are: the files of this folder that declare one. Nothing else is imported here."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+_ORDER = (
+    "spectrum", "levels", "raman", "thermo", "tumble", "gas", "fluid", "stark", "zeeman", "align", "fit", "emission",
+)  # fmt: skip  # in which kinds are listed; others follow by name
+
+
+@cache
+def declared_verbs() -> tuple[str, ...]:
+    """The verbs that a file of this folder declares."""
+    files = Path(__file__).parent.glob("*.py")
+    names = {one.stem for one in files if "\nVERB = Verb(" in one.read_text(encoding="utf-8")}
+    return tuple(sorted(names, key=lambda name: (_ORDER.index(name) if name in _ORDER else len(_ORDER), name)))
+
+
+SCENE_VERBS = tuple(dict.fromkeys((*_ORDER, *declared_verbs())))  # kinds of scene
+
+
+def verb_of(name: str) -> Any:
+    """The `rotor.verbs.verb.Verb` of a name; only its module is imported."""
+    return import_module(f"rotor.verbs.{name}").VERB
