@@ -28,8 +28,8 @@ def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
 
     The block may have been solved for its lowest states alone.
     """
-    shares = np.zeros((int(t.max()) + 1, vectors.shape[1]))
-    np.add.at(shares, t, np.abs(vectors) ** 2)
+    members = (np.arange(int(t.max()) + 1)[:, None] == t).astype(float)
+    shares = members @ np.abs(vectors) ** 2
     numbers = np.full(vectors.shape[1], -1)
     for v, share in enumerate(shares):
         free = np.flatnonzero(numbers < 0)
