@@ -263,7 +263,7 @@ def test_partition_function_counts_torsional_states():
 
 
 def test_wrong_constants_are_refused():
-    with pytest.raises(ValueError, match="expected RAM"):
+    with pytest.raises(ValueError, match="not stated"):
         InternalRotationConstants({"F": 1.0, "rho": 0.1, "V3": 1.0}, "")
     with pytest.raises(ValueError, match="no constant of an internal rotor"):
         InternalRotationConstants({"F": 1.0, "rho": 0.1, "V3": 1.0, "DeltaJ": 1.0}, "RAM")
@@ -273,8 +273,8 @@ def test_wrong_constants_are_refused():
         InternalRotationConstants({"F": 1.0, "rho": 0.1, "V3": 1.0}, "RAM", vt_max=9)
     assert not is_torsional("J4Jz2Jpm6")
     top = acetaldehyde()
-    spins = rotor.Top.from_constants("A=9 B=4 C=3 GHz", spin_constants="chi_aa(14N)=-4 MHz")
+    text = "E[1]=9 A[1]=9 B[1]=4 C[1]=3 GHz"
+    states = rotor.Top.from_constants("A=9 B=4 C=3 GHz", states=text)
+    both = (*rotor.api.effects_of(top, False), *rotor.api.effects_of(states, False)[2:])
     with pytest.raises(ValueError, match="not computed together"):
-        rotor.api.solve_levels(
-            top, 2, effects=(*rotor.api.effects_of(top, False), *rotor.api.effects_of(spins, True)[2:])
-        )
+        rotor.api.solve_levels(top, 2, effects=both)
