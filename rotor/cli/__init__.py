@@ -41,6 +41,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "gas": "A classical gas: equipartition, correlations.",
     "fluid": "Rigid molecules in a periodic box, run in time.",
     "fit": "Constants from measured lines, with their errors.",
+    "assign": "Constants of unknown molecules from a spectrum.",
     "structure": "Structures from the constants of isotopologues.",
     "convert": "Constants from one file format into another.",
     "identify": "Which species an observed spectrum needs.",
@@ -81,6 +82,7 @@ Examples:
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
+  rotor assign peaks.csv --plot found.png
   rotor structure family.toml --plot molecule.png
   rotor new spectrum > s.toml && rotor run s.toml"""
 

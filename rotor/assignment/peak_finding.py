@@ -1,0 +1,98 @@
+"""Peaks of a spectrum on a grid: noise, local maxima of the smoothed spectrum, and a parabola through the logarithm of each.
+
+The noise is 1.4826 times the median of |x_(k+1) - x_k|/√2 in windows, so that neither lines nor a slow baseline count. The width w of lines
+(standard deviation of a Gaussian) is that of the strongest ones. The spectrum is smoothed with a Gaussian of that width, the filter
+matched to the lines; maxima above six times its noise are peaks, and a parabola through the logarithms of three points, exact for a
+Gaussian, gives the centre. With white noise σ, steps Δ and height h the matched filter places a line within
+
+    σ_ν = (σ/h) √(2 w Δ/√π),    for Σ (∂g/∂ν)² Δ = h² √π/2w of g = h exp(-ν²/2w²)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment.peaks import PeakList, peak_list
+
+THRESHOLD = 6.0  # times the noise
+WINDOW = 4096  # points over which the noise is one number
+SMALLEST_MHZ = 0.001  # standard error of a centre: what a parabola through three points is good to
+MOST_PEAKS = 20_000
+STRONGEST = 30  # peaks that tell the width
+
+
+def noise_of(intensity: Floats) -> Floats:
+    """Standard deviation of the noise at each point (n,)."""
+    steps = np.abs(np.diff(intensity))
+    edges = np.arange(0, max(len(steps) - WINDOW // 2, 1), WINDOW)
+    levels = [1.4826 * float(np.median(steps[a : a + WINDOW])) / np.sqrt(2) for a in edges]
+    positive = [level for level in levels if level > 0]
+    floor = min(positive) if positive else float(np.ptp(intensity)) * 1e-9 or 1.0
+    return np.interp(np.arange(len(intensity)), edges + WINDOW / 2, np.maximum(levels, floor))
+
+
+def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: str = "") -> PeakList:
+    """Peaks of a spectrum.
+
+    Raises ValueError for frequencies that do not rise in equal steps, for fewer than two peaks, and for more than 20,000.
+
+    >>> f = np.arange(6000.0, 6100.0, 0.02)
+    >>> lines = sum(np.exp(-(((f - f0) / 0.06) ** 2)) for f0 in (6020.011, 6071.3))
+    >>> peaks = peaks_of_spectrum(f, lines + 1e-3 * np.random.default_rng(1).normal(size=len(f)))
+    >>> [round(float(x), 3) for x in peaks.frequency_mhz]
+    [6020.011, 6071.3]
+    """
+    f, x = np.asarray(frequency_mhz, dtype=np.float64), np.asarray(intensity, dtype=np.float64)
+    where = f"{source}: " if source else ""
+    steps = np.diff(f)
+    if len(f) < 16 or not (steps > 0).all():
+        raise ValueError(f"{where}expected a spectrum of at least 16 points with rising frequencies")
+    step = float(np.median(steps))
+    noise = noise_of(x)
+    width = _width(x, noise)  # in steps
+    reach = np.arange(-int(np.ceil(4 * width)), int(np.ceil(4 * width)) + 1)
+    kernel = np.exp(-0.5 * (reach / width) ** 2)
+    kernel /= kernel.sum()
+    smooth = np.convolve(x, kernel, mode="same")
+    quiet = noise * float(np.sqrt((kernel**2).sum()))
+    top = _maxima(smooth, quiet)
+    if not 2 <= len(top) <= MOST_PEAKS:
+        raise ValueError(
+            f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise; from 2 to {MOST_PEAKS} can be searched"
+        )
+    shift, bend, centre = _parabola(smooth, top)
+    height = np.sqrt(2) * np.exp(centre - 0.5 * bend * shift**2)  # smoothing made the line √2 wider and lower
+    error = noise[top] / height * np.sqrt(2 * width / np.sqrt(np.pi)) * step
+    return peak_list(
+        f[top] + shift * step,
+        height,
+        np.maximum(error, SMALLEST_MHZ),
+        band_mhz=(float(f[0]), float(f[-1])),
+        source=source,
+    )
+
+
+def _maxima(x: Floats, noise: Floats) -> Ints:
+    """Local maxima above the threshold whose neighbours are positive."""
+    middle = x[1:-1]
+    top = np.flatnonzero((middle >= x[:-2]) & (middle > x[2:]) & (middle > THRESHOLD * noise[1:-1])) + 1
+    return np.asarray(top[(x[top - 1] > 0) & (x[top + 1] > 0)])
+
+
+def _parabola(x: Floats, top: Ints) -> tuple[Floats, Floats, Floats]:
+    """Shift of the centre in steps, second difference and middle of the logarithms around maxima."""
+    left, centre, right = (np.log(x[top + k]) for k in (-1, 0, 1))
+    bend = np.minimum(left - 2 * centre + right, -1e-9)
+    return np.clip(0.5 * (left - right) / bend, -0.5, 0.5), bend, centre
+
+
+def _width(x: Floats, noise: Floats) -> float:
+    """Standard deviation of lines in steps, from the strongest maxima."""
+    top = _maxima(x, noise)
+    if not len(top):
+        return 1.0
+    strongest = top[np.argsort(-x[top])][:STRONGEST]
+    _, bend, _ = _parabola(x, strongest)
+    return float(np.clip(np.median(1 / np.sqrt(-bend)), 0.5, 50.0))

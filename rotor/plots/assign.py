@@ -1,0 +1,88 @@
+"""A picture of an assignment: peaks above, predictions of each species mirrored below, what is left at the bottom."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.plots.picture import GREY, checked_suffix, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito, for all kinds of sight
+
+
+def plot_assignment(
+    answer: AssignAnswer,
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw an assignment into a picture.
+
+    Parameters
+    ----------
+    answer : AssignAnswer
+    path : path
+        A .png, .pdf or .svg file.
+    view : View
+        Frequencies (MHz) and intensities shown, another title.
+    provenance : mapping, optional
+        What the metadata of the file shall say.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture, and for nothing in the view.
+    """
+    checked_suffix(path)
+    title = view.title or f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
+    save(assignment_figure(answer, title, view), path, title, dict(provenance or {}))
+
+
+def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> Any:
+    """A matplotlib figure: peaks and mirrored predictions, below them the peaks that nothing explains."""
+    with styled():
+        figure = new_figure((9.0, 5.5))
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
+        peaks = answer.request.peaks
+        upper.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
+        for number, one in enumerate(answer.species):
+            colour = COLOURS[number % len(COLOURS)]
+            f, height = predicted_sticks(one, peaks.band_mhz)
+            upper.vlines(f, -height, 0, color=colour, lw=0.7, label=_label(one))
+            rows = np.unique(one.peak)
+            upper.vlines(peaks.frequency_mhz[rows], 0, peaks.intensity[rows], color=colour, lw=0.7)
+        left = answer.unexplained
+        lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
+        upper.axhline(0, color="black", lw=0.5)
+        upper.set_ylabel("intensity")
+        lower.set_ylabel("left")
+        lower.set_xlabel("frequency (MHz)")
+        upper.set_title(title)
+        upper.legend(fontsize=7, loc="upper left")
+        show_part(upper, view)
+        if view.horizontal is not None:
+            lower.set_xlim(*view.horizontal)
+        return figure
+
+
+def predicted_sticks(one: AssignedSpecies, band_mhz: tuple[float, float]) -> tuple[Any, Any]:
+    """Frequencies and heights of the lines of a species in a band, the strongest as high as was fitted."""
+    from rotor.spectra.lines import line_list
+
+    lines = line_list(one.top, temperature_k=one.grown.temperature_k, jmax=40, range_mhz=band_mhz, untrusted=True)
+    intensity = 10 ** lines.columns["lgint"]
+    height = one.strength * intensity / intensity.max(initial=1e-300)
+    seen = height > 0.003 * one.strength
+    return lines.frequency_mhz[seen], height[seen]
+
+
+def _label(one: AssignedSpecies) -> str:
+    a, b, c = one.refined.values[:3]
+    name = one.isotopologue or f"{one.kind}-type"
+    return f"{a:.1f}, {b:.1f}, {c:.1f} MHz, {name}, {one.word}"

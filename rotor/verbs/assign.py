@@ -1,0 +1,181 @@
+"""`assign`: rotational constants from a spectrum of unknown molecules."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import OBSERVABLES, all_fields, declared
+from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.readers import Range, Text
+from rotor.tops.uncertain_numbers import write_number
+from rotor.verbs.subjects import beside
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
+
+EXAMPLES = """\b
+Examples:
+  rotor assign peaks.csv
+  rotor assign spectrum.csv --species 3 --plot found.png --csv peaks_assigned.csv --lin found.lin
+  rotor assign peaks.csv --guess 2458,490,409 --temperature 2
+  rotor assign peaks.csv --isotopologues --molecule parent.xyz --json found.json"""
+
+
+@dataclass(frozen=True)
+class SpectrumInput:
+    """Which spectrum, and the geometry of its first species."""
+
+    file: str | None = declared(
+        None,
+        Text(metavar="FILE"),
+        "List of peaks, or a spectrum on a grid: .csv, .npy, FITS",
+        "spectrum.file",
+        option="SPECTRUM",
+        panel=OBSERVABLES,
+        example="peaks.csv",
+    )
+    range_mhz: tuple[float, float] | None = declared(
+        None, Range("MHz"), "Band that was recorded (MHz); by default from the first to the last peak", "spectrum.range",
+        panel=OBSERVABLES, common=True, example="6000:18000 MHz",
+    )  # fmt: skip
+    molecule: str | None = declared(
+        None, Text(metavar="FILE"), "Geometry of the first species for --isotopologues: a file, a name, SMILES:...",
+        "spectrum.molecule", panel=OBSERVABLES, common=True, example="parent.xyz",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpectrumFile(SubjectKind):
+    """The peaks of a file, and a geometry."""
+
+    fields = {one.identity: one for one in all_fields(SpectrumInput).values()}  # noqa: RUF012
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The peaks and the geometry that were given."""
+        from rotor.formats import read
+        from rotor.formats.peak_files import read_peaks
+
+        asked = read_instance(SpectrumInput, given)
+        if asked.file is None:
+            raise ValueError("no spectrum: expected a file with a list of peaks or a spectrum, such as peaks.csv")
+        values: dict[str, Any] = {"peaks": read_peaks(Path(place.folder) / asked.file, asked.range_mhz)}
+        if asked.molecule is not None:
+            path = Path(place.folder) / asked.molecule
+            top = read(path if path.is_file() else asked.molecule)
+            if getattr(top, "molecule", None) is None:
+                raise ValueError(f"{asked.molecule}: holds no geometry; expected a file with the positions of nuclei")
+            values["molecule"] = top.molecule
+        return Subject(values, (asked,), asked.file, place.note)
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The inputs, files counted from the folder of the scene."""
+        content = written_fields(subject.molecules[0])
+        return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
+
+
+def draw(answer: AssignAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.assign import plot_assignment
+
+    plot_assignment(answer, path, view=report.view, provenance=report.command)
+
+
+def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
+    """The assigned lines of the first species, ready for `rotor fit`."""
+    from rotor.formats.assigned_lines import write_assigned_lines
+
+    if not answer.species:
+        raise ValueError(f"{path}: no species was found, so that there are no lines to write")
+    write_assigned_lines(answer.species[0].lines, path)
+
+
+def show(answer: AssignAnswer, report: Report) -> None:
+    """Print the species with their constants and errors."""
+    record = report.content
+    show_facts(
+        [
+            ("spectrum", f"{record['peaks']} peaks, {record['band_mhz'][0]:g} to {record['band_mhz'][1]:g} MHz"),
+            ("spurs", f"{record['spurs']} harmonics of a clock are left out"),
+            ("answer", _verdict(answer)),
+            ("left", f"{record['unexplained']} peaks belong to no species"),
+        ]
+    )
+    for number, one in enumerate(answer.species, 1):
+        print()
+        show_table(_table(number, one))
+        show_facts(_facts(one))
+
+
+def _verdict(answer: AssignAnswer) -> str:
+    if not answer.species:
+        return "not found: no species stands above chance"
+    words = ", ".join(f"{number}: {one.word}" for number, one in enumerate(answer.species, 1))
+    return words + ("; the search was ended by its seconds" if answer.ended else "")
+
+
+def _table(number: int, one: AssignedSpecies) -> Table:
+    constants = one.constants
+    open_ = one.refined.open_constants
+    rows = [
+        [name, write_number(constants[name], constants.uncertainties[name], "MHz"), "open" if name in open_ else ""]
+        for name in constants.values
+    ]
+    title = f"species {number}, {one.word} (p = {one.probability:.4f})" + (
+        f", {one.isotopologue}" if one.isotopologue else ""
+    )
+    return Table(title, ("constant", "MHz", ""), rows)
+
+
+def _facts(one: AssignedSpecies) -> list[tuple[str, str]]:
+    a, b, c = one.dipole_ratio
+    facts = [
+        (
+            "lines",
+            f"{len(one.lines)} on {len({*one.peak.ravel().tolist()})} peaks, rms {1000 * one.refined.fit.rms_mhz():.1f} kHz",
+        ),
+        ("types", f"{one.kind}; |μa| : |μb| : |μc| = {a:.2f} : {b:.2f} : {c:.2f}"),
+        ("temperature", f"about {one.grown.temperature_k:g} K"),
+        ("evidence", f"e^{one.grown.evidence:.0f} against chance"),
+    ]
+    if one.split:
+        facts.append(("split", "its lines are doublets; their centres are fitted"))
+    for constants, _ in one.twins:
+        facts.append(
+            (
+                "twin",
+                "as good: "
+                + ", ".join(f"{name} {value:.3f}" for name, value in zip("ABC", constants, strict=True))
+                + " MHz",
+            )
+        )
+    return facts
+
+
+VERB = Verb(
+    name="assign",
+    about="Rotational constants of unknown molecules from a spectrum, with the probability that they are right.",
+    examples=EXAMPLES,
+    request=AssignRequest,
+    answer=lambda request, work: answer_assign(request),
+    table=lambda answer: answer.table,
+    rows="assignments",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write every peak with its assignment as CSV", example="assigned.csv"),
+        Output(
+            "lin",
+            (".lin", ".csv"),
+            "Write the lines of the first species, ready for rotor fit",
+            write_lines,
+            "found.lin",
+        ),
+        Output("plot", PICTURES, "Draw peaks, predictions and what is left (.png, .pdf, .svg)", draw, "found.png"),
+    ),
+    subject=SpectrumFile(),
+    drawn="MHz",
+    scaled=False,
+    start={"spectrum.file": "peaks.csv", "observables.species": 1, "outputs.csv": "assigned.csv"},
+)
