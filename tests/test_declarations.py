@@ -20,7 +20,7 @@ from rotor.scenes.scene_file import parse_scene, scene_text
 from rotor.scenes.template import template
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
-OTHERWISE = ("align", "emission", "tumble", "fluid", "fit")  # kinds that are of more than a molecule
+OTHERWISE = ("align", "assign", "emission", "tumble", "fluid", "fit")  # kinds that are of more than a molecule
 DECLARED = [kind for kind in SCENE_VERBS if find_spec(f"rotor.verbs.{kind}") is not None]
 
 

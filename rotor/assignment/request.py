@@ -70,12 +70,14 @@ class AssignRequest:
         common=True,
         example=[2458.0, 490.0, 409.0],
     )
-    low_mhz: tuple[float, ...] = declared(
-        LOWEST_MHZ, Numbers("MHz", (3,), "500,200,150"), "Least A, B, C (MHz)", "observables.low"
-    )
-    high_mhz: tuple[float, ...] = declared(
-        HIGHEST_MHZ, Numbers("MHz", (3,), "20000,12000,9000"), "Greatest A, B, C (MHz)", "observables.high"
-    )
+    low_mhz: tuple[float, ...] | None = declared(
+        None, Numbers("MHz", (3,), "500,200,150"), "Least A, B, C (MHz); by default 500,200,150", "observables.low",
+        example=[500.0, 200.0, 150.0],
+    )  # fmt: skip
+    high_mhz: tuple[float, ...] | None = declared(
+        None, Numbers("MHz", (3,), "20000,12000,9000"), "Greatest A, B, C (MHz); by default 20000,12000,9000",
+        "observables.high", example=[20000.0, 12000.0, 9000.0],
+    )  # fmt: skip
     isotopologues: bool = declared(
         False,
         Flag(),
@@ -90,10 +92,9 @@ class AssignRequest:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        low, high = np.array(self.low_mhz), np.array(self.high_mhz)
-        if not (low < high).all() or not (low > 0).all():
+        if not (self._range.low > 0).all() or not (self._range.low < self._range.high).all():
             raise ValueError(
-                f"low_mhz: {self.low_mhz}, high_mhz: {self.high_mhz}: expected 0 < low < high for A, B and C"
+                f"low_mhz, high_mhz: {self._range.low}, {self._range.high}: expected 0 < low < high for A, B and C"
             )
         if self.guess_mhz is not None and not (self.guess_mhz[0] > self.guess_mhz[1] > self.guess_mhz[2] > 0):
             raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
@@ -104,9 +105,13 @@ class AssignRequest:
     def bounds(self) -> Bounds:
         """Of A, B, C, those of the guess where there is one."""
         if self.guess_mhz is None:
-            return Bounds(np.array(self.low_mhz), np.array(self.high_mhz))
+            return self._range
         centre = np.array(self.guess_mhz)
         return Bounds(centre * (1 - GUESS_ERROR), centre * (1 + GUESS_ERROR))
+
+    @property
+    def _range(self) -> Bounds:
+        return Bounds(np.array(self.low_mhz or LOWEST_MHZ), np.array(self.high_mhz or HIGHEST_MHZ))
 
     @property
     def temperatures(self) -> Floats:

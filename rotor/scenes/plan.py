@@ -390,7 +390,14 @@ def _emission(request: Any) -> Plan:
     return plan_of_emission(request)
 
 
+def _assign(request: Any) -> Plan:
+    from rotor.scenes.plan_measured import plan_of_assign
+
+    return plan_of_assign(request)
+
+
 _PLANS: dict[str, Callable[[Any], Plan]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _in_field, "zeeman": _in_field,
     "align": _align, "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
+    "assign": _assign,
 }  # fmt: skip

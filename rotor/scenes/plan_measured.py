@@ -97,3 +97,27 @@ def plan_of_emission(request: Any) -> Plan:
         memory_mb=peak_mb(lambda: answer_emission(request)),
         left_out=tuple(sorted(absent, key=lambda one: (one.size is None, -(one.size or 0.0)))),
     )
+
+
+def plan_of_assign(request: Any) -> Plan:
+    """What a search for constants will do; its time is bounded by the seconds of the request."""
+    peaks = request.peaks
+    known = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
+    bounds = request.bounds
+    limits = ", ".join(
+        f"{name} {low:g} to {high:g}" for name, low, high in zip("ABC", bounds.low, bounds.high, strict=True)
+    )
+    return Plan(
+        kind="assign",
+        effects=("rigid", "quartic distortion"),
+        good=("J",),
+        parts=(
+            ("method", "families of three lines on the strongest peaks, evidence against chance, refinement by a fit"),
+            ("bounds", f"{limits} MHz"),
+            ("temperature", known),
+        ),
+        counts={"peaks": len(peaks), "species": request.species},
+        seconds=float(min(request.seconds, 1.0 + request.species)),
+        memory_mb=150.0,
+        left_out=(),
+    )

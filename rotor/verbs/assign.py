@@ -12,7 +12,7 @@ from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Range, Text
-from rotor.tops.uncertain_numbers import write_number
+from rotor.fitting.publication import value_text
 from rotor.verbs.subjects import beside
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
 
@@ -120,7 +120,7 @@ def _table(number: int, one: AssignedSpecies) -> Table:
     constants = one.constants
     open_ = one.refined.open_constants
     rows = [
-        [name, write_number(constants[name], constants.uncertainties[name], "MHz"), "open" if name in open_ else ""]
+        [name, value_text(constants[name], constants.uncertainties[name]), "open" if name in open_ else ""]
         for name in constants.values
     ]
     title = f"species {number}, {one.word} (p = {one.probability:.4f})" + (
