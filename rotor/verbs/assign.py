@@ -8,11 +8,11 @@ from typing import Any
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.fitting.publication import value_text
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Range, Text
-from rotor.fitting.publication import value_text
 from rotor.verbs.subjects import beside
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
 
