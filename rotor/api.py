@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rotor.alignment.align import align as align
     from rotor.alignment.request import AlignRequest as AlignRequest
     from rotor.alignment.request import answer_align as answer_align
+    from rotor.assignment.request import AssignRequest as AssignRequest
+    from rotor.assignment.request import answer_assign as answer_assign
     from rotor.classical.free.free_motion import free_motion as free_motion
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
     from rotor.classical.tumble import answer_tumble as answer_tumble
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
 
 MODULES = {
     "AlignRequest": "rotor.alignment.request",
+    "AssignRequest": "rotor.assignment.request",
     "AlignmentTrace": "rotor.alignment.align",
     "FluidRequest": "rotor.fluids.request",
     "GasLayer": "rotor.spectra.request",
@@ -73,6 +76,7 @@ MODULES = {
     "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
     "align": "rotor.alignment.align",
     "answer_align": "rotor.alignment.request",
+    "answer_assign": "rotor.assignment.request",
     "answer_fluid": "rotor.fluids.request",
     "answer_gas": "rotor.thermodynamics.classical_gas",
     "answer_levels": "rotor.quantum.request",

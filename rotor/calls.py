@@ -33,6 +33,7 @@ EXAMPLES = {
     "emission": (
         'rotor.emission(["CO"], column_per_cm2="1e16", excitation_k="20 K", range_mhz="115:116GHz").table.names', "('carbon monoxide',)",
     ),
+    "assign": ("rotor.assign([[7000.0, 1.0], [9000.0, 2.0]]).word", "'not found'"),
     "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
 }  # fmt: skip  # of each function: an expression and its value, which a test evaluates
 

@@ -49,6 +49,11 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
         spectrum = read_spectrum(path)
         return _in_band(peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, name), band_mhz)
     columns = _of_npy(name) if name.lower().endswith(".npy") else _of_csv(Path(path))
+    return peaks_of_columns(columns, band_mhz, name)
+
+
+def peaks_of_columns(columns: Floats, band_mhz: tuple[float, float] | None = None, name: str = "") -> PeakList:
+    """The peaks of columns (n, 2 or 3): a list of them, or a spectrum where frequencies rise in equal steps."""
     frequency = columns[:, 0]
     steps = np.diff(frequency)
     if len(steps) >= LEAST_GRID and steps.mean() > 0 and np.ptp(steps) < EQUAL_STEPS * steps.mean():

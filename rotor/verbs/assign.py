@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from rotor.fitting.publication import value_text
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
-from rotor.requests.readers import Range, Text
+from rotor.requests.readers import Custom, Range, Text
 from rotor.verbs.subjects import beside
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
 
@@ -24,13 +25,25 @@ Examples:
   rotor assign peaks.csv --isotopologues --molecule parent.xyz --json found.json"""
 
 
+def spectrum_source(given: Any) -> Any:
+    """A file by its name, or rows or columns of numbers."""
+    if isinstance(given, str | os.PathLike):
+        return os.fspath(given)
+    import numpy as np
+
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim != 2 or not {2, 3} & set(values.shape):
+        raise ValueError(f"an array of shape {values.shape}: expected columns of frequency, intensity[, error]")
+    return values if values.shape[1] in (2, 3) else values.T
+
+
 @dataclass(frozen=True)
 class SpectrumInput:
     """Which spectrum, and the geometry of its first species."""
 
-    file: str | None = declared(
+    source: Any = declared(
         None,
-        Text(metavar="FILE"),
+        Custom(spectrum_source, metavar="FILE"),
         "List of peaks, or a spectrum on a grid: .csv, .npy, FITS",
         "spectrum.file",
         option="SPECTRUM",
@@ -56,22 +69,26 @@ class SpectrumFile(SubjectKind):
     def read(self, given: Given, place: Place, verb: Verb) -> Subject:
         """The peaks and the geometry that were given."""
         from rotor.formats import read
-        from rotor.formats.peak_files import read_peaks
+        from rotor.formats.peak_files import peaks_of_columns, read_peaks
 
         asked = read_instance(SpectrumInput, given)
-        if asked.file is None:
+        if asked.source is None:
             raise ValueError("no spectrum: expected a file with a list of peaks or a spectrum, such as peaks.csv")
-        values: dict[str, Any] = {"peaks": read_peaks(Path(place.folder) / asked.file, asked.range_mhz)}
+        is_file = isinstance(asked.source, str)
+        spectrum = Path(place.folder) / asked.source if is_file else asked.source
+        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_of_columns)(spectrum, asked.range_mhz)}
         if asked.molecule is not None:
             path = Path(place.folder) / asked.molecule
             top = read(path if path.is_file() else asked.molecule)
             if getattr(top, "molecule", None) is None:
                 raise ValueError(f"{asked.molecule}: holds no geometry; expected a file with the positions of nuclei")
             values["molecule"] = top.molecule
-        return Subject(values, (asked,), asked.file, place.note)
+        return Subject(values, (asked,), asked.source if is_file else "numbers", place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs, files counted from the folder of the scene."""
+        if not isinstance(subject.molecules[0].source, str):
+            raise ValueError("a scene holds no numbers of a spectrum; give a file")
         content = written_fields(subject.molecules[0])
         return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
 
