@@ -38,7 +38,17 @@ if TYPE_CHECKING:
     from rotor.tops.states.state_constants import StateConstants as StateConstants
     from rotor.tops.top import Top as Top
 
-VERBS = ("spectrum", "levels", "raman", "thermo", "gas", "stark", "zeeman", "emission", "assign")  # each a function of that name
+VERBS = (
+    "spectrum",
+    "levels",
+    "raman",
+    "thermo",
+    "gas",
+    "stark",
+    "zeeman",
+    "emission",
+    "assign",
+)  # each a function of that name
 
 _MODULES = {
     "ErrorBudget": "rotor.requests.budget",
