@@ -164,6 +164,9 @@ def _grown(
             temperature = best_temperature(field, constants, covariance, sigma0)
         chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else CHANCE_OF_FEW
         matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
+        while chance < CHANCE_OF_FEW and (matched is None or len(np.unique(matched.peak)) < FEW):
+            chance = min(3 * chance, CHANCE_OF_FEW)
+            matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
         if matched is None or len(matched.peak) < 5:
             return None
         constants, covariance, sigma0, found = _refitted(field, constants, prior, temperature, matched, sigma0, start)

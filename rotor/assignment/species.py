@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
-from rotor.assignment.growth import Grown, grow, predict, regrown
+from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown
 from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import Candidate, Field, quick_ratios, ranked, roots_of
 
@@ -25,6 +26,8 @@ NEAR, GROWN_NEAR = (
     2e-3,
 )  # relative difference of constants of roots of which one is grown; of those near a species
 AROUND = 0.01  # relative difference of constants of roots that may be of one species
+MOST_ALIASES = 4
+LOW_J, LOW_KA, SHIFT_PEAKS = 8, 3, 25  # lines and peaks that tell shifts of A, B and C together
 PEAK_MHZ = 0.1  # half the width of a peak
 MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
 
@@ -94,7 +97,11 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
         return best
     first = best[0]
     near = [one for one in candidates if np.abs(np.log(one.constants / first.constants[:3])).max() < AROUND]
-    again = [regrown(seen, first), *_grown(seen, near, [], 2), *_grown(seen, aliases(seen, first), [], 3)]
+    again = [
+        regrown(seen, first),
+        *_grown(seen, near, [], 2),
+        *_grown(seen, aliases(seen, first), [], 2 * MOST_ALIASES),
+    ]
     return _best(best + again)
 
 
@@ -142,40 +149,65 @@ def _best(grown: Sequence[Grown]) -> list[Grown]:
 
 
 def aliases(seen: Field, grown: Grown) -> list[Candidate]:
+    """Candidates with other constants of which a species' lines are a part, so that it may be a wrong answer."""
+    return [*multiples(seen, grown), *shifts(seen, grown)]
+
+
+def multiples(seen: Field, grown: Grown) -> list[Candidate]:
     """Candidates whose a-type R branches fall on the same peaks with J multiplied by a ratio r.
 
     With B' = B/r, C' = C/r and A' - ½(B'+C') = r (A - ½(B+C)) both the splitting of K = 1, (B-C) J, and the shift of K = 0,
-    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)), stay.
+    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)), stay. Within some per cent of these
+    constants the lines of K = 0 and 1 are laid on the strongest peaks.
     """
-    start = grown.start
-    if start is None or not grown.ratios[0] > 3.0:
+    if not grown.ratios[0] > LEAST_RATIO:
         return []
     a, b, c = grown.constants[:3]
-    tops, families = list[Floats](), list[Family]()
+    mean, out, seeds = (b + c) / 2, list[Candidate](), seen.seeds(2 * FIRST_STAGES[0].seeds)
     for ratio in MULTIPLES:
-        mean = (b + c) / 2
         top = np.array([ratio * (a - mean) + mean / ratio, b / ratio, c / ratio])
-        if not (seen.bounds.low <= top).all() or not (top <= seen.bounds.high).all() or top[0] <= top[1]:
+        if top[0] <= top[1] or (top < seen.bounds.low).any() or (top > seen.bounds.high).any():
             continue
-        for j in _strong_j(seen, top):
+        narrow = replace(seen, bounds=Bounds(top * (0.9, 0.999, 0.999), top * (1.1, 1.001, 1.001)))
+        middle = round(sum(seen.peaks.band_mhz) / 2 / (top[1] + top[2]))
+        for j in (middle - 1, middle, middle + 1):
             family = _lowest_a_lines(seen, j)
             if family is not None:
-                tops.append(top)
-                families.append(family)
-    if not tops:
+                out += ranked(narrow, family, roots_of(narrow, family, seeds, 0), FAINT)[:2]
+    return sorted(out, key=lambda one: -one.ratio)[:MOST_ALIASES]
+
+
+def shifts(seen: Field, grown: Grown) -> list[Candidate]:
+    """Candidates A + x, B + x, C + x, which have the same Q branches; x lays a line of an R branch on a strong peak."""
+    table, constants = seen.table, grown.constants.copy()
+    energy = np.empty(len(seen.jj))
+    _kernels.level_energies(table.levels, table.theta, seen.jj, constants, energy)
+    change = seen.jj[table.upper] - seen.jj[table.lower]
+    low = (table.quanta[table.upper, 0] <= LOW_J) & (table.quanta[table.upper, 1] <= LOW_KA)
+    present = (grown.ratios > LEAST_RATIO)[table.kind]
+    rows = np.flatnonzero(low & present & (change > 0) & (table.quanta[table.lower, 1] <= LOW_KA))
+    line = energy[table.upper[rows]] - energy[table.lower[rows]]
+    peaks = seen.peaks.frequency_mhz[seen.order[:SHIFT_PEAKS]]
+    x = ((peaks[None, :] - line[:, None]) / change[rows][:, None]).ravel()
+    tops = constants[:3] + x[:, None]
+    a, b, c = tops.T
+    sound = (np.abs(x) > 1e-3 * constants[2]) & (c * (a + b) > 0.99 * a * b)
+    sound &= (tops > seen.bounds.low).all(axis=1) & (tops < seen.bounds.high).all(axis=1)
+    tops, which = np.ascontiguousarray(tops[sound]), np.repeat(rows, len(peaks))[sound]
+    if not len(tops):
         return []
-    ratios, temperatures = quick_ratios(seen, np.array(tops), np.zeros(len(tops), dtype=np.int64))
-    return [
-        Candidate(top, family, float(ratio), float(temperature))
-        for top, family, ratio, temperature in zip(tops, families, ratios, temperatures, strict=True)
-        if ratio > FAINT
+    each = [quick_ratios(seen, tops, np.full(len(tops), q)) for q in np.flatnonzero(grown.ratios > LEAST_RATIO)]
+    ratios = np.sum([ratio for ratio, _ in each], axis=0)
+    temperatures = np.array([temperature for _, temperature in each])[
+        np.argmax([ratio for ratio, _ in each], axis=0), np.arange(len(tops))
     ]
-
-
-def _strong_j(seen: Field, top: Floats) -> list[int]:
-    """J of the a-type R branch in the middle of the band."""
-    low, high = seen.peaks.band_mhz
-    return [round((low + high) / 2 / (top[1] + top[2]))]
+    slow = grown.rows[change[grown.rows] == 0][:2]
+    out = list[Candidate]()
+    for n in np.argsort(-ratios)[: 5 * MOST_ALIASES].tolist():
+        if ratios[n] > FAINT and all(np.abs(np.log(tops[n] / one.constants)).max() > NEAR for one in out):
+            family = Family(_kernels.MIXED, np.concatenate([which[n : n + 1], slow]), slow[:0], 0.0)
+            out.append(Candidate(tops[n], family, float(ratios[n]), float(temperatures[n])))
+    return out[:MOST_ALIASES]
 
 
 def _lowest_a_lines(seen: Field, j: int) -> Family | None:
@@ -198,7 +230,7 @@ def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
     out = np.zeros(len(seen.peaks), dtype=bool)
     out[grown.peak] = True
     lines = predict(seen, grown.constants, grown.temperature_k, 4000)
-    level = lines.expected + np.where(grown.ratios > 3.0, grown.scales, -np.inf)[lines.kind]
+    level = lines.expected + np.where(grown.ratios > LEAST_RATIO, grown.scales, -np.inf)[lines.kind]
     strong = level > seen.peaks.log_threshold - 2.0
     f, height = lines.frequency[strong], level[strong]
     peaks = seen.peaks
@@ -212,5 +244,5 @@ def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
 def strength(seen: Field, grown: Grown) -> float:
     """Height of the strongest line of a species in the units of the intensities, from the fitted scales."""
     lines = predict(seen, grown.constants, grown.temperature_k, 20)
-    level = lines.expected + np.where(grown.ratios > 3.0, grown.scales, -np.inf)[lines.kind]
+    level = lines.expected + np.where(grown.ratios > LEAST_RATIO, grown.scales, -np.inf)[lines.kind]
     return float(np.exp(level.max()))
