@@ -158,3 +158,20 @@ def test_what_knows_no_internal_rotation_refuses_it(acetaldehyde, call, command)
     code, _, err = call(verb, str(acetaldehyde), *options)
     assert code == 2
     assert "internal rotation" in err
+
+
+def test_a_plan_states_what_the_truncation_of_the_torsion_costs(acetaldehyde, call):
+    (acetaldehyde.parent / "scene.toml").write_text(
+        'schema = 1\nkind = "spectrum"\nmolecule = "ch3cho.toml"\n[conditions]\ntemperature = "10 K"\n[numerics]\njmax = 3\n'
+    )
+    code, out, _ = call("plan", str(acetaldehyde.parent / "scene.toml"))
+    assert code == 0
+    assert "9 torsional functions for each K" in out
+    assert re.search(r"truncation +at most \S+ MHz at J = 3", out)
+
+
+def test_a_field_on_a_molecule_with_spins_is_refused_too(acetaldehyde, call):
+    acetaldehyde.write_text(ACETALDEHYDE + "[spins.14N]\nchi_aa = -4\n")
+    code, _, err = call("stark", str(acetaldehyde), "--hyperfine", "--field", "0:1kV/cm:2")
+    assert code == 2
+    assert "internal rotation" in err

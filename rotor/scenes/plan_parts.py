@@ -14,6 +14,7 @@ from rotor.scenes.left_out import LeftOut
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.internal_rotation import InternalRotationConstants
     from rotor.tops.top import Top
 
 LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
@@ -137,6 +138,9 @@ def _extrapolated(
     return most + rate * (work(size) - work(second))
 
 
+MOST_J_COMPARED = 30  # J up to which the truncation of the torsion is compared with more functions
+
+
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
     """Basis, blocks and method of the levels of a top."""
     from rotor.quantum.estimates.convergence import converges_to
@@ -144,6 +148,8 @@ def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[t
     from rotor.quantum.wang.rotation import representation_of
 
     spins = [spin for effect in effects for spin in effect.spins(top)]
+    if top.internal_rotation is not None:
+        return _torsional_parts(top, top.internal_rotation, jmax)
     if top.kind in ("linear", "spherical", "prolate", "oblate"):
         basis, method = f"J to {jmax}; no matrix", f"closed form: H is diagonal in the basis of a {top.kind} top"
     else:
@@ -179,3 +185,18 @@ def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
     from rotor.quantum.solve import solve_levels
 
     return solve_levels(top, 1, effects=effects, vectors=False).quanta_names
+
+
+def _torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -> list[tuple[str, str]]:
+    """Basis, method and truncation error of levels with an internal rotor."""
+    from rotor.quantum.internal_rotation.levels import ram_model
+    from rotor.quantum.internal_rotation.truncation import truncation_mhz
+
+    count = constants.functions
+    size = (2 * jmax + 1) * count
+    error = truncation_mhz(ram_model(top, constants), min(jmax, MOST_J_COMPARED), constants.vt_max, count)
+    return [
+        ("basis", f"J to {jmax}; {count} torsional functions for each K, blocks of up to {size} states"),
+        ("method", f"torsion of each K and species first; {ENERGY}"),
+        ("truncation", f"at most {error:.1g} MHz at J = {min(jmax, MOST_J_COMPARED)}, v_t up to {constants.vt_max}"),
+    ]

@@ -39,6 +39,7 @@ from rotor.quantum.spins.rotor import (
 )
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.three_spins import Allowed
+from rotor.tops.top import without_internal_rotation
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -164,6 +165,7 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     -------
     Plan
     """
+    without_internal_rotation(top, "levels with spins in a field")
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)

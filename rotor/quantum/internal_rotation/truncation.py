@@ -1,0 +1,34 @@
+"""What the truncation to n_v torsional functions costs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor.quantum.internal_rotation.model import RamModel
+
+STEP = 4  # further functions that levels are compared with
+MARGIN = 1.5  # on the fall from n_v to n_v + 4 functions: the series falls at least fivefold in four functions
+ROUNDING = 64 * float(np.finfo(float).eps)  # of the largest energy in a block
+
+
+def truncation_mhz(model: RamModel, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
+    """A bound of how far levels with v_t ≤ vt_max lie above those of all torsional functions, MHz, at J = jmax, where it is largest.
+
+    Energies are upper bounds that fall with n_v. The fall from n_v to n_v + 4 functions, half as much again, and round-off.
+
+    >>> model = RamModel({"A": 9e3, "B": 4e3, "C": 3e3, "Dab": 0.0, "F": 2e5, "rho": 0.1, "V3": 1e7})
+    >>> truncation_mhz(model, 3, 0, 9) < 1e-5
+    True
+    """
+    largest, scale = 0.0, 0.0
+    more = min(count + STEP, 2 * waves + 1)
+    for sigma in (0, 1):
+        energies = []
+        for functions in (count, more):
+            blocks = model.blocks(sigma, jmax, jmin=jmax, count=functions, waves=waves)
+            levels = blocks.solve(model.coefficients, vt_max)
+            order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])
+            energies.append(levels.energies[order])
+            scale = max(scale, float(np.nanmax(levels.solved.energies)))
+        largest = max(largest, float(np.abs(energies[0] - energies[1]).max()))
+    return MARGIN * largest + ROUNDING * scale
