@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 import rotor
+from rotor import units
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import ROUNDING, model_term
+from rotor.quantum.estimates.limits import every_limit, populated_j
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
+from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -106,12 +110,99 @@ def test_an_accuracy_is_compared_with_the_whole_budget(call, folder):
     assert text.endswith("measured constants would lower it")
 
 
-@pytest.mark.parametrize("verb", ["spectrum", "levels", "raman"])
+VERBS = {
+    "spectrum": ("HCN",),
+    "levels": ("HCN",),
+    "raman": ("HCN", "--polarizability", "3,2"),
+    "stark": ("OCS", "--field", "0:20kV/cm:3"),
+    "zeeman": ("OCS", "--g=-0.0287", "--field", "0:1T:3"),
+    "thermo": ("CO", "--temperature", "20,100", "--vibration", "2143"),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_report_table_and_json_have_the_same_numbers(call, verb):
-    given = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
-    code, out, _ = call(verb, *given, "--errors")
+    code, out, _ = call(verb, *VERBS[verb], "--errors")
     assert code == 0
-    budget = ErrorBudget.from_json(json.loads(call(verb, *given, "--json", "-")[1])["errors"])
+    budget = ErrorBudget.from_json(json.loads(call(verb, *VERBS[verb], "--json", "-")[1])["errors"])
     joined = " ".join(out.split())
     assert "errors " + budget.line().removeprefix("errors ") in joined
-    assert f"model {budget.model.value:.2g} MHz, size, within a factor of 3: {budget.model.source}" in joined
+    size = f"{budget.model.value:.2g} {budget.unit}".rstrip()
+    assert f"model {size}, size, within a factor of 3: {budget.model.source}" in joined
+
+
+def test_a_static_field_polarizes_as_light_of_its_intensity_does():
+    """½ α F² is the energy in light of the intensity c ε0 F², whose field is F in the root mean square."""
+    from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2
+    from rotor.quantum.fields.budgets import MHZ_PER_ANGSTROM3
+
+    w_per_cm2 = units.SPEED_OF_LIGHT_M_PER_S * units.VACUUM_PERMITTIVITY_F_PER_M * 1e10 * 1e-4
+    assert math.isclose(MHZ_PER_ANGSTROM3, MHZ_ANGSTROM3_W_PER_CM2 * w_per_cm2, rel_tol=1e-9)  # digits of ε0
+
+
+def test_the_error_of_an_estimated_dipole_is_that_of_the_energies():
+    """Against energies with a dipole that is larger by a thousandth."""
+    from rotor.quantum.fields.budgets import ESTIMATED_DIPOLE_D
+    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+
+    def energies(scale):
+        dipole = tuple(scale * x for x in (1.0, 0.5, 0.0))
+        top = Top(Constants(A=20000.0, B=6000.0, C=5000.0), dipole, dipole_source="estimate from charges")
+        return answer_stark(StarkRequest(top, (0.0, 20.0), j_highest=1))
+
+    answer = energies(1.0)
+    moved = np.abs(energies(1.001).states.energy_mhz - energies(0.999).states.energy_mhz).max() / 0.002
+    sigma = moved * ESTIMATED_DIPOLE_D / math.hypot(1.0, 0.5)
+    assert answer.errors.data.value is None  # the constants have no uncertainties
+    assert f"{sigma:.2g} MHz" in answer.errors.data.source
+
+
+def test_maps_state_their_bounds_and_the_unknown_moments():
+    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+
+    answer = answer_stark(StarkRequest(rotor.read("OCS"), (0.0, 50.0)))
+    assert answer.errors.numerical == pytest.approx(answer.states.accuracy_mhz, rel=0.5)
+    assert answer.errors.numerical >= answer.states.accuracy_mhz
+    assert answer.errors.data.source.startswith("the dipole has no stated uncertainty; constants: covariance of B")
+    free = answer_stark(StarkRequest(rotor.read("OCS"), (0.0,)))
+    assert free.errors.data.value > 0.0
+    assert "polarization" not in free.errors.model.source
+
+
+@pytest.mark.parametrize(
+    ("kind", "constants"), [("linear", {"B": 6000.0}), ("asymmetric", {"A": 20000.0, "B": 6000.0, "C": 5000.0})]
+)
+def test_the_data_of_q_are_its_derivatives(kind, constants):
+    """Against Q with each constant moved by its standard deviation; an asymmetric top at 300 K is classical within 1 %."""
+    sigma = {name: 0.001 * value for name, value in constants.items()}
+
+    def partition(**moved):
+        top = Top(Constants(**(constants | moved), uncertainties=sigma), (1.0, 0.0, 0.0))
+        return answer_thermo(ThermoRequest(top, (300.0,)))
+
+    assert partition().request.top.kind == kind
+    shifts = [
+        np.log(partition(**{n: constants[n] + sigma[n]}).functions.q_rot / partition().functions.q_rot) for n in sigma
+    ]
+    assert partition().errors.data.value == pytest.approx(math.hypot(*(float(x[0]) for x in shifts)), rel=0.01)
+
+
+def test_the_model_of_q_is_the_error_of_the_geometry():
+    """Q of a bent molecule goes as (ABC)^-1/2: a geometry that is off by r makes it wrong by 3r/2."""
+    top = rotor.read("SMILES:CC(Cl)C#N")
+    relative = top.molecule.uncertainty
+    with_vibration = answer_thermo(ThermoRequest(top, (300.0,), vibrations=VibrationalStates.parse("200")))
+    limits = {one.name: one.size_mhz for one in every_limit(top, populated_j(top, 300.0), with_vibration.effects)}
+    share = limits["error of the geometry"] / sum(size for size in limits.values() if size)
+    assert with_vibration.errors.model.value * share == pytest.approx(1.5 * relative, rel=0.5)
+    assert answer_thermo(ThermoRequest(top, (300.0,))).errors.model.source == "vibration is left out"
+
+
+def test_numerical_errors_of_q_are_bounds():
+    """Against sums to 1e-12."""
+    top = Top.from_constants("A=20000 B=6000 C=5000 MHz")
+    for relative_error in (1e-2, 1e-4, 1e-6):
+        answer = answer_thermo(ThermoRequest(top, (3.0, 30.0), relative_error=relative_error))
+        exact = answer_thermo(ThermoRequest(top, (3.0, 30.0), relative_error=1e-12))
+        actual = np.abs(answer.functions.q_rot / exact.functions.q_rot - 1).max()
+        assert 0.0 < actual <= answer.errors.numerical <= 2 * relative_error

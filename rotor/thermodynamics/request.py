@@ -11,8 +11,9 @@ from rotor.checks import require_positive, require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Custom, Grid, Quantity, Text
 from rotor.table import TextOf
@@ -119,6 +120,16 @@ class ThermoAnswer(TextOf):
         """The temperature above which the heat capacity is classical within 1 %; None where no sum over levels reaches so far."""
         return classical_above_if_known(self.request.top, CLASSICAL_TOLERANCE)
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far Q can be trusted."""
+        from rotor.thermodynamics.budgets import q_budget
+
+        top, effects = self.functions.top, self.effects
+        j = populated_j(top, float(self.functions.temperature_k.max()))
+        parameters = dict.fromkeys(name for effect in effects for name in effect.parameters(top))
+        return q_budget(self.functions, j, every_limit(top, j, effects), tuple(parameters))
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         functions = self.functions
@@ -142,6 +153,7 @@ class ThermoAnswer(TextOf):
             "electronic": gas.electronic.text if gas is not None else None,
             "hyperfine": functions.hyperfine,
             **limit_facts(top, populated_j(top, float(functions.temperature_k.max())), self.effects),
+            "errors": self.errors.as_json(),
         }
 
 

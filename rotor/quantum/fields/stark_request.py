@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,11 +21,12 @@ from rotor.quantum.effects.stark import (
     doubled_m,
     stark_map,
 )
-from rotor.quantum.estimates.limits import limit_facts
+from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import MOST_AT_EDGE
 from rotor.quantum.fields.readers import MOST_J, highest_j, read_direction, read_m
 from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Custom, Grid, Quantity, Whole
 from rotor.table import TextOf
@@ -32,6 +34,7 @@ from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.estimates.beyond import Limit
     from rotor.tops.top import Top
 
 POINTS = 201  # of a range of fields without a count
@@ -122,6 +125,26 @@ class StarkAnswer(TextOf):
     request: StarkRequest
     states: FieldMap
 
+    @cached_property
+    def further_limits(self) -> list[Limit]:
+        """What of the field the map leaves out."""
+        from rotor.quantum.fields.budgets import static_polarization
+
+        return static_polarization(self.request.top, float(np.abs(self.states.fields).max()))
+
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the energies can be trusted."""
+        from rotor.quantum.fields.budgets import constants_term, dipole_term, joined_data, map_budget
+
+        request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
+        j = max(request.j_highest, 1)
+        terms = [dipole_term(request.top, self.states), constants_term(request.top, effects, j)]
+        if request.intensity_w_per_cm2:
+            terms.append(ErrorTerm(None, "the polarizability has no stated uncertainty"))
+        limits = [*every_limit(request.top, j, effects), *self.further_limits]
+        return map_budget(self.states, limits, joined_data(*terms))
+
     def facts(self) -> Mapping[str, Any]:
         """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
         fields, request = self.states.fields, self.request
@@ -136,7 +159,13 @@ class StarkAnswer(TextOf):
             "tolerance_mhz": request.tolerance_mhz,
             **self.states.provenance,
             "curves": len(self.states.curves()),
-            **limit_facts(request.top, max(request.j_highest, 1), effects_of(request.top, request.hyperfine)),
+            **limit_facts(
+                request.top,
+                max(request.j_highest, 1),
+                effects_of(request.top, request.hyperfine),
+                self.further_limits,
+            ),
+            "errors": self.errors.as_json(),
         }
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,11 +16,12 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
 from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
 from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.limits import limit_facts
+from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import checked_fields
 from rotor.quantum.fields.readers import MOST_J, highest_j
 from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import SPINS, check_fields, declared
 from rotor.requests.readers import Custom, Grid, Pairs, Quantity, Whole
 from rotor.table import TextOf
@@ -139,6 +141,19 @@ class ZeemanAnswer(TextOf):
     request: ZeemanRequest
     states: FieldMap
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the energies can be trusted."""
+        from rotor.quantum.fields.budgets import constants_term, joined_data, map_budget
+
+        request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
+        j = max(request.j_highest, 1)
+        moment = ErrorTerm(0.0, "no field acts")
+        if self.states.fields.any():
+            moment = ErrorTerm(None, "the g tensor has no stated uncertainty")
+        limits = [*every_limit(request.top, j, effects), *magnetic_limits(request)]
+        return map_budget(self.states, limits, joined_data(moment, constants_term(request.top, effects, j)))
+
     def facts(self) -> Mapping[str, Any]:
         """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
         fields, request, magnetic = self.states.fields, self.request, self.request.magnetic
@@ -160,6 +175,7 @@ class ZeemanAnswer(TextOf):
                 effects_of(request.top, request.hyperfine),
                 magnetic_limits(request),
             ),
+            "errors": self.errors.as_json(),
         }
 
 

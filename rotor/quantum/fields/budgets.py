@@ -1,0 +1,125 @@
+"""Error budgets of maps of levels in a field (`rotor.requests.budget`).
+
+H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F, F the strength of the field (theorem of Hellmann and
+Feynman): a relative error of the dipole moves an energy by so much of the field times its slope. A static field also polarizes the
+molecule, which maps leave out: by definition of the polarizability -½ α F², with α/4πε0 a volume.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor import units
+from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, data_term, model_term, parameter_names
+from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
+from rotor.quantum.solve import solve_levels
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.fields.field_map import FieldMap
+    from rotor.tops.top import Top
+
+# ½ α F² in MHz of 1 Å³ in 1 kV/cm
+MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e10 / units.PLANCK_J_S * 1e-6
+ESTIMATED_DIPOLE_D = (
+    0.2 / 0.6745
+)  # half of the estimates are off by more than 0.2 D: a normal distribution with this standard deviation
+
+
+def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
+    """The polarization of a top by a static field; nothing without a field.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
+    >>> round(static_polarization(rod, 100.0)[0].size_mhz, 3)
+    67.169
+    """
+    if not strongest_kv_per_cm:
+        return []
+    text = f"energies in {strongest_kv_per_cm:g} kV/cm; lines shift by less, its anisotropy"
+    name, tensor = "polarization by the static field", top.polarizability_abc_angstrom3
+    if tensor is None:
+        return [Limit(name, None, f"{text}; the polarizability is not known")]
+    largest = float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max())
+    return [Limit(name, MHZ_PER_ANGSTROM3 * largest * strongest_kv_per_cm**2, text)]
+
+
+def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorTerm:
+    """One standard deviation of the free levels up to a J by the uncertainty of the constants."""
+    levels = solve_levels(top, j, effects=effects) if effects else solve_levels(top, j)
+    parameters = parameter_names(top, levels)
+    covariance = known_covariance(top, parameters)
+    source = source_of_errors(top, parameters, None)
+    if covariance is None:
+        return data_term(None, source)
+    return data_term(level_errors(top, levels, covariance), f"{source}; levels without the field")
+
+
+def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:
+    """One standard deviation of the energies by the error of an estimated dipole; others have no stated uncertainty."""
+    dipole = float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
+    moved = np.abs(states.field * states.slope) * units.MHZ_PER_DEBYE_KV_PER_CM
+    if not moved.any():
+        return ErrorTerm(0.0, "the dipole moves no energy")
+    if not top.dipole_source.startswith("estimate"):
+        return ErrorTerm(None, "the dipole has no stated uncertainty")
+    largest = float(np.nanmax(moved)) * ESTIMATED_DIPOLE_D / dipole
+    return ErrorTerm(largest, f"dipole estimated within {ESTIMATED_DIPOLE_D:.1g} D", "a measured dipole")
+
+
+def joined_data(*terms: ErrorTerm) -> ErrorTerm:
+    """Independent standard deviations together, largest first; not estimated where one of them is not.
+
+    >>> joined_data(ErrorTerm(3.0, "dipole"), ErrorTerm(4.0, "constants")).text("MHz")
+    '5 MHz (constants; dipole)'
+    >>> joined_data(ErrorTerm(None, "the dipole has no stated uncertainty"), ErrorTerm(4.0, "constants")).source
+    'the dipole has no stated uncertainty; constants 4 MHz'
+    """
+    known = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
+    unknown = [term.source for term in terms if term.value is None]
+    if unknown:
+        return ErrorTerm(None, "; ".join([*unknown, *(f"{term.source} {term.value:.2g} MHz" for term in known)]))
+    if not known:
+        return ErrorTerm(0.0, "; ".join(term.source for term in terms) or NO_UNCERTAINTIES)
+    value = math.hypot(*(term.value or 0.0 for term in known))
+    return ErrorTerm(value, "; ".join(term.source for term in known), known[0].remedy)
+
+
+def map_budget(states: FieldMap, limits: Sequence[Limit], data: ErrorTerm) -> ErrorBudget:
+    """The errors of the energies of a map.
+
+    Parameters
+    ----------
+    states : FieldMap
+        With the bounds of each energy.
+    limits : sequence of Limit
+        What the calculation leaves out, at the highest J that is followed and in the strongest field.
+    data : ErrorTerm
+        By constants and moments.
+
+    Returns
+    -------
+    ErrorBudget
+        In MHz, the largest over all states and fields.
+    """
+    return ErrorBudget(
+        of="energies",
+        unit="MHz",
+        rounding=ErrorTerm(
+            float(np.nanmax(states.round_off_mhz, initial=0.0)), "eigenvalues of the largest block in double precision"
+        ),
+        truncation=ErrorTerm(
+            float(np.nanmax(states.truncation_mhz, initial=0.0)),
+            f"functions left out of the basis, J max {states.jmax}",
+            "a smaller tolerance",
+        ),
+        model=model_term(limits),
+        data=data,
+        statistics=NO_SAMPLES,
+    )

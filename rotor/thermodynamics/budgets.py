@@ -1,0 +1,112 @@
+"""Error budget of a partition function (`rotor.requests.budget`), relative to Q.
+
+Rounding: a level is off by at most `ROUNDING` of the largest energy E_max of its J, its Boltzmann factor by that over kT, and a sum of n
+terms by n units in the last place. Data: Q depends on the constants by ∂ln Q/∂c = -⟨∂E/∂c⟩/kT; scaled together they give -U/kT, of which
+each rotation of a rigid top has an equal share at high temperature, ∂ln Q/∂ln c = -(U/kT)/f for each of the f rotations that c belongs
+to. Model: a relative error of the constants is one of f/2 in Q, so that what shifts a line of J, 2B(J + 1), by δ shifts levels by
+δ J/2 and Q by that over kT.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, ROUNDING, model_term
+from rotor.quantum.estimates.limits import OF_SPINS
+from rotor.quantum.estimates.uncertainty import known_covariance, source_of_errors
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.thermodynamics.functions import GAS_CONSTANT
+from rotor.units import MHZ_PER_K
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.beyond import Limit
+    from rotor.thermodynamics.functions import ThermoFunctions
+    from rotor.tops.top import Top
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+def q_budget(functions: ThermoFunctions, j: int, limits: Sequence[Limit], parameters: Sequence[str]) -> ErrorBudget:
+    """The errors of the rotational partition function, the largest over its temperatures.
+
+    Parameters
+    ----------
+    functions : ThermoFunctions
+        With the bounds of their sums.
+    j : int
+        Populated at the highest temperature.
+    limits : sequence of Limit
+        What the Hamiltonian leaves out at that J.
+    parameters : sequence of str
+        Constants of the Hamiltonian.
+
+    Returns
+    -------
+    ErrorBudget
+        Relative to Q.
+    """
+    return ErrorBudget(
+        of="Q, relative",
+        unit="",
+        rounding=rounding_of_q(functions),
+        truncation=ErrorTerm(
+            float(functions.relative_error.max()),
+            "levels left out of the sums, of Q, U and C_v",
+            "a smaller relative error",
+        ),
+        model=model_of_q(functions, j, limits),
+        data=data_of_q(functions, parameters),
+        statistics=NO_SAMPLES,
+    )
+
+
+def rounding_of_q(functions: ThermoFunctions) -> ErrorTerm:
+    """Bound of rounding, by the largest energy of the highest J in each sum."""
+    largest = max(functions.top.rotational_constants_mhz, key=lambda c: c if math.isfinite(c) else 0.0)
+    j = np.maximum(functions.jmax, 0).astype(np.float64)
+    energy = largest * j * (j + 1) / (MHZ_PER_K * functions.temperature_k)
+    terms = (j + 1) ** (1 if functions.top.kind == "linear" else 2)
+    return ErrorTerm(float((ROUNDING * (1 + energy) + EPS * terms).max()), "levels and their sums in double precision")
+
+
+def data_of_q(functions: ThermoFunctions, parameters: Sequence[str]) -> ErrorTerm:
+    """One standard deviation of ln Q by the uncertainty of A, B and C."""
+    top = functions.top
+    covariance = known_covariance(top, parameters)
+    if covariance is None:
+        return ErrorTerm(None, (source_of_errors(top, parameters, None) or NO_UNCERTAINTIES).removeprefix("none: "))
+    axes, rotations = _axes_of(top), 2 if top.kind == "linear" else 3
+    share = np.array(
+        [axes[name] / (rotations * top.constants[name]) if name in axes else 0.0 for name in covariance.names]
+    )
+    energy = functions.energy_j_per_mol / (GAS_CONSTANT * functions.temperature_k)  # U/RT
+    value = float(energy.max(initial=0.0)) * float(np.linalg.norm(share @ covariance.factor))
+    return ErrorTerm(value, "uncertainties of A, B, C", "more precise constants")
+
+
+def _axes_of(top: Top) -> dict[str, int]:
+    """The number of axes that each rotational constant belongs to."""
+    if top.kind in ("linear", "spherical"):
+        return {"B": 2 if top.kind == "linear" else 3}
+    return {"asymmetric": {"A": 1, "B": 1, "C": 1}, "prolate": {"A": 1, "B": 2}, "oblate": {"B": 2, "C": 1}}[top.kind]
+
+
+def model_of_q(functions: ThermoFunctions, j: int, limits: Sequence[Limit]) -> ErrorTerm:
+    """Relative size of what is left out: shifts of levels over kT; not estimated where vibration is left out.
+
+    Splittings by spins (`OF_SPINS`) count at the lowest temperature, other effects at the highest, where high J are populated.
+    """
+    if functions.vibrations is None:
+        return ErrorTerm(None, "vibration is left out", "vibrational states")
+    lowest, highest = (MHZ_PER_K * float(end(functions.temperature_k)) for end in (np.min, np.max))
+    relative = [_over(limit, lowest if limit.name in OF_SPINS else 2 * highest / j) for limit in limits]
+    return model_term(relative)
+
+
+def _over(limit: Limit, unit_mhz: float) -> Limit:
+    return limit if limit.size_mhz is None else replace(limit, size_mhz=limit.size_mhz / unit_mhz)
