@@ -23,7 +23,7 @@ OF_GAS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_m
 KEYS = {
     "rotational_temperatures_k", "classical_above_k", "classical_tolerance", "classical_corrections", "species",
     "species_known", "fractions", "symmetry_number_counted", "hyperfine", "spin_factor", "jmax", "relative_error", "vibrations",
-    "pressure_bar", "electronic", "functions", "files",
+    "pressure_bar", "electronic", "functions", "files", "errors",
 }  # fmt: skip
 
 
