@@ -9,11 +9,14 @@ import pytest
 
 import rotor
 from rotor import units
+from rotor.alignment.budgets import model_of_cosines
+from rotor.classical.tumble import TumbleRequest, answer_tumble
 from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.budgets import ROUNDING, model_term
+from rotor.quantum.estimates.budgets import model_term
 from rotor.quantum.estimates.limits import every_limit, populated_j
 from rotor.quantum.request import LevelsRequest, answer_levels
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+from rotor.spectra.brightness_budget import steepness
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.vibration import VibrationalStates
@@ -117,18 +120,40 @@ VERBS = {
     "stark": ("OCS", "--field", "0:20kV/cm:3"),
     "zeeman": ("OCS", "--g=-0.0287", "--field", "0:1T:3"),
     "thermo": ("CO", "--temperature", "20,100", "--vibration", "2143"),
+    "align": ("CO", "--polarizability", "2.3,1.8", "--pulse", "1e13 W/cm2, 0.1 ps", "--temperature", "5"),
+    "emission": ("CO", "--range", "115:116GHz", "--excitation", "20", "--column", "1e16"),
+    "gas": ("HCl", "--molecules", "500"),
+    "tumble": ("water",),
+    "fluid": (
+        "argon",
+        "--model",
+        "argon",
+        "--molecules",
+        "27",
+        "--density",
+        "1.2",
+        "--cutoff",
+        "4",
+        "--steps",
+        "20",
+        "--every",
+        "2",
+    ),
 }
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_report_table_and_json_have_the_same_numbers(call, verb):
-    code, out, _ = call(verb, *VERBS[verb], "--errors")
+    table = () if verb == "tumble" else ("--errors",)  # tumble has the line alone
+    code, out, _ = call(verb, *VERBS[verb], *table)
     assert code == 0
     budget = ErrorBudget.from_json(json.loads(call(verb, *VERBS[verb], "--json", "-")[1])["errors"])
     joined = " ".join(out.split())
     assert "errors " + budget.line().removeprefix("errors ") in joined
-    size = f"{budget.model.value:.2g} {budget.unit}".rstrip()
-    assert f"model {size}, size, within a factor of 3: {budget.model.source}" in joined
+    if table:
+        size = f"{budget.model.value or 0:.2g} {budget.unit}".rstrip()
+        text = "not estimated" if budget.model.value is None else f"{size}, size, within a factor of 3"
+        assert f"model {text}: {budget.model.source}" in joined
 
 
 def test_a_static_field_polarizes_as_light_of_its_intensity_does():
@@ -206,3 +231,94 @@ def test_numerical_errors_of_q_are_bounds():
         exact = answer_thermo(ThermoRequest(top, (3.0, 30.0), relative_error=1e-12))
         actual = np.abs(answer.functions.q_rot / exact.functions.q_rot - 1).max()
         assert 0.0 < actual <= answer.errors.numerical <= 2 * relative_error
+
+
+def test_the_errors_of_cosines_are_bounds():
+    """Against the same cosines with a tolerance of 1e-9; and phases after a time against constants that are off."""
+    from rotor.alignment.pulse import GaussianPulse
+    from rotor.alignment.request import AlignRequest, answer_align
+
+    def cosines(b=6000.0, tolerance=1e-9):
+        top = Top.from_constants(f"B={b} MHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
+        return answer_align(AlignRequest(top, (GaussianPulse(1e13, 0.05),), 2.0, tolerance=tolerance, points=301))
+
+    exact = cosines()
+    for tolerance in (1e-2, 1e-4):
+        answer = cosines(tolerance=tolerance)
+        actual = np.abs(answer.trace.cosines["cos2theta"] - exact.trace.cosines["cos2theta"]).max()
+        assert actual <= answer.errors.numerical <= 3 * tolerance
+    shifted = np.abs(cosines(6000.6).trace.cosines["cos2theta"] - exact.trace.cosines["cos2theta"]).max()
+    j = max(exact.trace.ensemble.jmax, 1)
+    left_out = model_of_cosines(exact.trace, [Limit("error of B", 0.6 * 2 * (j + 1), "")])
+    assert shifted / 3 <= left_out.value <= 3 * shifted
+
+
+def test_the_slope_of_a_line_is_bounded():
+    """1 - exp(-τ0 exp(-4 ln 2 x²)) against its steepest slope on a grid, thin to thick."""
+    x = np.linspace(-4, 4, 40_001)
+    for depth in (1e-6, 0.1, 1.0, 3.0, 100.0, 1e6):
+        slope = np.abs(np.gradient(-np.expm1(-depth * np.exp(-4 * math.log(2) * x**2)), x)).max()
+        assert slope <= steepness(depth) * (1 + 1e-6) <= 3 * slope  # of the differences of the grid
+
+
+def test_brightness_moves_as_its_budget_says():
+    """A line whose frequency is off by a tenth of its width, seen at one frequency, against the shift that the budget allows."""
+    from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
+
+    def answer(b):
+        co = Top.from_constants(f"B={b} MHz", dipole_abc_debye=(0.11011, 0, 0), name="CO")
+        return answer_emission(EmissionRequest((co,), (Source(1e16, 20.0, 1.0),), (115.2e3, 115.4e3)))
+
+    here, width = answer(57635.968), 115272.0 * 1.0 / 299792.458
+    away = answer(57635.968 + 0.05 * width)
+    grid = here.spectrum.frequency_mhz
+    moved = np.abs(
+        np.interp(grid, away.spectrum.frequency_mhz, away.spectrum.brightness_k) - here.spectrum.brightness_k
+    ).max()
+    opaque = here.peak.brightness_k / -math.expm1(-here.peak.optical_depth)
+    assert moved <= 0.1 * opaque * steepness(here.peak.optical_depth) <= 3 * moved
+    assert here.errors.numerical <= 1e-4 * here.peak.brightness_k
+
+
+def test_the_temperature_of_a_gas_scatters_as_stated():
+    """Temperatures of 200 gases: their standard deviation against the stated one, and the coverage of the confidence."""
+    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+
+    top, found = Top.from_constants("A=10 B=6 C=4 GHz"), []
+    for seed in range(200):
+        answer = answer_gas(GasRequest(top, molecules=100, seed=seed, confidence=0.9))
+        found.append(300.0 * np.mean([degree.mean for degree in answer.test.degrees]) - 300.0)
+    stated = answer.errors.statistics.value
+    assert np.std(found) == pytest.approx(stated, rel=0.2)  # four standard errors of a deviation of 200
+    assert "within 1.64 times" in answer.errors.statistics.source
+    assert abs(np.mean(np.abs(found) <= 1.645 * stated) - 0.9) < 4 * math.sqrt(0.9 * 0.1 / 200)
+
+
+def test_the_steps_of_a_fluid_are_counted_about_the_mean():
+    from rotor.fluids.budgets import temperature_budget
+    from rotor.fluids.record import FluidRecord
+    from rotor.fluids.settings import Settings
+    from rotor.fluids.summary import Mean
+
+    total = np.array([1.0, 1.3, 1.1, 1.4])
+    flat = np.full(4, 300.0)
+    record = FluidRecord(np.arange(4.0), total, total, total, total, flat, flat, flat, flat)
+    budget = temperature_budget(record, Settings(), 6.0, 1, [Mean("temperature", "K", 300.0, 5.0, 4.0)])
+    assert budget.truncation.value == pytest.approx(2 * 0.2 / (6 * units.EV_PER_K))
+    assert "about its mean" in budget.truncation.source
+    assert budget.statistics.value == 5.0
+    few = Mean("temperature", "K", 300.0, math.nan, math.nan)
+    assert temperature_budget(record, Settings(), 6.0, 1, [few]).statistics.value is None
+
+
+def test_attitudes_are_within_their_bound():
+    """A symmetric top against its closed form in long double: body angle (1/I3 - 1/I1) L3 t about the axis, |L| t/I1 about L."""
+    answer = answer_tumble(TumbleRequest((1.0, 1.0, 2.0), (0.3, 0.0, 0.9), times=(0.0, 1e6)))
+    q = answer.table.attitude[-1]
+    about_l, spin = (np.longdouble(x) * np.longdouble(1e6) for x in (np.hypot(0.3, 0.9), 0.9 * (0.5 - 1.0)))
+    cosine = answer.table.momentum[-1, 0] / 0.3
+    assert np.arccos(np.clip(cosine, -1, 1)) == pytest.approx(
+        float(np.arccos(np.cos(spin))), abs=answer.errors.rounding.value
+    )
+    assert abs(np.linalg.norm(q) - 1) < 1e-15
+    assert answer.errors.rounding.value >= 8 * np.finfo(float).eps * float(about_l) * 0.99

@@ -26,7 +26,7 @@ _KEYS = """
     units moments axes angular_momentum angular_momentum_size angular_momentum_source temperature_k energy times_source
     motion_kind period turning_rate fixed_axes separatrix_ratio growth_rate asymptotic_period chaos invariant_drift motion files
 """
-MOTION_KEYS = set(_KEYS.split())
+MOTION_KEYS = {*_KEYS.split(), "errors"}
 BARE_KEYS = {"rotor_version", "command", "input", "kind", "notes"}
 
 

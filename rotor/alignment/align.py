@@ -125,9 +125,13 @@ class BasisTooSmallError(ValueError):
 
 def truncation_apart(trace: AlignmentTrace) -> float:
     """The error of the cosines by steps, by populations left out and by rounded phases, without that of the truncated basis."""
+    return trace.step_error * 16 / 15 + trace.ensemble.left_out * trace.moved + rounding_of_phases(trace)
+
+
+def rounding_of_phases(trace: AlignmentTrace) -> float:
+    """The error of the cosines by the phases of the highest level at the last time, in double precision."""
     farthest = RAD_PER_PS_MHZ * float(np.abs(trace.levels.energy_mhz).max()) * float(np.abs(trace.t_ps).max())
-    rounded = float(np.finfo(np.float64).eps) * farthest
-    return trace.step_error * 16 / 15 + (trace.ensemble.left_out + rounded) * trace.moved
+    return float(np.finfo(np.float64).eps) * farthest * trace.moved
 
 
 def align(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
 from rotor.alignment.pulse import Pulse
 from rotor.arrays import Floats
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.limits import limit_facts
+from rotor.quantum.estimates.limits import every_limit, limit_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Names, Pairs, Quantity, Whole
 from rotor.table import Table, TextOf
@@ -146,6 +148,15 @@ class AlignAnswer(TextOf):
         """All cosines as a table."""
         return AlignmentTable(self.trace, self.classical)
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the cosines can be trusted."""
+        from rotor.alignment.budgets import cosines_budget
+
+        trace = self.trace
+        effects = effects_of(trace.top, hyperfine=False)
+        return cosines_budget(trace, every_limit(trace.top, max(trace.ensemble.jmax, 1), effects))
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
@@ -160,6 +171,7 @@ class AlignAnswer(TextOf):
             "classical_molecules": self.request.classical_molecules,
             "times": len(trace.t_ps),
             **limit_facts(trace.top, max(trace.ensemble.jmax, 1), effects_of(trace.top, hyperfine=False)),
+            "errors": self.errors.as_json(),
         }
 
 

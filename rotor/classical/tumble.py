@@ -19,6 +19,7 @@ from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
 from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift, sampled
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.table import TextOf
 
 PERIODS, TURNS, POINTS = 2, 10, 201
@@ -150,6 +151,23 @@ class TumbleAnswer(TextOf):
             return "separatrix"
         return f"about axis {self.request.axes[self.motion.centre_axis]}"
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the attitude can be trusted, in rad at the last time."""
+        turned = (
+            float(self.motion.turning_rate) * float(np.abs(self.table.times).max()) / self.request.units.time_factor
+        )
+        given = "moments and angular momentum have no stated uncertainty"
+        return ErrorBudget(
+            of="attitude",
+            unit="rad",
+            rounding=ErrorTerm(ROUNDING * max(turned, 1.0), f"{turned:.2g} rad turned, in double precision"),
+            truncation=ErrorTerm(0.0, "closed form"),
+            model=ErrorTerm(None, "a rigid body without torques"),
+            data=ErrorTerm(None, given),
+            statistics=ErrorTerm(0.0, "nothing is sampled"),
+        )
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         request, units = self.request, self.request.units
@@ -163,6 +181,7 @@ class TumbleAnswer(TextOf):
             **self._facts_of_motion(),
             "times_source": self.times_source,
             "invariant_drift": asdict(self.drift),
+            "errors": self.errors.as_json(),
         }
 
     def _facts_of_motion(self) -> dict[str, Any]:

@@ -177,6 +177,9 @@ def _show(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> None:
     show_table(_axes_table(start, content))
     print()
     show_table(_motion_table(start, answer.table))
+    from rotor.reports.top_facts import error_facts
+
+    show_facts(error_facts(content))
 
 
 def _facts(start: Start, content: dict[str, Any]) -> list[tuple[str, str]]:

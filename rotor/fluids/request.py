@@ -19,6 +19,7 @@ from rotor.fluids.record import FluidRecord
 from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, progress_bar, run_fluid
 from rotor.fluids.settings import Settings
 from rotor.fluids.summary import Mean, conserved, means
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import declared, identical, part
 from rotor.requests.readers import Text, Whole
 from rotor.table import TextOf
@@ -134,6 +135,18 @@ class FluidAnswer(TextOf):
             return None
         return float(bodies.mass.sum()) * ATOMIC_MASS_KG * 1e27 / float(atoms.get_volume())
 
+    @cached_property
+    def _means(self) -> list[Mean]:
+        return means(self.record, len(self._count[0]), self.averaged_share)
+
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the mean temperature can be trusted."""
+        from rotor.fluids.budgets import temperature_budget
+
+        bodies, degrees, _ = self._count
+        return temperature_budget(self.record, self.request.settings, degrees.total, len(bodies), self._means)
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         bodies, degrees, _ = self._count
@@ -150,11 +163,12 @@ class FluidAnswer(TextOf):
             "equilibration_ps": None if self.equilibration is None else self.equilibration.time_ps,
             "stationary": None if self.equilibration is None else self.equilibration.stationary,
             "averaged_share": self.averaged_share,
-            "means": [asdict(mean) for mean in (*means(self.record, len(bodies), self.averaged_share), *self.motion)],
+            "means": [asdict(mean) for mean in (*self._means, *self.motion)],
             "motion_reason": self.motion_reason or None,
             "conserved_rms_ev": rms,
             "conserved_drift_ev_per_ns": drift,
             "notes": list(self.notes),
+            "errors": self.errors.as_json(),
         }
 
 

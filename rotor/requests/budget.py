@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 NOT_ESTIMATED = "not estimated"
+ROUNDING = 8 * sys.float_info.epsilon  # a few units in the last place: of an eigenvalue, relative to the largest
 
 
 @dataclass(frozen=True)

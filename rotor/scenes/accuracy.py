@@ -21,13 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from rotor.requests.budget import ROUNDING
 from rotor.scenes.choice import NOTHING_CHEAPER, Choice, Reached
 from rotor.scenes.kind import quantity
 from rotor.scenes.scene import Scene
 
-ROUNDING = 8 * float(
-    np.finfo(np.float64).eps
-)  # of an eigenvalue, relative to the largest: a few units in the last place
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
 MOST_CONFIRMED = 6  # J max that are confirmed by whole runs of an alignment, before the one of its tolerance is taken

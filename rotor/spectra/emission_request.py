@@ -19,6 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hamiltonian_input import effects_of_each_field
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, part
 from rotor.requests.readers import Custom, Each, Quantity, Range
 from rotor.spectra.emission import (
@@ -261,6 +262,13 @@ class EmissionAnswer(TextOf):
         k = position[row]
         return Peak(row, float(observed[row]), float(at.brightness_k[k]), float(at.optical_depth[k]))
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the brightness of the brightest line can be trusted."""
+        from rotor.spectra.brightness_budget import brightness_budget
+
+        return brightness_budget(self)
+
     def facts(self) -> dict[str, Any]:
         """Everything but the tables, by the keys of docs/command_line.md."""
         request, layer, peak = self.request, self.request.sources[0], self.peak
@@ -274,6 +282,7 @@ class EmissionAnswer(TextOf):
             "peak_molecule": None if peak is None else request.names[int(self.lines.molecule[peak.row])],
             "deepest": float(self.spectrum.optical_depth.max()),
             "notes": list(self.notes),
+            "errors": self.errors.as_json(),
         }
 
     def _molecule_facts(self, number: int) -> dict[str, Any]:

@@ -93,6 +93,7 @@ class EmittedLines:
 
     energy_upper_k: E′/k. q: partition function, with its source. quanta: names of the quantum numbers in upper and lower; empty for a
     catalogue, whose numbers are as printed. effects, hyperfine: of the Hamiltonian of a top; hyperfine is None without spins.
+    q_error: relative bound of the sum Q; 0 for a catalogue, whose Q is taken as it is.
     """
 
     temperature_k: float
@@ -109,6 +110,7 @@ class EmittedLines:
     effects: tuple[QuantumEffect, ...] = ()
     hyperfine: dict[str, Any] | None = None
     notes: tuple[str, ...] = ()
+    q_error: float = 0.0
 
     def where(self, rows: Ints) -> EmittedLines:
         """The lines of these rows."""
@@ -183,6 +185,7 @@ def _of_top(
         effects=tuple(lines.levels.effects),
         hyperfine=hyperfine_facts(top, lines.levels),
         notes=tuple(lines.warnings),
+        q_error=lines.partition.relative_error,
     )
 
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, ROUNDING, model_term
+from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, model_term
 from rotor.quantum.estimates.limits import OF_SPINS
 from rotor.quantum.estimates.uncertainty import known_covariance, source_of_errors
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.thermodynamics.functions import GAS_CONSTANT
 from rotor.units import MHZ_PER_K
 

@@ -21,6 +21,7 @@ from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import OF_SPINS, model_limits, model_sizes, populated_j
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.statistics.degrees_of_freedom import count_degrees
@@ -128,6 +129,13 @@ class GasAnswer(TextOf):
         seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in OF_SPINS]
         return [f"collisions; vibrations; {quantum}", *distortion, *seen]
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the temperature, or C1 and C2, can be trusted."""
+        from rotor.thermodynamics.gas_budget import gas_budget
+
+        return gas_budget(self)
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         request, test = self.request, self.test
@@ -156,6 +164,7 @@ class GasAnswer(TextOf):
             "degrees": [asdict(d) | {"energy_cm": half_kt * d.mean, "expected_cm": half_kt} for d in test.degrees],
             **self._facts_of_correlations(),
             "left_out": self.left_out,
+            "errors": self.errors.as_json(),
         }
 
     def _facts_of_correlations(self) -> dict[str, Any]:

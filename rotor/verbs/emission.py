@@ -13,7 +13,7 @@ from rotor.reports.line_tables import the_first
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
-from rotor.reports.top_facts import with_option
+from rotor.reports.top_facts import error_facts, with_option
 from rotor.requests.field import CONDITIONS, OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Names, Quantity, Text, Whole
@@ -278,7 +278,7 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         + ("" if lines.quanta else f", Q {lines.q_source}")
         for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
     )
-    show_facts([("sources", cited), *_limits(answer)])
+    show_facts([("sources", cited), *error_facts(report.content), *_limits(answer)])
 
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:

@@ -14,6 +14,7 @@ from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox,
 from rotor.fluids.run import Outputs, RunStopped
 from rotor.fluids.settings import Settings
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
 from rotor.requests.fill import Given, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
@@ -289,6 +290,7 @@ def show(answer: FluidAnswer, report: Report) -> None:
         facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
     if content["motion_reason"]:
         facts.append(("no motion", content["motion_reason"]))
+    facts += error_facts(content)
     show_facts(facts)
     rows = [
         [

@@ -15,14 +15,13 @@ import numpy as np
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
 from rotor.quantum.spins.method import used_method
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats, Ints
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
-ROUNDING = 8 * float(np.finfo(np.float64).eps)
 GEOMETRY = ("error of the geometry", "vibration-rotation difference")
 NO_SAMPLES = ErrorTerm(0.0, "nothing is sampled")
 NO_UNCERTAINTIES = "no uncertainties of the constants are known"

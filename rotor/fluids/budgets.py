@@ -1,0 +1,74 @@
+"""Error budget of the temperature of a fluid (`rotor.requests.budget`).
+
+Truncation: the departure of the conserved energy from its mean over the run, the largest of the rows, as a temperature 2 ΔE/(f k) of the f
+degrees of freedom. It is counted about the mean, not from the start: the energy of the first row has the departure of that row itself,
+which a box with velocities just drawn has more of.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor import units
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rotor.fluids.record import FluidRecord
+    from rotor.fluids.settings import Settings
+    from rotor.fluids.summary import Mean
+
+
+def temperature_budget(
+    record: FluidRecord, settings: Settings, degrees: float, bodies: int, averages: Sequence[Mean]
+) -> ErrorBudget:
+    """The errors of the mean temperature of a run in K.
+
+    Parameters
+    ----------
+    record : FluidRecord
+    settings : Settings
+        Step and potential of the run.
+    degrees : float
+        Degrees of freedom of the box.
+    bodies : int
+        Molecules of the box.
+    averages : sequence of Mean
+        Those of the run, the temperature among them.
+
+    Returns
+    -------
+    ErrorBudget
+    """
+    temperature = next(mean for mean in averages if mean.quantity == "temperature")
+    return ErrorBudget(
+        of="temperature",
+        unit="K",
+        rounding=ErrorTerm(bodies * sys.float_info.epsilon * abs(temperature.mean), "sum over the molecules"),
+        truncation=_of_steps(record, settings, degrees),
+        model=ErrorTerm(None, f"rigid molecules of the model {settings.model}", "another model"),
+        data=ErrorTerm(None, "the parameters of the model have no stated uncertainty"),
+        statistics=_of_rows(temperature),
+    )
+
+
+def _of_steps(record: FluidRecord, settings: Settings, degrees: float) -> ErrorTerm:
+    """The largest departure of the conserved energy from its mean."""
+    if len(record) < 2 or not np.isfinite(record.total_ev).all():
+        return ErrorTerm(None, "a run of fewer than two rows has no departure of its conserved energy")
+    away = float(np.abs(record.total_ev - record.total_ev.mean()).max())
+    source = f"conserved energy about its mean, with a step of {settings.step_fs:g} fs"
+    return ErrorTerm(2.0 * away / (units.EV_PER_K * degrees), source, "a shorter step")
+
+
+def _of_rows(temperature: Mean) -> ErrorTerm:
+    """The standard error of the mean over correlated rows."""
+    if not math.isfinite(temperature.error):
+        return ErrorTerm(None, "too few rows for a standard error", "a longer run")
+    source = f"{temperature.effective_samples:.3g} independent rows; within 1.96 times this at a confidence of 0.95"
+    return ErrorTerm(temperature.error, source, "a longer run")

@@ -1,0 +1,72 @@
+"""Error budget of a classical gas (`rotor.requests.budget`): of C1 and C2 where there are times, else of the temperature.
+
+The kinetic energy of f N independent degrees of freedom has the relative variance 2/(f N), and the temperature that it shows with it. Free
+motion is exact at any time: an attitude is rounded by `ROUNDING` of the angle that has been turned, and C1 and C2, of slope 1 and 3/2 at
+most in that angle, by no more than twice as much.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from statistics import NormalDist
+from typing import TYPE_CHECKING
+
+from rotor import units
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+
+if TYPE_CHECKING:
+    from rotor.thermodynamics.classical_gas import GasAnswer
+
+EXACT_MOTION = ErrorTerm(0.0, "free motion in closed form")
+FASTEST = 6.0  # of the root mean square rate: 1 of 1e8 molecules turns faster about an axis
+LEFT_OUT = ErrorTerm(None, "a classical gas without collisions and vibrations", "the quantum calculation")
+
+
+def gas_budget(answer: GasAnswer) -> ErrorBudget:
+    """The errors of the temperature in K, or of C1 and C2 at all their times."""
+    return _of_temperature(answer) if answer.correlations is None else _of_curves(answer)
+
+
+def _of_temperature(answer: GasAnswer) -> ErrorBudget:
+    request = answer.request
+    degrees = round(answer.ensemble.kinetic.total)
+    return ErrorBudget(
+        of="temperature",
+        unit="K",
+        rounding=ErrorTerm(
+            (ROUNDING + math.log2(degrees) * sys.float_info.epsilon) * request.temperature_k, "sum over the molecules"
+        ),
+        truncation=EXACT_MOTION,
+        model=LEFT_OUT,
+        data=ErrorTerm(0.0, "equipartition holds for any constants"),
+        statistics=_sampled(answer, request.temperature_k * math.sqrt(2.0 / degrees)),
+    )
+
+
+def _of_curves(answer: GasAnswer) -> ErrorBudget:
+    curves, request = answer.correlations, answer.request
+    assert curves is not None
+    spread = max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)
+    lightest = min(moment for moment in request.top.moments_u_angstrom2 if moment > 0)
+    rate = FASTEST * math.sqrt(request.kt / lightest) / units.ASE_TIME_PS
+    turned = rate * max(abs(time) for time in request.times_ps or (0.0,))
+    return ErrorBudget(
+        of="C1 and C2",
+        unit="",
+        rounding=ErrorTerm(2 * ROUNDING * (1 + turned), "attitudes at the last time"),
+        truncation=EXACT_MOTION,
+        model=LEFT_OUT,
+        data=ErrorTerm(None, "uncertainties of the constants are not carried to correlation functions"),
+        statistics=_sampled(answer, spread),
+    )
+
+
+def _sampled(answer: GasAnswer, deviation: float) -> ErrorTerm:
+    request = answer.request
+    z = NormalDist().inv_cdf(0.5 + 0.5 * request.confidence)
+    return ErrorTerm(
+        deviation,
+        f"{request.molecules} molecules; within {z:.3g} times this at a confidence of {request.confidence:g}",
+        "more molecules",
+    )
