@@ -154,9 +154,10 @@ class TumbleAnswer(TextOf):
     @cached_property
     def errors(self) -> ErrorBudget:
         """How far the attitude can be trusted, in rad at the last time."""
-        turned = (
-            float(self.motion.turning_rate) * float(np.abs(self.table.times).max()) / self.request.units.time_factor
-        )
+        period = abs(float(self.motion.period))
+        going_round = 2 * math.pi / period if period else 0.0  # 0 where the momentum never comes back
+        rate = abs(float(self.motion.turning_rate)) + going_round
+        turned = rate * float(np.abs(self.table.times).max()) / self.request.units.time_factor
         given = "moments and angular momentum have no stated uncertainty"
         return ErrorBudget(
             of="attitude",

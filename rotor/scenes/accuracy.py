@@ -284,10 +284,7 @@ def _tumble_error(answer: Any) -> float:
 
     if not isinstance(answer, TumbleAnswer):
         return 0.0  # that of the steps was found when they were chosen
-    turned = (
-        float(answer.motion.turning_rate) * float(np.abs(answer.table.times).max()) / answer.request.units.time_factor
-    )
-    return ROUNDING * max(turned, 1.0)
+    return float(answer.errors.rounding.value or 0.0)
 
 
 def _stark(scene: Scene, request: Any, asked: float) -> Choice:
