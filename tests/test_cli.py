@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.cli.shared import inputs, output
+from rotor.cli.shared import output
 from rotor.reports import top_facts as report
+from rotor.requests.readers import Numbers
 
 ROOT = Path(__file__).resolve().parents[1]
 WATER_XYZ = "3\nwater\nO 0 0 0\nH 0.75695 0 0.585882\nH -0.75695 0 0.585882\n"
@@ -524,7 +525,7 @@ def test_numbers_that_are_not_finite_are_null():
 
 
 def test_dipole_carries_its_unit():
-    assert inputs.vector("--dipole", "0,0,3.33564095198152e-30 C*m") == pytest.approx((0.0, 0.0, 1.0))
+    assert Numbers("D", (3,)).read("0,0,3.33564095198152e-30 C*m") == pytest.approx((0.0, 0.0, 1.0))
     assert report.vector_text((1e-9, -1e-9, 1.85)) == "μa 0, μb 0, μc 1.85 D"
 
 

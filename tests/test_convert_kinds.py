@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.cli import run, spectrum
+from rotor.cli import run
 from rotor.cli.convert import _note_of_options, top_with_errors
 from rotor.formats.spcat.names.named_parameters import named_parameter_file
 from rotor.formats.spcat.text.egy import format_egy, read_egy
@@ -174,7 +174,7 @@ def test_round_off_below_zero_prints_as_zero():
     assert b"-0.000000" not in format_egy(levels)
 
 
-def test_levels_are_computed_before_any_file_is_begun(tmp_path, monkeypatch):
+def test_nothing_is_written_where_levels_are_not_reached(tmp_path, monkeypatch):
     from rotor.formats.spcat import predict
 
     def failing(*args, **options):
@@ -182,10 +182,9 @@ def test_levels_are_computed_before_any_file_is_begun(tmp_path, monkeypatch):
 
     monkeypatch.setattr(predict, "levels_of_file", failing)
     given = copied("ocs", tmp_path)
-    begun = []
-    monkeypatch.setattr(spectrum, "deliver", lambda *args, **options: begun.append(args))
-    assert run(["spectrum", str(given), "--egy", str(tmp_path / "a.egy")]) == 1
-    assert begun == []
+    before = sorted(tmp_path.iterdir())
+    assert run(["spectrum", str(given), "--egy", str(tmp_path / "a.egy"), "--cat", str(tmp_path / "a.cat")]) == 1
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_the_file_of_a_kind_is_read(tmp_path):

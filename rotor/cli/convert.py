@@ -13,6 +13,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
+from rotor.verbs.molecule import refuse_weights_of_another_kind
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile
@@ -150,7 +151,7 @@ def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
     from rotor.formats.read_write import top_of_file
 
     try:
-        inputs.refuse_weights_of_another_kind(top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET")))
+        refuse_weights_of_another_kind(top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET")))
     except ValueError as reason:
         raise ValueError(
             f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.requests.fill import Given
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
-from rotor.verbs.verb import Note, Report
+from rotor.verbs.verb import NoAnswerError, Note, Report
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -145,8 +145,13 @@ def _levels_of(answer: SpectrumAnswer) -> LevelList:
     from rotor.formats.spcat.predict import levels_of_file
 
     listed = request.prediction.levels
-    found: LevelList = levels_of_file(request.source, **dict(request.basis)) if listed is None else listed
-    return found
+    if listed is not None:
+        found: LevelList = listed
+        return found
+    try:
+        return levels_of_file(request.source, **dict(request.basis))
+    except ValueError as error:
+        raise NoAnswerError(str(error)) from error
 
 
 def _prediction(answer: SpectrumAnswer) -> Prediction:

@@ -193,7 +193,7 @@ def top_of(reading: Reading) -> Top:
     top = _with_states(_with_spins(_with_internal_rotation(top, reading), reading), reading)
     from rotor.tops.plausible import implausible
 
-    _refuse_weights_of_another_kind(top)
+    refuse_weights_of_another_kind(top)
     for text in (*top.notes, *implausible(top)):
         reading.note(text)
     return top
@@ -399,7 +399,7 @@ def _with_states(top: Top, reading: Reading) -> Top:
     return replace(top, notes=(*top.notes, *notes)) if notes else top
 
 
-def _refuse_weights_of_another_kind(top: Top) -> None:
+def refuse_weights_of_another_kind(top: Top) -> None:
     """ValueError where the levels of lowest J show spin weights of another kind of top, or a coupling of unlike weights."""
     from rotor.quantum.solve import solve_levels
 

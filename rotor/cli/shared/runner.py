@@ -44,7 +44,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
             writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
-        with naming(verb):
+        with naming(verb), reaching():
             deliver(
                 files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
             )
@@ -63,8 +63,15 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 
 def answer_of(verb: Verb, request: Any, work: Work) -> Any:
     """The answer; one that was not reached is no mistake of the user."""
-    try:
+    with reaching():
         return verb.answer(request, work)
+
+
+@contextmanager
+def reaching() -> Iterator[None]:
+    """Inside, an answer that is not reached is no mistake of the user."""
+    try:
+        yield
     except NoAnswerError as error:
         raise ComputationError(str(error)) from error
 
