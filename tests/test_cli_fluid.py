@@ -84,6 +84,19 @@ def test_other_models_and_a_file_without_velocities(call, folder):
         (("water", "--molecules", "8", "--model", "argon"), "--model argon is no model of water"),
         (("benzene", "--molecules", "8"), "a box is made of one model"),
         (("water", "--density", "1"), "--density: expected with --molecules"),
+        (("water", "--equilibration", "1ps"), "--equilibration: expected with --molecules"),
+        (
+            ("water", "--molecules", "8", "--relaxation", "9fs", "--ensemble", "langevin"),
+            "with --ensemble nose-hoover; langevin has",
+        ),
+        (
+            ("water", "--molecules", "8", "--friction", "2"),
+            "--friction: expected with --ensemble langevin; nve has no use",
+        ),
+        (
+            ("water", "--molecules", "8", "--ewald-tolerance", "1e-4"),
+            "expected with --electrostatics ewald; reaction-field has",
+        ),
         (("tip4p", "--molecules", "8"), "write --model tip4p too"),
         (("water", "--molecules", "8", "--step", "0"), "--step: 0: expected a finite number above 0 fs"),
         (("water", "--molecules", "8", "--relaxation", "9x"), "the default is 'fs'"),

@@ -83,6 +83,35 @@ def test_a_scene_makes_a_long_list_on_disk(folder, short):
     assert not list(folder.glob("*.pieces"))
 
 
+@pytest.mark.parametrize("json_file", ["-", "all.json"])
+def test_json_beside_a_list_on_disk_has_every_line(call, folder, monkeypatch, short, json_file):
+    cut = [word if word != "none" else "-4.5" for word in TYPED]
+    code, out, err = call(*cut, "--cat", "a.cat", "--json", json_file, "--save-scene", "a.toml")
+    assert (code, err) == (0, "")
+    content = json.loads(out if json_file == "-" else Path(json_file).read_text())
+    assert len(content["lines"]) == content["line_count"] == len(Path("a.cat").read_text().splitlines()) > 50
+    assert not list(folder.glob("*.pieces"))
+
+
+@pytest.mark.parametrize("json_file", ["-", "all.json"])
+def test_json_of_too_many_lines_is_refused(call, folder, monkeypatch, short, json_file):
+    """At once where no cut shortens the list; else when its lines are counted, and the same list goes on without the JSON."""
+    monkeypatch.setattr(long_lists, "JSON_LINES", 100)
+    code, out, err = call(*TYPED, "--cat", "a.cat", "--json", json_file)
+    assert (code, out) == (2, "")
+    assert "--json: some 1e+04 lines are sorted on disk" in err
+    assert "--parquet has every column of every line" in err
+    assert not list(folder.iterdir())
+
+    cut = [word if word != "none" else "-4.5" for word in TYPED]
+    code, out, err = call(*cut, "--cat", "a.cat", "--json", json_file)
+    assert (code, out) == (1, "")
+    assert "the lines are in a.cat.pieces, from where the same command without --json writes them" in err
+    assert not Path("a.cat").exists()
+    assert call(*cut, "--cat", "a.cat")[0] == 0
+    assert not list(folder.glob("*.pieces"))
+
+
 @pytest.mark.parametrize(
     "more", [("--csv", "a.csv"), ("--cat", "a.cat.gz"), ("--cat", "a.cat", "--resolution", "1"), ()], ids=str
 )

@@ -611,3 +611,19 @@ def test_the_command_prints_symmetric_families(call, folder):
     assert "nan" not in (out + err).lower()
     assert "109.471 (by symmetry)" in out
     assert out.count("spherical") == 2
+
+
+@pytest.mark.parametrize("sulphur", [False, True])
+def test_a_structure_without_bonds_has_no_empty_table(call, folder, sulphur):
+    """One substituted atom has a coordinate and no bond: the table `rs` of bonds and angles was an empty heading."""
+    more = '[[isotopologue]]\nisotopes = "3=34S"\nconstants = "B=5932.83 MHz"\n' if sulphur else ""
+    (folder / "ocs.toml").write_text(
+        'name = "OCS"\n[geometry]\natoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]\n'
+        '[[isotopologue]]\nconstants = "B=6081.49 MHz"\n'
+        f'[[isotopologue]]\nisotopes = "2=13C"\nconstants = "B=6061.92 MHz"\n{more}'
+    )
+    code, out, err = call("structure", "ocs.toml", "--method", "rs")
+    assert (code, err) == (0, "")
+    assert "rs: coordinates" in out
+    assert ("rs" in out.splitlines()) == sulphur
+    assert ("C2-S3" in out.replace(" ", "")) == sulphur

@@ -42,8 +42,11 @@ WRONG = {
     "a last time before the first": (OCS + PULSE + '[conditions]\nlast_time = "-9 ps"', "conditions.last_time: -9 ps is not"),
     "a last time beyond all digits": (OCS + PULSE + "[conditions]\nlast_time = 1e300", "conditions.last_time: 1e+300 ps"),
     "more times than fit": (OCS + PULSE + "[conditions]\npoints = 1000000000", "conditions.points: 1000000000"),
-    "a state without its J": (OCS + PULSE + "[conditions]\ntemperature = 0\nstate = {k = 1}", "conditions.state: {'k': 1}"),
-    "steps below 0": (FLUID + "steps = -5", "conditions.steps = -5: expected at least 0"),
+    "a state without its J": (OCS + PULSE + "[conditions]\nstate = {k = 1}", "conditions.state: {'k': 1}"),
+    "one level and a temperature": (OCS + PULSE + "[conditions]\ntemperature = 9\nstate = {j = 1}",
+        "conditions.temperature and conditions.state: give one"),
+    "friction without Langevin": (FLUID + "friction = 2", "conditions.friction: expected with conditions.ensemble langevin"),
+    "steps below 0": (FLUID + "steps = -5", "conditions.steps: -5: expected a whole number of 0 or more"),
 }  # fmt: skip
 
 
@@ -76,6 +79,10 @@ OPTIONS = [
     (["zeeman", "HC3N", "--field", "1T", "--g", "nan"], "--g: 'nan' is not a number"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--m", "3"], "--m: 3 belongs to one state"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--state", "k=1"], "--state: {'k': 1}"),
+    (
+        ["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--state", "j=1", "--temperature", "5"],
+        "--temperature and --state: give one",
+    ),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--until", "1e300"], "--until: 1e+300 ps"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--points", "1000000000"], "--points: 1000000000"),
     (["align", "OCS", "--thz", "100 kV/cm, 1 ps, -0.3 THz"], "--thz: frequency -0.3 THz"),

@@ -158,6 +158,11 @@ def _rows(path: str) -> tuple[list[str], list[list[float]]]:
 def build(verb: Verb, given: Given, subject: Subject) -> AlignRequest:
     """The request of a top and its pulses."""
     values = read_fields(AlignRequest, given, subject)
+    if values.get("state") is not None and "temperature_k" in values and not values.get("classical_molecules"):
+        temperature, state = (
+            verb.fields[f"conditions.{name}"].called(given.style) for name in ("temperature", "state")
+        )
+        raise ValueError(f"{temperature} and {state}: give one of them; the molecules of one level have no temperature")
     if values.get("state") is not None and values.get("classical_molecules"):
         subject.note("the classical gas is at the temperature of --temperature, not in the level of --state")
     return AlignRequest(**subject.values, **values)

@@ -86,17 +86,34 @@ class Box(SubjectKind):
         """The box, and where it is from."""
         asked: BoxInput = read_instance(BoxInput, given)
         settings = Settings(**read_fields(Settings, given))
+        self._refuse_unused(asked, settings, given)
         if given.style == "key":
             return self._of_scene(asked, place)
         if asked.source is None:
             raise ValueError("SOURCE is missing; --help shows what the command takes")
         if asked.molecules is not None:
             return Subject({"box": _new_box(asked, settings), "box_source": "given"}, (), asked.source, place.note)
-        if asked.density is not None:
-            raise ValueError("--density: expected with --molecules; the box of a file has the density of its cell")
         if not Path(asked.source).is_file():
             raise ValueError(f"{asked.source}: no such file; with --molecules N a box is made of 'water' or of a model")
         return Subject({"box": _read(asked.source), "box_source": asked.source}, (), asked.source, place.note)
+
+    def _refuse_unused(self, asked: BoxInput, settings: Settings, given: Given) -> None:
+        """ValueError for what was typed and changes nothing: of another ensemble, of other charges, of a box that is made."""
+        known = all_fields(Settings) | self.fields
+        uses = {
+            "conditions.friction": ("conditions.ensemble", settings.ensemble, "langevin"),
+            "conditions.relaxation": ("conditions.ensemble", settings.ensemble, "nose-hoover"),
+            "numerics.ewald_tolerance": ("numerics.electrostatics", settings.electrostatics, "ewald"),
+        }
+        for name, (choice, chosen, needed) in uses.items():
+            if given.has(known[name]) and chosen != needed:
+                option, other = known[name].called(given.style), known[choice].called(given.style)
+                raise ValueError(f"{option}: expected with {other} {needed}; {chosen} has no use for it")
+        why = {"density": "has the density of its cell", "equilibration": "starts as it is"}
+        for key, reason in why.items():
+            if asked.molecules is None and getattr(asked, key) is not None:
+                option, other = (known[f"conditions.{n}"].called(given.style) for n in (key, "molecules"))
+                raise ValueError(f"{option}: expected with {other}; the box of a file {reason}")
 
     def _of_scene(self, asked: BoxInput, place: Place) -> Subject:
         if (asked.molecules is None) == (asked.box is None):

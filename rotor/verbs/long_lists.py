@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 TRANSITIONS = 2_000_000  # before the cut, beyond which a list is made on disk: in memory each takes some 0.3 kB
 STRONGEST = 1_000  # lines that are in memory
 STREAMED = frozenset({"cat", "parquet"})  # outputs that are written from the disk
+SMALL = frozenset({"json", "save_scene"})  # outputs beside them: a scene has no lines, JSON has all while they are few
+JSON_LINES = 200_000  # the text of a line takes some 0.6 kB, and the whole text is in memory
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,13 +55,34 @@ def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: floa
         not plain
         or request.covariance is not None
         or request.vibrations is not None
-        or not files
-        or files.keys() - STREAMED
+        or not files.keys() & STREAMED
+        or files.keys() - STREAMED - SMALL
     ):
         return False
-    if any(path.suffix == ".gz" for paths in files.values() for path in paths) or request.top.dipole_abc_debye is None:
+    if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
         return False
     return transition_count(request.top, _highest_j(request)) > TRANSITIONS
+
+
+def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
+    return [path for name, paths in files.items() if name in STREAMED for path in paths]
+
+
+def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> None:
+    """ValueError for the JSON of a list on disk that no cut shortens: before any work."""
+    if "json" in files and request.min_lgint is None and is_long(request, files, resolution):
+        from rotor.formats.streamed_lines import transition_count
+
+        first, last = request.range_mhz
+        if first <= 0 and last == float("inf"):
+            raise ValueError(_no_json(f"some {transition_count(request.top, _highest_j(request)):.0e}"))
+
+
+def _no_json(count: str) -> str:
+    return (
+        f"--json: {count} lines are sorted on disk, and JSON has at most {JSON_LINES} of them in memory; leave --json out "
+        "(--parquet has every column of every line), or give --range or a higher --min-lgint"
+    )
 
 
 def _highest_j(request: SpectrumRequest) -> int:
@@ -80,10 +103,15 @@ def answer_long(
     request: SpectrumRequest, files: Mapping[str, tuple[Path, ...]], strongest: int, progress: bool
 ) -> LongAnswer:
     """The lines of a request, sorted in a folder beside the first of its files; a run that was cut off goes on from there."""
-    paths = [path for several in files.values() for path in several]
+    paths = _streamed(files)
     with progress_bar("pieces") if progress else nullcontext() as advance:
         whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)
-    cut, jmax = whole.strongest_cut(max(strongest, STRONGEST))
+    if "json" in files and whole.count > JSON_LINES:
+        raise ValueError(
+            f"{_no_json(str(whole.count))}; the lines are in {whole.plan.folder}, from where the same command without --json writes them"
+        )
+    every = None, whole.plan.jmax
+    cut, jmax = every if "json" in files else whole.strongest_cut(max(strongest, STRONGEST))
     least = request.min_lgint if cut is None else cut
     lines = answer_spectrum(replace(request, jmax=jmax, min_lgint=least)).lines
     return LongAnswer(request, lines, whole, whole.span_mhz, paths)

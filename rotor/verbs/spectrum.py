@@ -18,7 +18,7 @@ from rotor.requests.fill import Given, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
-from rotor.verbs.long_lists import LongAnswer, answer_long, is_long
+from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
 from rotor.verbs.molecule import has_unit, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
@@ -138,6 +138,8 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
     if shaped and not (request.layer or {"profile_csv", "plot"} & outputs.keys()):
         what = request.profile or "gaussian"
         raise ValueError(f"a {what} profile was asked for, but no file for it; add --plot or --profile-csv")
+    if not isinstance(request, int_files.PredictedRequest):
+        refuse_long_json(request, outputs, shown.resolution)
 
 
 def content(answer: SpectrumAnswer, shown: SpectrumShown) -> Mapping[str, Any]:

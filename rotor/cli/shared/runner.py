@@ -29,6 +29,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     request, subject = verb.read(given, Place(".", note))
     outputs = by_name(files, growing)
     request = request if verb.adapt is None else verb.adapt(request, outputs, given)
+    if "--json" in files.screen:
+        outputs["json"] = ()
     if verb.check is not None:
         verb.check(request, outputs, shown)
     head = {"command": str(context.obj), "input": subject.text}
