@@ -169,9 +169,9 @@ def test_every_kind_of_pulse(call, options):
     [
         (("align", "OCS"), "no pulse"),
         (("align", "OCS", "--pulse", "1e13 W/cm2"), "--pulse: '1e13 W/cm2': expected 2 to 3 numbers"),
-        (("align", "OCS", "--pulse", "1e13 MHz, 1 ps"), "--pulse: '1e13 MHz'"),
-        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 MHz"), "--pulse: '1 MHz'"),
-        (("align", "OCS", "--pulse", "-1e13 W/cm2, 1 ps"), "--pulse: intensity"),
+        (("align", "OCS", "--pulse", "1e13 MHz, 1 ps"), "--pulse: peak: '1e13 MHz'"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 MHz"), "--pulse: fwhm: '1 MHz'"),
+        (("align", "OCS", "--pulse", "-1e13 W/cm2, 1 ps"), "--pulse: peak: -1e13 W/cm2"),
         (
             ("align", "OCS", "--pulse", "1e13 W/cm2, 10 ps", "--until", "5"),
             "--until: 5 ps is before the pulses have ended",

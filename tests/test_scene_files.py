@@ -69,7 +69,7 @@ BAD = [
     ),
     (
         'schema = 1\nkind = "align"\nmolecule = "OCS"\n[[pulses]]\nshape = "kick"\nfluense = 1',
-        "[pulses] has no key 'fluense'; the nearest is 'fluence'",
+        "pulses[0] has no key 'fluense'; the nearest is 'fluence'",
     ),
 ]
 

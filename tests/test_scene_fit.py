@@ -102,7 +102,7 @@ def test_what_cannot_be_is_refused_with_its_key(lines, scene, said):
 
 def test_an_unknown_key_of_a_list_of_tables_is_named():
     text = 'schema = 1\nkind = "emission"\n[[molecules]]\nsource = "CO"\ncolunm = 1.0\n'
-    with pytest.raises(ValueError, match=r"\[molecules\] has no key 'colunm'; the nearest is 'column'"):
+    with pytest.raises(ValueError, match=r"molecules\[0\] has no key 'colunm'; the nearest is 'column'"):
         parse_scene(text)
 
 

@@ -37,8 +37,8 @@ WRONG = {
     "times to and fro": (BODY + DRAG + "[conditions]\ntimes = [0.0, -2.0, 5.0]", "conditions.times: expected times that all"),
     "moments below 0": (BODY.replace("[1.0,", "[-1.0,"), "body.moments: principal moments must be finite"),
     "no pulse": (OCS, "the key 'pulses' is missing"),
-    "a pulse of negative width": (OCS + PULSE.replace("1 ps", "-1 ps"), "pulses[0]: width of a pulse -1 ps"),
-    "a negative frequency": (OCS + FIELD, "pulses[0]: frequency -0.3 THz: expected a finite number of 0 or more"),
+    "a pulse of negative width": (OCS + PULSE.replace("1 ps", "-1 ps"), "pulses[0].fwhm: -1 ps: expected a finite number above 0 ps"),
+    "a negative frequency": (OCS + FIELD, "pulses[0].frequency: -0.3 THz: expected a finite number of 0 THz"),
     "a last time before the first": (OCS + PULSE + '[conditions]\nlast_time = "-9 ps"', "conditions.last_time: -9 ps is not"),
     "a last time beyond all digits": (OCS + PULSE + "[conditions]\nlast_time = 1e300", "conditions.last_time: 1e+300 ps"),
     "more times than fit": (OCS + PULSE + "[conditions]\npoints = 1000000000", "conditions.points: 1000000000"),
@@ -85,7 +85,7 @@ OPTIONS = [
     ),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--until", "1e300"], "--until: 1e+300 ps"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--points", "1000000000"], "--points: 1000000000"),
-    (["align", "OCS", "--thz", "100 kV/cm, 1 ps, -0.3 THz"], "--thz: frequency -0.3 THz"),
+    (["align", "OCS", "--thz", "100 kV/cm, 1 ps, -0.3 THz"], "--thz: frequency: -0.3 THz: expected"),
 ]
 
 

@@ -170,10 +170,14 @@ class GaussianPulse(Pulse):
     acts_on: ClassVar[str] = "polarizability"
 
     peak_w_per_cm2: float = declared(
-        REQUIRED, Quantity("W/cm2"), "Peak intensity (W/cm2)", "peak", example="1e13 W/cm2"
+        REQUIRED,
+        Quantity("W/cm2", least=0, most=HIGHEST_W_PER_CM2),
+        "Peak intensity (W/cm2)",
+        "peak",
+        example="1e13 W/cm2",
     )
     fwhm_ps: float = declared(
-        REQUIRED, Quantity("ps"), "Full width at half maximum of the intensity (ps)", "fwhm", example="1 ps"
+        REQUIRED, Quantity("ps", above=0), "Full width at half maximum of the intensity (ps)", "fwhm", example="1 ps"
     )
     centre_ps: float = declared(0.0, Quantity("ps"), "Time of the peak (ps)", "centre")
     axis: Axis = axis_field()
@@ -205,11 +209,15 @@ class SwitchedPulse(Pulse):
     acts_on: ClassVar[str] = "polarizability"
 
     peak_w_per_cm2: float = declared(
-        REQUIRED, Quantity("W/cm2"), "Peak intensity (W/cm2)", "peak", example="1e12 W/cm2"
+        REQUIRED,
+        Quantity("W/cm2", least=0, most=HIGHEST_W_PER_CM2),
+        "Peak intensity (W/cm2)",
+        "peak",
+        example="1e12 W/cm2",
     )
-    rise_ps: float = declared(REQUIRED, Quantity("ps"), "Rise (ps)", "rise", example="1 ps")
-    plateau_ps: float = declared(REQUIRED, Quantity("ps"), "Plateau (ps)", "plateau", example="10 ps")
-    fall_ps: float = declared(REQUIRED, Quantity("ps"), "Fall (ps)", "fall", example="1 ps")
+    rise_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Rise (ps)", "rise", example="1 ps")
+    plateau_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Plateau (ps)", "plateau", example="10 ps")
+    fall_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Fall (ps)", "fall", example="1 ps")
     start_ps: float = declared(0.0, Quantity("ps"), "Where it begins (ps)", "start")
     axis: Axis = axis_field()
 
@@ -301,7 +309,9 @@ class Kick(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    fluence_j_per_cm2: float = declared(REQUIRED, Quantity("J/cm2"), "Fluence (J/cm2)", "fluence", example="0.1 J/cm2")
+    fluence_j_per_cm2: float = declared(
+        REQUIRED, Quantity("J/cm2", least=0), "Fluence (J/cm2)", "fluence", example="0.1 J/cm2"
+    )
     time_ps: float = declared(0.0, Quantity("ps"), "Time (ps)", "time")
     axis: Axis = axis_field()
 
@@ -342,8 +352,10 @@ class DipolePulse(Pulse):
     acts_on: ClassVar[str] = "dipole"
 
     peak_kv_per_cm: float = declared(REQUIRED, Quantity("kV/cm"), "Peak field (kV/cm)", "peak", example="100 kV/cm")
-    fwhm_ps: float = declared(REQUIRED, Quantity("ps"), "Full width of the envelope (ps)", "fwhm", example="1 ps")
-    frequency_thz: float = declared(0.0, Quantity("THz"), "Frequency (THz)", "frequency")
+    fwhm_ps: float = declared(
+        REQUIRED, Quantity("ps", above=0), "Full width of the envelope (ps)", "fwhm", example="1 ps"
+    )
+    frequency_thz: float = declared(0.0, Quantity("THz", least=0), "Frequency (THz)", "frequency")
     phase_rad: float = declared(0.0, Quantity(), "Phase (rad)", "phase")
     centre_ps: float = declared(0.0, Quantity("ps"), "Middle of the envelope (ps)", "centre")
     axis: Axis = Z_AXIS

@@ -83,7 +83,7 @@ class AlignRequest:
 
     def __post_init__(self) -> None:
         if not self.pulses:
-            raise ValueError("no pulse: give at least one")
+            raise ValueError("pulses: there is no pulse; give at least one, in a scene a table [[pulses]]")
         check_fields(self)
         for pulse in self.pulses:
             acted_on(self.top, pulse.acts_on)

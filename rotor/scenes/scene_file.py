@@ -90,14 +90,14 @@ def _refuse_unknown_keys(
         if kind.__struct_config__.tag_field == key:
             continue
         if key not in kind.__struct_fields__:
-            of = f"[{place}]" if place else "a scene of this kind"
+            of = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
             belongs = place and key in outermost and not isinstance(value, Mapping)
             near = "; it stands before the first table" if belongs else _nearest(key, kind.__struct_fields__)
             raise ValueError(f"{where}: {of} has no key {key!r}{near}")
         inside = f"{place}.{key}" if place else key
         _refuse_unknown_tags(hints[key], value, where, inside)
-        for one, item in _tables_in(hints[key], value):
-            _refuse_unknown_keys(item, one, where, inside, outermost)
+        for one, item, number in _tables_in(hints[key], value):
+            _refuse_unknown_keys(item, one, where, inside + number, outermost)
 
 
 def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
@@ -111,19 +111,23 @@ def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
                 )
 
 
-def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
-    """Tables in a value, each with the structure that it must have."""
+def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any], str]]:
+    """Tables in a value, each with the structure that it must have and its number in a list, such as [0]."""
     structures = structures_in(hint)
     if isinstance(value, Mapping) and len(structures) == 1:
-        return [(structures[0], value)]
+        return [(structures[0], value, "")]
     by_tag = {one.__struct_config__.tag: one for one in structures}
     if not structures or not isinstance(value, list):
         return []
     word = structures[0].__struct_config__.tag_field
-    tables = [item for item in value if isinstance(item, Mapping)]
+    tables = [(item, f"[{number}]") for number, item in enumerate(value) if isinstance(item, Mapping)]
     if word is None:
-        return [(structures[0], item) for item in tables]
-    return [(by_tag[tag], item) for item in tables if isinstance(tag := item.get(word), str) and tag in by_tag]
+        return [(structures[0], item, number) for item, number in tables]
+    return [
+        (by_tag[tag], item, number)
+        for item, number in tables
+        if isinstance(tag := item.get(word), str) and tag in by_tag
+    ]
 
 
 def structures_in(hint: Any) -> list[Any]:

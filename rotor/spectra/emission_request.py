@@ -36,7 +36,7 @@ from rotor.spectra.emission import (
     together,
 )
 from rotor.spectra.emitters import CatalogueLines, EmittedLines, emitted_lines
-from rotor.table import Table, TextOf
+from rotor.table import Table, TextOf, counted
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -87,7 +87,10 @@ def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
     for name in _OF_EACH:
         values = getattr(layer, name)
         if len(values) not in (1, count):
-            raise ValueError(f"{name}: {len(values)} given for {count} molecules; expected one for all or one for each")
+            text = ",".join(f"{value:g}" for value in values)
+            raise ValueError(
+                f"{name}: {text}: {counted(len(values), 'number')} for {counted(count, 'molecule')}; expected one for all or one for each"
+            )
 
     def value(name: str, number: int) -> float:
         values = getattr(layer, name)

@@ -119,7 +119,7 @@ def _of_text(text: str, option: str, axis: Axis) -> Pulse:
         raise ValueError(
             f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
         )
-    values = {fields[key].name: fields[key].reader.read(part) for key, part in zip(keys, parts, strict=False)}
+    values = {fields[key].name: fields[key].read(part, "key") for key, part in zip(keys, parts, strict=False)}
     made: Any = SHAPES[shape]
     pulse: Pulse = made(**values) if shape == "thz" else made(**values, axis=axis)
     return pulse
