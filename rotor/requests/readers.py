@@ -95,7 +95,7 @@ class Whole(Reader):
 
     def check(self, value: int) -> None:
         """ValueError for what is no whole number, and for one out of bounds."""
-        if not hasattr(value, "__index__"):
+        if isinstance(value, bool) or not hasattr(value, "__index__"):
             raise ValueError(f"{value!r}: expected a whole number, of type int")
         low, high = self.least, self.most
         if (low is not None and value < low) or (high is not None and value > high):

@@ -51,7 +51,7 @@ BY_OVERLAP = """
     for n in range(1, len(fields)):
         follow = np.abs(vectors[n - 1].conj().T @ vectors[n]).argmax(axis=1)
         energies[n], vectors[n] = energies[n][follow], vectors[n][:, follow]
-    found = type(found)(found.block, found.rows, energies, found.places, vectors)
+    found = type(found)(found.block, found.rows, energies, found.places, vectors, found.error)
 """
 
 MUTATIONS = (
@@ -185,14 +185,34 @@ MUTATIONS = (
     ),
     Mutation(
         22, "rotor/quantum/fields/field_map.py",
-        "    fields, vectors = request.fields, found.vectors\n",
-        "    fields, vectors, energies = request.fields, found.vectors.copy(), found.energies.copy()\n" + BY_OVERLAP,
+        "    block, fields, vectors = found.block, request.fields, found.vectors\n",
+        "    block, fields, vectors, energies = found.block, request.fields, found.vectors.copy(), found.energies.copy()\n" + BY_OVERLAP,
         "tests/hard/test_safeguards.py::test_labels_are_ranks_whatever_the_grid",
     ),
     Mutation(
         23, "rotor/quantum/fields/field_map.py",
-        "        if worst <= request.tolerance_mhz:", "        if True:",
-        "tests/test_stark.py::test_j_max_follows_from_the_tolerance",
+        "        if error <= request.tolerance_mhz and leaked", "        if True or leaked",
+        "tests/test_field_bounds.py::test_the_lowest_j_max_is_chosen",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/block_states.py",
+        "max() <= PART_OF_TOLERANCE * tolerance_mhz:", "max() <= np.inf:",
+        "tests/test_field_bounds.py::test_stated_errors_are_bounds",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/solver.py",
+        "if error.max() <= tolerance_mhz else", "if True else",
+        "tests/test_field_bounds.py::test_a_state_that_the_basis_missed_is_noticed",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/solver.py",
+        "        if error[worst] <= 0.1 * tolerance_mhz:", "        if True:",
+        "tests/test_field_bounds.py::test_the_basis_grows_until_its_error_is_within_the_tolerance",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/truncation.py",
+        "lowering + mixed.sum(axis=2)", "lowering",
+        "tests/test_field_bounds.py::test_the_bound_in_small_cases",
     ),
     Mutation(
         24, "rotor/alignment/pulse.py", "    2 * math.pi * 1e-30 * 1e4", "    4 * math.pi * 1e-30 * 1e4",
