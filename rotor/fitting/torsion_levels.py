@@ -71,7 +71,7 @@ class TorsionLevels(LevelModel):
         if known is None or (np.abs(torsion - known[0]) > MOVED * np.abs(known[0])).any():
             j = part.keys[:, 0]
             blocks = model.blocks(
-                part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, wanted=np.unique(j)
+                part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, needed=np.unique(j)
             )
             self._blocks[part.sigma] = torsion, blocks
         return self._blocks[part.sigma][1]
@@ -116,8 +116,8 @@ def _exist(keys: Ints) -> NDArray[np.bool_]:
 def _rows(table: Ints, keys: Ints) -> Ints:
     """Rows of a table (n, k) of whole numbers of at least 0 that equal keys (m, k), -1 where none does."""
     spans = np.maximum(table.max(axis=0), keys.max(axis=0)) + 1
-    codes, wanted = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
+    codes, needed = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
     order = np.argsort(codes)
-    place = np.minimum(np.searchsorted(codes[order], wanted), len(codes) - 1)
+    place = np.minimum(np.searchsorted(codes[order], needed), len(codes) - 1)
     rows = order[place]
-    return np.asarray(np.where(codes[rows] == wanted, rows, -1))
+    return np.asarray(np.where(codes[rows] == needed, rows, -1))

@@ -158,7 +158,7 @@ def linear_blocks(functions: Functions, terms: Mapping[str, Operator]) -> Linear
 
 
 def blocks_of_elements(
-    names: Sequence[str], labels: Mapping[str, Ints], elements: Elements, wanted: NDArray[np.bool_] | None = None
+    names: Sequence[str], labels: Mapping[str, Ints], elements: Elements, needed: NDArray[np.bool_] | None = None
 ) -> LinearBlocks:
     """The connected parts of elements that are written already.
 
@@ -170,8 +170,8 @@ def blocks_of_elements(
         Quantum numbers of the functions; inside a block functions are in the order of these.
     elements : Elements
         Both triangles of Hermitian matrices.
-    wanted : (n,) array of bool, optional
-        Blocks without a wanted function are left out.
+    needed : (n,) array of bool, optional
+        Blocks without a needed function are left out.
 
     Returns
     -------
@@ -179,7 +179,7 @@ def blocks_of_elements(
     """
     count = elements.count
     part = connected_parts(count, elements.rows, elements.columns)
-    present = np.ones(count, dtype=bool) if wanted is None else np.isin(part, part[wanted])
+    present = np.ones(count, dtype=bool) if needed is None else np.isin(part, part[needed])
     order = np.flatnonzero(present)
     keys = [np.asarray(column)[order] for column in labels.values()]
     order = order[np.lexsort([*keys[::-1], part[order]])]

@@ -121,14 +121,18 @@ def contracted(solved: SolvedBlocks, functions: Functions, tensors: Mapping[str,
 
 
 def contracted_elements(
-    solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]], kept: Mapping[int, Ints] | None = None
+    solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]], retained: Mapping[int, Ints] | None = None
 ) -> Space:
-    """The same, of reduced elements that are written already; kept: by block the ranks of the states to take, all by default."""
+    """The same, of reduced elements that are written already; retained: by block the ranks of the states to take, all by default."""
     linear = solved.linear
-    present = [int(n) for n in np.unique(linear.block) if n >= 0 and (kept is None or len(kept.get(int(n), ())))]
+    present = [
+        int(n) for n in np.unique(linear.block) if n >= 0 and (retained is None or len(retained.get(int(n), ())))
+    ]
     number = {block: i for i, block in enumerate(present)}
     states = [solved.vectors(block) for block in present]
-    ranks = [np.arange(v.shape[1]) if kept is None else kept[n] for n, (_, v) in zip(present, states, strict=True)]
+    ranks = [
+        np.arange(v.shape[1]) if retained is None else retained[n] for n, (_, v) in zip(present, states, strict=True)
+    ]
     states = [(rows, vectors[:, rank]) for (rows, vectors), rank in zip(states, ranks, strict=True)]
     sectors = []
     for block, (rows, _), rank in zip(present, states, ranks, strict=True):
@@ -148,8 +152,8 @@ def _between_blocks(
     """V† O V of each pair of blocks that an operator connects."""
     rows, columns, values = elements.rows, elements.columns, elements.values[0]
     taken = np.isin(linear.block, list(number))
-    kept = taken[rows] & taken[columns]
-    rows, columns, values = rows[kept], columns[kept], values[kept]
+    retained = taken[rows] & taken[columns]
+    rows, columns, values = rows[retained], columns[retained], values[retained]
     pair = linear.block[rows] * (int(linear.block.max()) + 1) + linear.block[columns]
     order = np.argsort(pair, kind="stable")
     bounds = np.flatnonzero(np.diff(pair[order], prepend=-1, append=-1))

@@ -49,7 +49,7 @@ class InternalRotationConstants:
     """Constants of one threefold top: MHz by name, rho without a unit.
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
-    vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions kept for each K. spin_states: 2I + 1 of
+    vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K. spin_states: 2I + 1 of
     each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
     "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
     uncertainties: in MHz (of rho without a unit). source: where the values are from.

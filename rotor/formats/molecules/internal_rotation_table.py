@@ -8,7 +8,7 @@ rho = 0.328632673
 V3 = { value = 407.59768, uncertainty = 0.0002 }
 Dab = 0.122669
 vt_max = 1                          # the highest torsional state of the levels
-functions = 9                       # torsional functions kept for each K
+functions = 9                       # torsional functions retained for each K
 """
 
 from __future__ import annotations

@@ -40,11 +40,11 @@ def merged(count: int, rows: Ints, columns: Ints, values: NDArray[Any]) -> Eleme
         values = np.add.reduceat(values, starts, axis=1)
         key = key[starts]
     size = np.abs(values)
-    kept = (size > ROUND_OFF * size.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
-    values = values[:, kept]
+    retained = (size > ROUND_OFF * size.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
+    values = values[:, retained]
     if np.iscomplexobj(values) and not values.imag.any():
         values = np.ascontiguousarray(values.real)
-    return Elements(count, key[kept] // count, key[kept] % count, values)
+    return Elements(count, key[retained] // count, key[retained] % count, values)
 
 
 def concatenated(count: int, operators: int, pieces: Sequence[tuple[Ints, Ints, NDArray[Any]]]) -> Elements:

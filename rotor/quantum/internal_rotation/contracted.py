@@ -5,7 +5,7 @@ In the rho-axis frame the kinetic coupling of a top with the rotation acts along
     h(K, σ) = F (p - ρK)² + ½ V3 (1 - cos 3α) + ½ V6 (1 - cos 6α)
 
 is solved for each K first (E. Herbst, J. K. Messer, F. C. De Lucia and P. Helminger, J. Mol. Spectrosc. 108 (1984) 42, the two-step
-diagonalisation). Its lowest n_v functions |K t⟩ are kept, and a term R ⊗ o of the rotation and the torsion becomes
+diagonalisation). Its lowest n_v functions |K t⟩ are retained, and a term R ⊗ o of the rotation and the torsion becomes
 
     ⟨J K' t'|R o|J K t⟩ = ⟨J K'|R|J K⟩ Σ_m'm ⟨K' t'|m'⟩⟨m'|o|m⟩⟨m|K t⟩.
 

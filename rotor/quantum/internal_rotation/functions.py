@@ -160,8 +160,8 @@ class TorsionRotation:
         r = np.broadcast_to(rows[:, :, None], values.shape[1:]).ravel()
         c = np.broadcast_to(columns[:, None, :], values.shape[1:]).ravel()
         scale = ROUND_OFF * np.abs(flat).max(axis=1, keepdims=True, initial=0.0)
-        kept = np.flatnonzero((np.abs(flat) > scale).any(axis=0) & (r >= 0) & (c >= 0))
-        return Elements(len(self.labels["J"]), r[kept], c[kept], flat[:, kept])
+        retained = np.flatnonzero((np.abs(flat) > scale).any(axis=0) & (r >= 0) & (c >= 0))
+        return Elements(len(self.labels["J"]), r[retained], c[retained], flat[:, retained])
 
 
 class _Tables:

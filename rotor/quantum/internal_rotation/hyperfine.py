@@ -255,8 +255,8 @@ def _rotation_space(levels: SpeciesLevels, nuclei: Sequence[NucleusTensors], has
             parts = _real(spherical_components(unit, 1, REPRESENTATION))
             tensors[f"mu {axis}"] = 1, functions.elements([[Product(body_tensor(parts))]], 1)
     block, rank = linear.block[levels.rows], linear.rank[levels.rows]
-    kept = {number: np.sort(rank[block == number]) for number in levels.blocks}
-    return contracted_elements(levels.solved, tensors, kept)
+    retained = {number: np.sort(rank[block == number]) for number in levels.blocks}
+    return contracted_elements(levels.solved, tensors, retained)
 
 
 def _rotation_quanta(levels: SpeciesLevels, space: Space) -> list[dict[str, Ints]]:

@@ -255,9 +255,11 @@ def _blocks(species: SpeciesLevels, model: RamModel, start: int, components: int
         rows = species.rows[chosen == number]
         members, vectors = species.solved.vectors(number)
         if len(rows):
-            kept = vectors[:, linear.rank[rows]]
+            retained = vectors[:, linear.rank[rows]]
             j = int(linear.labels["J"][members[0]])
-            made.append(TorsionBlock(j, number, species.solved.energies[rows], kept, start, moments, components, rows))
+            made.append(
+                TorsionBlock(j, number, species.solved.energies[rows], retained, start, moments, components, rows)
+            )
             start += len(rows)
     return made
 

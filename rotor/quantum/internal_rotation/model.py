@@ -93,7 +93,7 @@ class RamModel:
         jmin: int = 0,
         count: int = DEFAULT_COUNT,
         waves: int = 10,
-        wanted: Ints | None = None,
+        needed: Ints | None = None,
     ) -> SpeciesBlocks:
         """The blocks of one species.
 
@@ -104,10 +104,10 @@ class RamModel:
         jmax, jmin : int
             Range of J.
         count : int, optional
-            n_v, torsional functions kept for each K.
+            n_v, torsional functions retained for each K.
         waves : int, optional
             k from -waves to waves of the free functions.
-        wanted : array of int, optional
+        needed : array of int, optional
             The J that are needed; by default all.
 
         Returns
@@ -116,5 +116,5 @@ class RamModel:
         """
         torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
-        chosen: NDArray[np.bool_] | None = None if wanted is None else np.isin(functions.labels["J"], wanted)
+        chosen: NDArray[np.bool_] | None = None if needed is None else np.isin(functions.labels["J"], needed)
         return species_blocks(functions, self.terms(sigma), chosen)

@@ -48,10 +48,10 @@ class SpeciesBlocks:
         return diagonal
 
 
-def species_blocks(functions: TorsionRotation, terms: Terms, wanted: NDArray[np.bool_] | None = None) -> SpeciesBlocks:
+def species_blocks(functions: TorsionRotation, terms: Terms, needed: NDArray[np.bool_] | None = None) -> SpeciesBlocks:
     """The blocks of one species, of named sums of products."""
     elements = functions.elements(list(terms.values()))
-    return SpeciesBlocks(functions, blocks_of_elements(tuple(terms), functions.labels, elements, wanted))
+    return SpeciesBlocks(functions, blocks_of_elements(tuple(terms), functions.labels, elements, needed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +79,10 @@ class SpeciesLevels:
                 name = named_by_overlap(v, t[members], vectors)
             else:
                 name = named_by_energy(v, t[members], self.zeroth_order[members])
-            kept = np.flatnonzero((v >= 0) & (v <= self.vt_max))
-            rows.append(members[kept])
-            numbers.append(v[kept])
-            names.append(members[name[kept]])
+            retained = np.flatnonzero((v >= 0) & (v <= self.vt_max))
+            rows.append(members[retained])
+            numbers.append(v[retained])
+            names.append(members[name[retained]])
         return np.concatenate(rows), np.concatenate(numbers), np.concatenate(names)
 
     @cached_property

@@ -4,7 +4,7 @@
         + ½ V12s sin 3α1 sin 3α2,                                               π_i = p_i - ρ_i·P
 
 in principal axes, z along a (H. Hartwig and H. Dreizler, Z. Naturforsch. 51a (1996) 923, for one frame of several tops). For each K the
-torsion of top i with ρ_iz K is solved, and the products with the lowest sums of energies are kept; what ρ has across z acts between them,
+torsion of top i with ρ_iz K is solved, and the products of lowest energy are retained; what ρ has across z acts between them,
 p_i with its matrix over these functions. Species are pairs (σ1, σ2); (-σ1, -σ2) has the same energies.
 """
 
@@ -40,11 +40,11 @@ class InternalTop:
 
 @dataclass(frozen=True, eq=False)
 class ProductTorsion:
-    """Products of contracted functions of two tops; kept: (t1, t2) of those that are taken."""
+    """Products of contracted functions of two tops; retained: (t1, t2) of those that are taken."""
 
     first: ContractedTorsion
     second: ContractedTorsion
-    kept: Ints
+    retained: Ints
 
     @property
     def sigma(self) -> int:
@@ -59,7 +59,7 @@ class ProductTorsion:
     @property
     def count(self) -> int:
         """Products for each K."""
-        return len(self.kept)
+        return len(self.retained)
 
     @property
     def is_near_free(self) -> bool:
@@ -69,18 +69,18 @@ class ProductTorsion:
     @cached_property
     def energies(self) -> Floats:
         """Sums of torsional energies (K, products)."""
-        return np.asarray(self.first.energies[:, self.kept[:, 0]] + self.second.energies[:, self.kept[:, 1]])
+        return np.asarray(self.first.energies[:, self.retained[:, 0]] + self.second.energies[:, self.retained[:, 1]])
 
     @cached_property
     def parity(self) -> Ints:
         """Of the products at K = 0 under reversal of both tops."""
-        return np.asarray(self.first.parity[self.kept[:, 0]] * self.second.parity[self.kept[:, 1]])
+        return np.asarray(self.first.parity[self.retained[:, 0]] * self.second.parity[self.retained[:, 1]])
 
     def tables(self, operator: Any, change: int) -> Floats:
         """⟨K + change, t'|o1 o2|K t⟩ as (K, t', t) of a pair of operators."""
         pair: Pair = (None, None) if operator is None else operator
         left, right = self.first.tables(pair[0], change), self.second.tables(pair[1], change)
-        one, two = self.kept[:, 0], self.kept[:, 1]
+        one, two = self.retained[:, 0], self.retained[:, 1]
         return np.asarray(left[:, one[:, None], one] * right[:, two[:, None], two])
 
 
@@ -111,7 +111,7 @@ class TwoTops:
         jmax : int
             Highest J.
         count : int, optional
-            Products of torsional functions kept for each K, the lowest by energy.
+            Products of torsional functions retained for each K, the lowest by energy.
         each : int, optional
             Functions of each top that products are made of.
         waves : int, optional
@@ -128,8 +128,8 @@ class TwoTops:
             for top, sigma in zip(self.tops, species, strict=True)
         ]
         middle = torsions[0].energies[jmax][:, None] + torsions[1].energies[jmax]
-        kept = np.column_stack(np.unravel_index(np.argsort(middle, axis=None, kind="stable")[:count], middle.shape))
-        product: Any = ProductTorsion(torsions[0], torsions[1], kept)
+        retained = np.column_stack(np.unravel_index(np.argsort(middle, axis=None, kind="stable")[:count], middle.shape))
+        product: Any = ProductTorsion(torsions[0], torsions[1], retained)
         folded = species == (0, 0) and self.has_plane
         return species_blocks(TorsionRotation(product, 0, jmax, folded), self.terms(species))
 

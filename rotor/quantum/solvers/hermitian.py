@@ -4,7 +4,7 @@
 |---|---|
 | size 1 | the element itself |
 | small matrices, many of them | one stacked call |
-| large, and only the lowest few states wanted | LAPACK's relatively robust representations, for these states alone |
+| large, and only the lowest few states needed | LAPACK's relatively robust representations, for these states alone |
 | large, banded, energies alone | LAPACK's banded reduction |
 | other | LAPACK's divide and conquer |
 """
