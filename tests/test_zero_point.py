@@ -17,7 +17,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import model_limits
-from rotor.quantum.estimates.methyl_groups import bonded_atoms
+from rotor.molecules.bonds import bonded_atoms
 from rotor.quantum.estimates.zero_point import (
     F_HYDROGEN,
     F_OTHER,

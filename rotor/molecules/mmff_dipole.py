@@ -44,27 +44,37 @@ def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
     >>> estimate_dipole(carbon_monoxide)[1]
     'no dipole for CO: MMFF94 has no charges for it; give one'
     """
-    from rdkit import Chem, Geometry, rdBase
-    from rdkit.Chem import rdDetermineBonds
+    from rdkit import rdBase
 
     if len(molecule.symbols) > MOST_ATOMS:
         return None, f"no dipole for {molecule.formula}: bonds are found up to {MOST_ATOMS} atoms; give one"
-    bare = Chem.RWMol()
-    conformer = Chem.Conformer(len(molecule.symbols))
-    for i, (symbol, position) in enumerate(zip(molecule.symbols, molecule.positions_angstrom, strict=True)):
-        bare.AddAtom(Chem.Atom(symbol))
-        conformer.SetAtomPosition(i, Geometry.Point3D(*position.tolist()))
-    bare.AddConformer(conformer)
     with rdBase.BlockLogs():
-        try:
-            rdDetermineBonds.DetermineBonds(bare, charge=molecule.charge)
-        except (ValueError, RuntimeError):
+        bare = bonded_rdkit(molecule)
+        if bare is None:
             why = "no ordinary bonds fit its geometry (a radical, a metal, or far from equilibrium?)"
             return None, f"no dipole for {molecule.formula}: {why}; give one"
         dipole = mmff_dipole(bare, molecule)
     if dipole is None:
         return None, f"no dipole for {molecule.formula}: MMFF94 has no charges for it; give one"
     return dipole, charges_note(molecule)
+
+
+def bonded_rdkit(molecule: Molecule) -> Any:
+    """An RDKit molecule whose bonds follow from the distances and the charge (rdDetermineBonds); None where none fit."""
+    from rdkit import Chem, Geometry
+    from rdkit.Chem import rdDetermineBonds
+
+    bare = Chem.RWMol()
+    conformer = Chem.Conformer(len(molecule.symbols))
+    for i, (symbol, position) in enumerate(zip(molecule.symbols, molecule.positions_angstrom, strict=True)):
+        bare.AddAtom(Chem.Atom(symbol))
+        conformer.SetAtomPosition(i, Geometry.Point3D(*position.tolist()))
+    bare.AddConformer(conformer)
+    try:
+        rdDetermineBonds.DetermineBonds(bare, charge=molecule.charge)
+    except (ValueError, RuntimeError):
+        return None
+    return bare
 
 
 def mmff_dipole(mol: Any, molecule: Molecule) -> Floats | None:

@@ -179,7 +179,7 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
 
 def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
     """What zero-point vibration does to lines of about one frequency; nothing where no atoms are bonded."""
-    from rotor.quantum.estimates.methyl_groups import bonded_atoms
+    from rotor.molecules.bonds import bonded_atoms
     from rotor.quantum.estimates.zero_point import relative_difference
 
     relative = relative_difference(molecule, bonded_atoms(molecule))
@@ -239,7 +239,8 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
 
 def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
     """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
-    from rotor.quantum.estimates.methyl_groups import bonded_atoms, methyl_groups
+    from rotor.molecules.bonds import bonded_atoms
+    from rotor.quantum.estimates.methyl_groups import methyl_groups
 
     found, bonds = [], bonded_atoms(molecule)
     if "internal rotation" not in present and (groups := methyl_groups(molecule, bonds)):

@@ -1,0 +1,230 @@
+"""Rotation of one part of a molecule about a bond: which atoms turn, its symmetry, and its reduced moment of inertia.
+
+With the angle α, the velocities v_i = n × (x_i - x_0) of the atoms of one part (0 for those of the other), less that of the centre of
+mass, and the angular velocity ω of the whole, the kinetic energy is ½ (ω, α') K (ω, α')ᵀ with the 4 x 4 matrix
+
+    K = | I   c |     I the inertia tensor,   c = Σ m_i r_i × v_i,   I_α = Σ m_i v_i².
+        | cᵀ I_α |
+
+Without angular momentum of the whole, ω = -I⁻¹ c α', and ½ I_r α'² is left with
+
+    I_r = I_α - cᵀ I⁻¹ c = det K / det I = 1 / (K⁻¹)_αα.
+
+Derived here. For one group on a rigid frame it is the reduced moment of K. S. Pitzer, J. Chem. Phys. 14 (1946) 239, as later authors
+cite it; for a symmetric group it is r I_α with r = 1 - Σ λ_g² I_α/I_g (`rotor.quantum.estimates.internal_rotation`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.molecules.bonds import bonded_atoms
+from rotor.molecules.molecule import Molecule
+
+ON_AXIS_ANGSTROM = 0.1  # atoms nearer to the line of the bond do not turn: the group is linear
+SYMMETRIC_ANGSTROM = 0.25  # how far atoms of a group may be off an n-fold axis along the bond: hydrogens of a methyl group are by 0.05
+MOST_FOLD = 6
+
+
+@dataclass(frozen=True, eq=False)
+class BondRotation:
+    """Rotation about the bond between two atoms (counted from 0); top: the atoms on the side of `last`, which turn.
+
+    Parameters
+    ----------
+    molecule : Molecule
+    first, last : int
+        The atoms of the bond, counted from 0.
+    top, frame : (n,) array of int
+        Atoms on the side of `last` and of `first`, both of them among these.
+
+    Examples
+    --------
+    >>> from rotor.molecules.readers.read import read_molecule
+    >>> ethane = bond_rotation(read_molecule("C2H6"), "1-2")
+    >>> len(ethane.top), len(ethane.frame), ethane.symmetry_number()
+    (4, 4, 3)
+    """
+
+    molecule: Molecule
+    first: int
+    last: int
+    top: Ints
+    frame: Ints
+
+    def turned(self, angle: float) -> Molecule:
+        """The molecule with the top turned rigidly by an angle, radian."""
+        return replace(
+            self.molecule, positions_angstrom=self.turned_positions(self.molecule.positions_angstrom, angle)
+        )
+
+    def turned_positions(self, positions: Floats, angle: float) -> Floats:
+        """Positions (n, 3) with the top turned about the bond, right-handed seen from first to last."""
+        axis = _axis(positions, self.first, self.last)
+        moved, arms = positions.copy(), positions[self.top] - positions[self.last]
+        across = np.cross(axis, arms)
+        along = np.outer(arms @ axis, axis)
+        moved[self.top] = positions[self.last] + along + (arms - along) * math.cos(angle) + across * math.sin(angle)
+        return moved
+
+    def kinetic_matrix(self, positions: Floats | None = None) -> Floats:
+        """K (4, 4) in u Å² over ω_x, ω_y, ω_z and α', in the frame of the positions; see the head of this module."""
+        x = self.molecule.positions_angstrom if positions is None else positions
+        mass = self.molecule.masses_u
+        velocity = np.zeros_like(x)
+        velocity[self.top] = np.cross(_axis(x, self.first, self.last), x[self.top] - x[self.last])
+        velocity -= mass @ velocity / mass.sum()
+        arms = x - mass @ x / mass.sum()
+        matrix = np.empty((4, 4))
+        matrix[:3, :3] = np.eye(3) * (mass @ np.sum(arms**2, axis=1)) - np.einsum("i,ij,ik->jk", mass, arms, arms)
+        matrix[:3, 3] = matrix[3, :3] = mass @ np.cross(arms, velocity)
+        matrix[3, 3] = mass @ np.sum(velocity**2, axis=1)
+        return matrix
+
+    def reduced_moment(self, positions: Floats | None = None) -> float:
+        """I_r in u Å² at the geometry of the molecule, or at other positions (n, 3)."""
+        return float(1 / np.linalg.inv(self.kinetic_matrix(positions))[3, 3])
+
+    def symmetry_number(self, isotopes: bool = True) -> int:
+        """How many positions in a turn are alike: least common multiple of the axes of both parts along the bond.
+
+        isotopes: whether different isotopes are different; the potential does not know them, the kinetic energy does.
+        """
+        return math.lcm(*(self._fold(atoms, isotopes) for atoms in (self.top, self.frame)))
+
+    def _fold(self, atoms: Ints, isotopes: bool) -> int:
+        """Largest n for which a turn by 2π/n brings every atom of a part to a place of its like."""
+        x, axis = self.molecule.positions_angstrom, _axis(self.molecule.positions_angstrom, self.first, self.last)
+        arms = x[atoms] - x[self.last]
+        kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
+        alike = np.array([[one == other for other in kinds] for one in kinds])
+        along = np.outer(arms @ axis, axis)
+        for n in range(MOST_FOLD, 1, -1):
+            angle = 2 * math.pi / n
+            moved = along + (arms - along) * math.cos(angle) + np.cross(axis, arms) * math.sin(angle)
+            apart = np.where(alike, np.linalg.norm(moved[:, None] - arms[None], axis=-1), np.inf)
+            if apart.min(axis=1).max() < SYMMETRIC_ANGSTROM:
+                return n
+        return 1
+
+    def angle(self, positions: Floats) -> float:
+        """Mean angle by which the inner atoms of the top have turned against those of the frame, radian from -π to π.
+
+        One dihedral angle would count the tilt of a single bond as rotation; a mean over a methyl group does not.
+        """
+        turns = [self._mean_turn(positions, end, other) for end, other in ((self.last, self.first), (self.first, self.last))]
+        return float(np.angle(turns[0] * np.conj(turns[1])))
+
+    def _mean_turn(self, positions: Floats, end: int, other: int) -> complex:
+        """Σ exp i(φ - φ_0) of the atoms bonded to one end of the bond; φ about the bond, φ_0 that of the molecule itself."""
+        start = self.molecule.positions_angstrom
+        near = bonded_atoms(self.molecule)[end]
+        off = [i for i in near.tolist() if i != other and _off_axis(start, i, self.first, self.last) > ON_AXIS_ANGSTROM]
+        atoms = off or [self.dihedral_atoms()[3 if end == self.last else 0]]
+        return complex(np.sum(_across(positions, self, atoms) * np.conj(_across(start, self, atoms))))
+
+    def dihedral_atoms(self) -> tuple[int, int, int, int]:
+        """Four atoms (from 0) whose dihedral angle is that of the bond: the nearest atoms off the axis on either side."""
+        x = self.molecule.positions_angstrom
+        ends = []
+        for atoms, end in ((self.frame, self.first), (self.top, self.last)):
+            off = [i for i in atoms.tolist() if _off_axis(x, i, self.first, self.last) > ON_AXIS_ANGSTROM]
+            ends.append(min(off, key=lambda i: (float(np.linalg.norm(x[i] - x[end])), i)))
+        return ends[0], self.first, self.last, ends[1]
+
+
+def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
+    """The rotation about a bond, named by its atoms as counted from 1, such as "1-2".
+
+    Parameters
+    ----------
+    molecule : Molecule
+    bond : str
+        The atom of the frame, a hyphen, the atom of the group that turns.
+
+    Returns
+    -------
+    BondRotation
+
+    Raises
+    ------
+    ValueError
+        For atoms that are not there or not bonded, a bond of a ring, an atom without others behind it, and a linear group.
+    """
+    first, last = _numbers(molecule, bond)
+    neighbours = bonded_atoms(molecule)
+    x, name = molecule.positions_angstrom, _named(molecule, first, last)
+    if last not in neighbours[first]:
+        apart = float(np.linalg.norm(x[last] - x[first]))
+        others = ", ".join(str(i + 1) for i in neighbours[first].tolist()) or "none"
+        raise ValueError(f"{name} are not bonded: {apart:.3g} Å apart; atom {first + 1} is bonded to {others}")
+    top, frame = _side(neighbours, last, first), _side(neighbours, first, last)
+    if first in top:
+        raise ValueError(f"{name}: the bond is part of a ring, about which nothing turns; give a bond of no ring")
+    for atoms, end in ((frame, first), (top, last)):
+        if len(atoms) == 1:
+            raise ValueError(
+                f"{name}: atom {end + 1} ({molecule.symbols[end]}) is bonded to no further atom, so that nothing turns; "
+                "give a bond with atoms on both sides"
+            )
+        if max(_off_axis(x, i, first, last) for i in atoms) <= ON_AXIS_ANGSTROM:
+            raise ValueError(
+                f"{name}: all atoms behind atom {end + 1} lie on the line of the bond (a linear group), so that nothing turns; "
+                "give a bond with atoms off its line on both sides"
+            )
+    return BondRotation(molecule, first, last, np.array(sorted(top)), np.array(sorted(frame)))
+
+
+def _numbers(molecule: Molecule, bond: str) -> tuple[int, int]:
+    count = len(molecule.symbols)
+    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", bond)
+    if match is None:
+        raise ValueError(f"{bond!r}: expected two atom numbers, such as 1-2")
+    first, last = int(match[1]), int(match[2])
+    if first == last or not (1 <= first <= count and 1 <= last <= count):
+        raise ValueError(f"{bond!r}: expected two different atoms of {molecule.formula}, which has atoms 1 to {count}")
+    return first - 1, last - 1
+
+
+def _named(molecule: Molecule, first: int, last: int) -> str:
+    return f"atoms {first + 1} ({molecule.symbols[first]}) and {last + 1} ({molecule.symbols[last]})"
+
+
+def _side(neighbours: list[Ints], start: int, without: int) -> set[int]:
+    """Atoms reached from `start` by bonds other than that to `without`."""
+    reached, front = {start}, [start]
+    while front:
+        atom = front.pop()
+        for other in neighbours[atom].tolist():
+            if other not in reached and not (atom == start and other == without):
+                reached.add(other)
+                front.append(other)
+    return reached
+
+
+def _axis(positions: Floats, first: int, last: int) -> Floats:
+    """Unit vector of the bond."""
+    bond = positions[last] - positions[first]
+    return np.asarray(bond / np.linalg.norm(bond))
+
+
+def _off_axis(positions: Floats, atom: int, first: int, last: int) -> float:
+    """Distance of an atom from the line of the bond, Å."""
+    return float(np.linalg.norm(np.cross(positions[atom] - positions[last], _axis(positions, first, last))))
+
+
+def _across(positions: Floats, rotation: BondRotation, atoms: list[int]) -> NDArray[np.complex128]:
+    """exp iφ of atoms about the bond, φ from the plane of the bond and the first atom of the dihedral angle."""
+    axis = _axis(positions, rotation.first, rotation.last)
+    side = positions[rotation.dihedral_atoms()[0]] - positions[rotation.first]
+    side = side - (side @ axis) * axis
+    side /= np.linalg.norm(side)
+    arms = positions[atoms] - positions[rotation.last]
+    waves = arms @ side + 1j * (arms @ np.cross(axis, side))
+    return np.asarray(waves / np.abs(waves))

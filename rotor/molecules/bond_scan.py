@@ -1,0 +1,173 @@
+"""A relaxed scan of the rotation about a bond: energies and geometries by an ASE calculator, or by MMFF94 of RDKit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.molecules.bond_rotation import BondRotation
+from rotor.molecules.molecule import Molecule
+from rotor.molecules.optimise import ase_atoms, calculator_by_name
+from rotor.units import AVOGADRO_PER_MOL, CM_PER_EV, ELEMENTARY_CHARGE_C
+
+MOST_FORCE_EV_PER_ANGSTROM = 5e-4  # the energy is then converged to some 1e-6 eV, 0.01 cm⁻¹: it is of second order in what is left
+MOST_STEPS = 500
+EV_PER_KCAL_MOL = 4184.0 / AVOGADRO_PER_MOL / ELEMENTARY_CHARGE_C  # exact
+MMFF = "mmff"
+POINTS = 36  # of a whole turn
+LEAST_POINTS = 6  # of one period: two harmonics of it
+
+
+@dataclass(frozen=True, eq=False)
+class BondScan:
+    """Energies along the rotation about a bond.
+
+    angles : (n,) radian, mean angle of the group from that of the input, over one period (`BondRotation.angle`)
+    energies_cm : (n,) cm⁻¹ above the lowest
+    positions_angstrom : (n, atoms, 3)
+    closure_cm : energy after a whole period less that at its start; a path that does not close has left its valley
+    source : the calculator
+    """
+
+    angles: Floats
+    energies_cm: Floats
+    positions_angstrom: Floats
+    closure_cm: float
+    source: str
+
+
+def relaxed_scan(
+    rotation: BondRotation,
+    calculator: Any = MMFF,
+    *,
+    points: int = POINTS,
+    progress: Callable[[int, int], object] | None = None,
+) -> BondScan:
+    """Energies over one period of the rotation, all else relaxed at each angle (BFGS with the dihedral angle fixed).
+
+    Parameters
+    ----------
+    rotation : BondRotation
+    calculator : ASE calculator or str, optional
+        Any with forces; a name for `calculator_by_name`; "mmff": MMFF94 of RDKit.
+    points : int, optional
+        Angles in a whole turn; those of one period are calculated, 2π divided by the symmetry number of the elements.
+    progress : callable, optional
+        Called with points done and points in all.
+
+    Returns
+    -------
+    BondScan
+
+    Raises
+    ------
+    ValueError
+        Where the calculator is unknown or fails, and where a geometry does not converge, with its angle.
+    """
+    engine = _calculator(rotation.molecule, calculator)
+    name = "MMFF94 (RDKit)" if calculator == MMFF else type(engine).__name__
+    period = 2 * math.pi / rotation.symmetry_number(isotopes=False)
+    points = max(LEAST_POINTS, math.ceil(points * period / (2 * math.pi)))
+    step = period / points
+    energies, geometries, positions = [], [], np.array(rotation.molecule.positions_angstrom)
+    for point in range(points + 1):
+        if point:
+            positions = rotation.turned_positions(positions, step)
+        positions, energy = _relaxed(rotation, positions, engine, name, math.degrees(point * step))
+        energies.append(energy * CM_PER_EV)
+        geometries.append(positions)
+        if progress is not None:
+            progress(point + 1, points + 1)
+    levels = np.array(energies)
+    return BondScan(
+        np.array([_unwrapped(rotation.angle(x), i * step) for i, x in enumerate(geometries[:-1])]),
+        levels[:-1] - levels[:-1].min(),
+        np.array(geometries[:-1]),
+        float(levels[-1] - levels[0]),
+        f"relaxed scan with {name}, {points} angles in a period",
+    )
+
+
+def _relaxed(
+    rotation: BondRotation, positions: Floats, engine: Any, name: str, degrees: float
+) -> tuple[Floats, float]:
+    """Positions and energy (eV) at the minimum of all coordinates but the dihedral angle."""
+    from ase.constraints import FixInternals
+    from ase.optimize import BFGS
+
+    atoms = ase_atoms(rotation.molecule)
+    atoms.set_positions(positions)
+    quartet = list(rotation.dihedral_atoms())
+    atoms.set_constraint(FixInternals(dihedrals_deg=[[atoms.get_dihedral(*quartet), quartet]], epsilon=1e-9))
+    atoms.calc = engine
+    try:
+        search: Any = BFGS(atoms, logfile=None)
+        converged = search.run(fmax=MOST_FORCE_EV_PER_ANGSTROM, steps=MOST_STEPS)
+        energy = float(atoms.get_potential_energy())
+    except Exception as reason:  # calculators fail with any class; all mean that this molecule cannot be done with it
+        raise ValueError(
+            f"{name} fails for {rotation.molecule.formula} at {degrees:g} degrees: {reason or type(reason).__name__}"
+        ) from reason
+    if not converged:
+        raise ValueError(
+            f"{name} did not relax {rotation.molecule.formula} at {degrees:g} degrees in {MOST_STEPS} steps; "
+            "refine the geometry first, or use another calculator"
+        )
+    return np.asarray(atoms.get_positions()), energy
+
+
+def _unwrapped(angle: float, near: float) -> float:
+    """The angle plus the multiple of 2π that brings it next to another."""
+    return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
+
+
+def _calculator(molecule: Molecule, calculator: Any) -> Any:
+    if calculator == MMFF:
+        return mmff_calculator(molecule)
+    return calculator_by_name(calculator) if isinstance(calculator, str) else calculator
+
+
+def mmff_calculator(molecule: Molecule) -> Any:
+    """An ASE calculator with the energy and forces of MMFF94 (T. A. Halgren, J. Comput. Chem. 17 (1996) 490) by RDKit.
+
+    Raises ValueError where no bonds fit the geometry or MMFF94 has no parameters.
+    """
+    from ase.calculators.calculator import Calculator, all_changes
+    from rdkit import Chem, rdBase
+    from rdkit.Chem import rdForceFieldHelpers
+
+    from rotor.molecules.mmff_dipole import bonded_rdkit
+
+    with rdBase.BlockLogs():
+        mol = bonded_rdkit(molecule)
+        parameters = None
+        if mol is not None and not Chem.SanitizeMol(mol, catchErrors=True):
+            parameters = rdForceFieldHelpers.MMFFGetMoleculeProperties(mol)
+    if parameters is None:
+        raise ValueError(f"MMFF94 has no parameters for {molecule.formula}; give the potential or an ASE calculator")
+    field = rdForceFieldHelpers.MMFFGetMoleculeForceField(mol, parameters)
+    conformer = mol.GetConformer()
+
+    class Mmff94(Calculator):  # type: ignore[misc]  # ASE has no types
+        """Energy and forces of RDKit's force field."""
+
+        implemented_properties = ("energy", "forces")
+
+        def calculate(self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = all_changes) -> None:
+            """Energy (eV) and forces (eV/Å) of the atoms."""
+            super().calculate(atoms, properties, system_changes)
+            for i, position in enumerate(atoms.get_positions().tolist()):  # the force field follows its conformer
+                conformer.SetAtomPosition(i, position)
+            field.Initialize()  # otherwise it goes on with the distances of its last call
+            gradient = np.array(field.CalcGrad()).reshape(-1, 3)
+            self.results = {
+                "energy": field.CalcEnergy() * EV_PER_KCAL_MOL,
+                "forces": -gradient * EV_PER_KCAL_MOL,
+            }
+
+    return Mmff94()

@@ -1,0 +1,81 @@
+"""A picture of a torsion: the potential, its levels, and a wave function on each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
+from rotor.thermodynamics.torsion_request import TorsionAnswer
+from rotor.version import version
+
+POINTS = 721
+AMPLITUDE = 0.55  # of the smallest distance of two levels with different v, that a wave function reaches
+MOST_DRAWN = 12
+
+
+def plot_torsion(
+    answer: TorsionAnswer,
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw `torsion_figure` into a .png, .pdf or .svg file; ValueError for another suffix."""
+    checked_suffix(path)
+    facts = {"program": "rotor", "version": version(), "bond": answer.request.bond, "potential": answer.source}
+    save(torsion_figure(answer, view), path, view.title or _title(answer), {**facts, **(provenance or {})})
+
+
+def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
+    """A matplotlib figure: V(α) in cm⁻¹, points of the scan, levels as lines, real wave functions about them by colour of the species."""
+    levels, torsion = answer.levels, answer.torsion
+    drawn = min(len(levels), MOST_DRAWN)
+    angles = np.linspace(0, 2 * np.pi, POINTS)
+    potential = (torsion.potential.values(angles) - torsion.foot_mhz) / units.MHZ_PER_CM
+    waves = answer.functions_of_levels(angles)[:, :drawn]
+    height = AMPLITUDE * _spacing(levels.energy_cm[:drawn], levels.v[:drawn]) / np.abs(waves).max()
+    degrees = np.degrees(angles)
+    with styled():
+        figure = new_figure(SIZE_INCHES)
+        axes = figure.subplots()
+        axes.plot(degrees, potential, color="black", linewidth=1.4, label="V(α)")
+        if answer.scan is not None:
+            shift = (torsion.potential.mean - torsion.foot_mhz) / units.MHZ_PER_CM  # of the fitted series: the scan has its own zero
+            fitted = torsion.potential.values(answer.scan.angles).mean() / units.MHZ_PER_CM - torsion.potential.mean / units.MHZ_PER_CM
+            place = np.degrees(answer.scan.angles) % 360
+            offset = shift + fitted - answer.scan.energies_cm.mean()
+            axes.plot(place, answer.scan.energies_cm + offset, "o", color=GREY, markersize=3, label="scan")
+        named: set[int] = set()
+        for row in range(drawn):
+            species = int(levels.species[row])
+            label = f"σ = {species}" if torsion.fold > 1 and species not in named else None
+            named.add(species)
+            colour, energy = PALETTE[species % len(PALETTE)], levels.energy_cm[row]
+            axes.axhline(energy, color=colour, linewidth=0.5, alpha=0.6)
+            axes.plot(degrees, energy + height * waves[:, row], color=colour, linewidth=0.9, label=label)
+        axes.set_xlim(0, 360)
+        axes.set_xticks(range(0, 361, 60))
+        axes.set_xlabel("angle from that of the geometry (degrees)")
+        axes.set_ylabel("energy above the foot (cm$^{-1}$)")
+        axes.set_title(_title(answer) if view.title is None else view.title, loc="left")
+        axes.legend(frameon=False, fontsize=7.5, loc="upper right")
+        show_part(axes, view)
+    return figure
+
+
+def _spacing(energies: Any, v: Any) -> float:
+    """Smallest mean distance between the levels of neighbouring v, cm⁻¹."""
+    means = np.array([energies[v == one].mean() for one in np.unique(v)])
+    apart = np.abs(np.diff(means))
+    wide = apart[apart > 0.1 * apart.max(initial=0.0)]
+    return float(wide.min()) if len(wide) else max(float(energies.max()), 1.0)
+
+
+def _title(answer: TorsionAnswer) -> str:
+    return f"{name_of_top(answer.request.top)}: rotation about the bond {answer.request.bond}"

@@ -1,0 +1,199 @@
+"""Levels of the rotation about a bond whose reduced moment changes with the angle: H = p F(α) p + V(α).
+
+F(α) = ħ²/2I_r(α) of the kinetic energy ½ I_r α'² without angular momentum of the whole (`rotor.molecules.bond_rotation`). In
+exp(i m α)/√2π, m = s k + σ, with the Fourier coefficients F_q and V_q of exp(i q α),
+
+    ⟨m|H|m'⟩ = m F_(m-m') m' + V_(m-m'),
+
+where s divides the periods of both and σ = 0 ... s - 1 is the species; with a constant F it is `rotor.quantum.torsion` with ρK = 0.
+Neglected: the pseudopotential from the determinant of the kinetic matrix (of the order of F times the square of the relative change of
+I_r), the coupling with the rotation of the whole, and with other vibrations beyond their relaxation along a scan.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats, Ints
+
+SAMPLES = 512  # angles of a turn at which V and F are sampled: exact for terms up to n = 255
+MOST_WAVES = 2500  # largest |m|: some seconds for a torsion without symmetry
+MARGIN = 1.15, 12  # of the classical |m| at the highest energy: factor, and waves beyond, into the forbidden range
+
+
+@dataclass(frozen=True, eq=False)
+class FourierSeries:
+    """f(α) = mean + Σ a_n cos nα + Σ b_n sin nα.
+
+    >>> series = FourierSeries.fitted(np.arange(6) * np.pi / 3, 2 + np.cos(np.arange(6) * np.pi / 3), 1, 2)
+    >>> series.values(np.array([0.0, np.pi])).round(9).tolist()
+    [3.0, 1.0]
+    """
+
+    mean: float
+    n: Ints
+    cosines: Floats
+    sines: Floats
+
+    @classmethod
+    def fitted(cls, angles: ArrayLike, values: ArrayLike, period: int, harmonics: int) -> FourierSeries:
+        """Least squares of n = period, 2 period, ..., harmonics · period."""
+        alpha, n = np.asarray(angles, dtype=float), period * np.arange(1, harmonics + 1)
+        phases = np.outer(alpha, n)
+        columns = np.hstack([np.ones((len(alpha), 1)), np.cos(phases), np.sin(phases)])
+        fit = np.linalg.lstsq(columns, np.asarray(values, dtype=float), rcond=None)[0]
+        return cls(float(fit[0]), n, fit[1 : harmonics + 1], fit[harmonics + 1 :])
+
+    def values(self, angles: ArrayLike) -> Floats:
+        """f at angles in radians."""
+        phases = np.multiply.outer(np.asarray(angles, dtype=float), self.n)
+        return np.asarray(self.mean + np.cos(phases) @ self.cosines + np.sin(phases) @ self.sines)
+
+    def derivative(self, angles: ArrayLike, order: int = 1) -> Floats:
+        """The first or second derivative at angles in radians."""
+        phases, n = np.multiply.outer(np.asarray(angles, dtype=float), self.n), self.n
+        if order == 1:
+            return np.asarray(np.cos(phases) @ (n * self.sines) - np.sin(phases) @ (n * self.cosines))
+        return np.asarray(-np.cos(phases) @ (n**2 * self.cosines) - np.sin(phases) @ (n**2 * self.sines))
+
+    def extrema(self, sign: float = 1.0) -> Floats:
+        """Angles of the minima in a turn, of the maxima with sign -1; refined by Newton's steps."""
+        angles = _grid(8 * SAMPLES)
+        values = sign * self.values(angles)
+        here = angles[(values < np.roll(values, 1)) & (values <= np.roll(values, -1))]
+        for _ in range(3):
+            curvature = sign * self.derivative(here, 2)
+            slope = sign * self.derivative(here)
+            step = np.divide(slope, curvature, out=np.zeros_like(slope), where=curvature > 0)
+            here = here - np.clip(step, -angles[1], angles[1])
+        return np.sort(here % (2 * np.pi))
+
+
+@dataclass(frozen=True)
+class Well:
+    """A minimum of the potential: its angle (radian), V there above the deepest one and the harmonic quantum √(2 F V''), both in MHz."""
+
+    angle: float
+    energy_mhz: float
+    quantum_mhz: float
+
+
+@dataclass(frozen=True, eq=False)
+class BondTorsion:
+    """F(α) and V(α) of a bond in MHz, and the number s of equal periods in a turn.
+
+    Parameters
+    ----------
+    kinetic, potential : FourierSeries
+        F and V; V counts from its lowest value (`foot_mhz` is subtracted).
+    fold : int
+        s.
+
+    Examples
+    --------
+    >>> free = BondTorsion(FourierSeries(150.0, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
+    >>> free.species_levels(1, 2)[0].tolist()  # F m² of m = 1, -2
+    [150.0, 600.0]
+    """
+
+    kinetic: FourierSeries
+    potential: FourierSeries
+    fold: int = 1
+
+    def __post_init__(self) -> None:
+        for series, what in ((self.kinetic, "F"), (self.potential, "V")):
+            wrong = [int(n) for n in series.n if n % self.fold]
+            if wrong:
+                raise ValueError(f"{what} has a term n = {wrong[0]}, which is no multiple of the fold {self.fold}")
+        if not (self.kinetic.values(_grid()) > 0).all():
+            raise ValueError("F is not above 0 at every angle; give more angles of the scan")
+
+    @cached_property
+    def foot_mhz(self) -> float:
+        """The lowest value of the series of V, from which energies count."""
+        return float(self.potential.values(self.potential.extrema()).min(initial=np.inf)) if self._hindered else self.potential.mean
+
+    @cached_property
+    def barrier_mhz(self) -> float:
+        """Highest less lowest value of V."""
+        if not self._hindered:
+            return 0.0
+        return float(self.potential.values(self.potential.extrema(-1.0)).max()) - self.foot_mhz
+
+    @property
+    def lowest_barrier_mhz(self) -> float:
+        """The lowest maximum of V above its foot; 0 without a barrier."""
+        tops = self.potential.values(self.potential.extrema(-1.0)) if self._hindered else np.zeros(0)
+        return float(tops.min()) - self.foot_mhz if len(tops) else 0.0
+
+    @property
+    def _hindered(self) -> bool:
+        return bool(np.any(self.potential.cosines) or np.any(self.potential.sines))
+
+    def sampled(self) -> tuple[Floats, Floats, Floats]:
+        """Angles of a whole turn, F and V above its foot there, (SAMPLES,) each."""
+        angles = _grid()
+        return angles, self.kinetic.values(angles), self.potential.values(angles) - self.foot_mhz
+
+    def wells(self) -> list[Well]:
+        """The minima of V in a turn by their angle; none without a barrier."""
+        if not self._hindered:
+            return []
+        angles = self.potential.extrema()
+        v = self.potential.values(angles) - self.foot_mhz
+        curvature = np.maximum(self.potential.derivative(angles, 2), 0.0)
+        quanta = np.sqrt(2 * self.kinetic.values(angles) * curvature)
+        return [Well(*one) for one in zip(angles.tolist(), v.tolist(), quanta.tolist(), strict=True)]
+
+    def waves_for(self, energy_mhz: float) -> int:
+        """|m| that holds every state up to an energy above the foot: the classical momentum, and a margin.
+
+        Raises ValueError where it passes MOST_WAVES.
+        """
+        smallest = float(self.kinetic.values(_grid()).min())
+        waves = math.ceil(MARGIN[0] * math.sqrt((energy_mhz + self.barrier_mhz) / smallest)) + MARGIN[1]
+        if waves > MOST_WAVES:
+            raise ValueError(
+                f"the torsion needs functions up to m = {waves}, more than {MOST_WAVES}: a group this heavy is classical here; "
+                "give lower temperatures or fewer levels"
+            )
+        return waves
+
+    def states(self, species: int, waves: int) -> tuple[Floats, NDArray[np.complex128], Ints]:
+        """Energies (n,) above the foot, rising, vectors (functions, n) over exp(i m α)/√2π, and m (functions,)."""
+        m = species + self.fold * np.arange(-((waves + species) // self.fold), (waves - species) // self.fold + 1)
+        _, f, v = self.sampled()
+        apart = m[:, None] - m[None, :]
+        kinetic, potential = (_elements(values, apart) for values in (f, v))
+        energies, vectors = np.linalg.eigh(np.outer(m, m) * kinetic + potential)
+        return energies, vectors, m
+
+    def species_levels(self, species: int, count: int, waves: int | None = None) -> Floats:
+        """The lowest energies of one species, MHz above the foot."""
+        usual = waves or self.waves_for(4 * float(self.kinetic.values(_grid()).max()) * (count * self.fold) ** 2)
+        return self.states(species, usual)[0][:count]
+
+    def all_energies(self, waves: int) -> Floats:
+        """Energies of every species in rising order."""
+        return np.sort(np.concatenate([self.states(species, waves)[0] for species in range(self.fold)]))
+
+
+def no_terms() -> tuple[Ints, Floats, Floats]:
+    """n, cosines and sines of a constant."""
+    return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+
+
+def _grid(count: int = SAMPLES) -> Floats:
+    return 2 * np.pi * np.arange(count) / count
+
+
+def _elements(values: Floats, apart: Ints) -> NDArray[np.complex128]:
+    """Fourier coefficients of sampled values at differences of m; 0 beyond what the samples hold."""
+    coefficients = np.fft.fft(values) / len(values)
+    held = np.abs(apart) < len(values) // 2
+    return np.asarray(np.where(held, coefficients[apart % len(values)], 0.0))

@@ -1,0 +1,189 @@
+"""Thermodynamic functions of the rotation about a bond: by the sum over its levels, and by the usual approximations.
+
+Energies count from the foot of the potential, σ is the symmetry number of the rotation, x = V/kT, u = hν/kT of a well with energy V_i.
+
+| method | Q |
+|---|---|
+| levels | (1/σ) Σ exp(-E/kT) |
+| free rotor | (1/σ) Σ exp(-E/kT), the levels with V = 0 |
+| harmonic | (1/σ) Σ_wells exp(-V_i/kT) exp(-u/2)/(1 - exp(-u)) |
+| classical | (1/σ)(1/2π) ∫ dα √(πkT/F(α)) exp(-x), from ∫∫ dp dα/h |
+| Pitzer-Gwinn | Q_classical · Q_harmonic/Q_classical harmonic, the latter with 1/u (K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, as
+  the documentation of RMG-Py, "Torsional degrees of freedom", gives it) |
+| tanh | Q_harmonic · tanh(Q_classical free/Q_classical harmonic): harmonic where it is cold, the free rotor where it is hot. The form is
+  known by the name of D. G. Truhlar (J. Comput. Chem. 12 (1991) 266), which was not read: it is made from these two limits |
+
+From ln Q follow U/RT = d ln Q/d ln T, C_v/R = U/RT + d(U/RT)/d ln T and S/R = ln Q + U/RT. Spins of the nuclei are counted by σ alone:
+where kT is not above the splittings of the species, their weights would matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.quantum.bond_torsion import BondTorsion, FourierSeries, no_terms
+from rotor.table import Table
+from rotor.thermodynamics.functions import GAS_CONSTANT
+
+HIGHEST_KT = 40.0  # levels up to so many kT: exp(-40) = 4e-18
+METHODS = ("levels", "free rotor", "harmonic", "classical", "Pitzer-Gwinn", "tanh")
+
+
+@dataclass(frozen=True, eq=False)
+class LogPartition:
+    """ln Q and its derivatives at temperatures (n,): u = U/RT and cv = C_v/R."""
+
+    ln_q: Floats
+    u: Floats
+    cv: Floats
+
+    def times(self, other: LogPartition, sign: float = 1.0) -> LogPartition:
+        """Of a product of partition functions, or with sign -1 of a ratio."""
+        return LogPartition(self.ln_q + sign * other.ln_q, self.u + sign * other.u, self.cv + sign * other.cv)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HinderedRotorFunctions(Table):
+    """Functions by method and temperature; U counts from the foot of the potential, zero-point energy included."""
+
+    method: NDArray[np.str_]
+    temperature_k: Floats
+    ln_q: Floats
+    energy_j_per_mol: Floats
+    entropy_j_per_mol_k: Floats
+    cv_over_r: Floats
+
+    @property
+    def columns(self) -> dict[str, NDArray[np.generic]]:
+        """Method, temperature, ln Q, U, S and C_v/R."""
+        return {
+            "method": self.method,
+            "temperature_k": self.temperature_k,
+            "ln_q": self.ln_q,
+            "energy_j_per_mol": self.energy_j_per_mol,
+            "entropy_j_per_mol_k": self.entropy_j_per_mol_k,
+            "cv_over_r": self.cv_over_r,
+        }
+
+    def of_method(self, name: str) -> HinderedRotorFunctions:
+        """The rows of one method."""
+        rows = self.method == name
+        return HinderedRotorFunctions(**{key: getattr(self, key)[rows] for key in self.__dataclass_fields__})
+
+
+def hindered_rotor_functions(
+    torsion: BondTorsion, temperatures_k: ArrayLike, symmetry_number: int
+) -> HinderedRotorFunctions:
+    """Functions of one torsion by every method of METHODS.
+
+    Parameters
+    ----------
+    torsion : BondTorsion
+        F(α) and V(α).
+    temperatures_k : (n,) array
+        Above 0 K.
+    symmetry_number : int
+        σ.
+
+    Returns
+    -------
+    HinderedRotorFunctions
+        The methods one after the other, each at all temperatures; those with harmonic wells are missing where V has none.
+
+    Raises
+    ------
+    ValueError
+        For a group so heavy that the sum over levels would not end.
+
+    Notes
+    -----
+    See the head of this module for the formulas, and for what is neglected.
+
+    Examples
+    --------
+    >>> from rotor.quantum.bond_torsion import FourierSeries, no_terms
+    >>> methyl = BondTorsion(FourierSeries(160e3, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
+    >>> found = hindered_rotor_functions(methyl, [1000.0], 3)
+    >>> found.of_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
+    [0.5]
+    """
+    t = np.atleast_1d(np.asarray(temperatures_k, dtype=float))
+    kt = t * units.MHZ_PER_K
+    free = BondTorsion(torsion.kinetic, FourierSeries(0.0, *no_terms()), torsion.fold)
+    waves = torsion.waves_for(HIGHEST_KT * float(kt.max()))
+    parts = {
+        "levels": _of_levels(torsion.all_energies(waves), kt),
+        "free rotor": _of_levels(free.all_energies(waves), kt),
+        "classical": _classical(torsion, kt),
+    }
+    wells = torsion.wells()
+    if wells and min(well.quantum_mhz for well in wells) > 0:
+        energies = np.array([well.energy_mhz for well in wells])
+        quanta = np.array([well.quantum_mhz for well in wells])
+        harmonic, limit = _harmonic(energies, quanta, kt), _classical_harmonic(energies, quanta, kt)
+        parts["harmonic"] = harmonic
+        parts["Pitzer-Gwinn"] = parts["classical"].times(harmonic).times(limit, -1.0)
+        parts["tanh"] = harmonic.times(_log_tanh(_classical(free, kt).times(limit, -1.0)))
+    return _table(t, [(name, parts[name]) for name in METHODS if name in parts], symmetry_number)
+
+
+def _table(t: Floats, parts: list[tuple[str, LogPartition]], symmetry_number: int) -> HinderedRotorFunctions:
+    ln_q = [part.ln_q - np.log(symmetry_number) for _, part in parts]
+    return HinderedRotorFunctions(
+        np.repeat([name for name, _ in parts], len(t)),
+        np.tile(t, len(parts)),
+        np.concatenate(ln_q),
+        np.concatenate([GAS_CONSTANT * t * part.u for _, part in parts]),
+        np.concatenate([GAS_CONSTANT * (one + part.u) for one, (_, part) in zip(ln_q, parts, strict=True)]),
+        np.concatenate([part.cv for _, part in parts]),
+    )
+
+
+def _weighted(ln_q: Floats, u: Floats, cv: Floats) -> LogPartition:
+    """A sum Q = Σ Q_i, of ln Q_i, U_i/RT and C_i/R (temperatures, parts)."""
+    highest = ln_q.max(axis=1, keepdims=True)
+    weights = np.exp(ln_q - highest)
+    total = weights.sum(axis=1)
+    p = weights / total[:, None]
+    mean = np.sum(p * u, axis=1)
+    spread = np.sum(p * (u - mean[:, None]) ** 2, axis=1)
+    return LogPartition(highest[:, 0] + np.log(total), mean, np.sum(p * cv, axis=1) + spread)
+
+
+def _of_levels(energies: Floats, kt: Floats) -> LogPartition:
+    """Each level is a part with ln Q_i = -x and U_i/RT = x."""
+    x = energies[None, :] / kt[:, None]
+    return _weighted(-x, x, np.zeros_like(x))
+
+
+def _classical(torsion: BondTorsion, kt: Floats) -> LogPartition:
+    """Each angle is a part with √(πkT/F) exp(-x)/samples; the sum is the integral, to all orders of a periodic function."""
+    _, f, v = torsion.sampled()
+    x = v[None, :] / kt[:, None]
+    ln_q = 0.5 * np.log(np.pi * kt[:, None] / f[None, :]) - x - np.log(len(f))
+    return _weighted(ln_q, x + 0.5, np.full_like(x, 0.5))
+
+
+def _harmonic(energies: Floats, quanta: Floats, kt: Floats) -> LogPartition:
+    x, u = energies[None, :] / kt[:, None], quanta[None, :] / kt[:, None]
+    occupied = np.exp(-u)
+    n = occupied / -np.expm1(-u)
+    return _weighted(-x - u / 2 - np.log1p(-occupied), x + u * (0.5 + n), u * u * n * (1 + n))
+
+
+def _classical_harmonic(energies: Floats, quanta: Floats, kt: Floats) -> LogPartition:
+    x, u = energies[None, :] / kt[:, None], quanta[None, :] / kt[:, None]
+    return _weighted(-x - np.log(u), x + 1.0, np.ones_like(x))
+
+
+def _log_tanh(ratio: LogPartition) -> LogPartition:
+    """ln tanh y of ln y and its derivatives: with g = d ln y/d ln T, d ln tanh y/d ln T = g h, h = 2y/sinh 2y, h' = g h (1 - 2y coth 2y)."""
+    double = 2 * np.exp(np.minimum(ratio.ln_q, 5.0))  # tanh of 148 is 1 to all digits, and so is what follows
+    g, h = ratio.u, double / np.sinh(double)
+    slope = (ratio.cv - ratio.u) * h + g * g * h * (1 - double / np.tanh(double))
+    return LogPartition(np.log(np.tanh(double / 2)), g * h, g * h + slope)

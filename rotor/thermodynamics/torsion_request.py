@@ -1,0 +1,374 @@
+"""A request for the rotation about a bond, and what answers it: potential, reduced moment, levels, splittings, thermodynamics."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.checks import require_positive, require_top
+from rotor.molecules.bond_rotation import BondRotation, bond_rotation
+from rotor.molecules.bond_scan import MMFF, POINTS, BondScan, relaxed_scan
+from rotor.molecules.bonds import bonded_atoms
+from rotor.quantum.bond_torsion import BondTorsion, FourierSeries
+from rotor.quantum.torsion import TorsionalPotential
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
+from rotor.table import Table, TextOf
+from rotor.thermodynamics.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
+TABLE = "table"
+SAME_WELLS = 0.05  # largest difference of the probabilities in wells of two components of one tunnelling doublet
+SHARED = 0.75  # of one well: a state with more there is no tunnelling component
+_TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s,][^\s,]*)?")
+Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True)
+class TorsionRequest:
+    """The rotation about one bond of a molecule; every field is checked when the request is made.
+
+    top: with a geometry. bond: atoms i-j as counted from 1; those behind j turn. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
+    of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: of a scan, in a whole turn. vmax: highest
+    torsional level. temperatures_k: of the thermodynamic functions.
+    """
+
+    top: Top
+    bond: str = declared(
+        "", Text(metavar="I-J"), "The bond: atoms I-J as counted from 1; what stands behind J turns", "observables.bond",
+        common=True, example="1-2",
+    )  # fmt: skip
+    potential: Any = declared(
+        MMFF, Custom(lambda given: given, metavar="TEXT"),
+        "'V3=400 V6=-10 cm-1', 'table' (V3 of a similar molecule), or a relaxed scan: mmff or an ASE calculator", "observables.potential",
+        common=True, example="V3=400 cm-1",
+    )  # fmt: skip
+    points: int = declared(POINTS, Whole(6, 720), "Angles of a scan, in a whole turn", "numerics.points")
+    vmax: int = declared(3, Whole(0, 200), "Highest torsional level", "numerics.vmax", common=True)
+    temperatures_k: Sequence[float] = declared(
+        TEMPERATURES_K, Grid("K", each=Quantity("K", above=0)), "Temperatures: 10:1000K:100 or 10,20,50 K", "conditions.temperature",
+        common=True, example="10:1000K:100",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        require_top(self.top)
+        check_fields(self)
+        if self.top.molecule is None:
+            raise ValueError("bond: constants alone have no bonds; give a molecule with its geometry")
+        if not self.bond:
+            raise ValueError("bond: none is named; give two atom numbers, such as 1-2")
+        if not len(self.temperatures_k):
+            raise ValueError("temperatures_k: expected at least one temperature")
+        for temperature in self.temperatures_k:
+            require_positive("temperatures_k", temperature, "K")
+        rotation = self.rotation
+        if isinstance(self.potential, str) and "=" in self.potential:
+            given_terms(self.potential, rotation)
+        elif self.potential == TABLE:
+            table_barrier(rotation)
+
+    @property
+    def rotation(self) -> BondRotation:
+        """The rotation about the bond; ValueError for a bond about which nothing turns."""
+        assert self.top.molecule is not None
+        try:
+            return bond_rotation(self.top.molecule, self.bond)
+        except ValueError as error:
+            raise ValueError(f"bond: {error}") from None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TorsionLevels(Table):
+    """Torsional levels. v: number within the species. species: σ of m = s k + σ. energy_cm: above the foot of the potential.
+
+    splitting_mhz: energy less that of σ = 0 with the same v; without symmetry, less that of the other component of a tunnelling doublet
+    (nan: the level has no partner).
+    """
+
+    v: Ints
+    species: Ints
+    degeneracy: Ints
+    energy_cm: Floats
+    splitting_mhz: Floats
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Labels, degeneracies, energies and splittings."""
+        return {
+            "v": self.v,
+            "species": self.species,
+            "degeneracy": self.degeneracy,
+            "energy_cm": self.energy_cm,
+            "above_lowest_cm": self.energy_cm - self.energy_cm.min(),
+            "splitting_mhz": self.splitting_mhz,
+        }
+
+
+@dataclass(frozen=True, repr=False)
+class TorsionAnswer(TextOf):
+    """Potential, levels and thermodynamic functions of the rotation about a bond."""
+
+    shown = "levels"
+
+    request: TorsionRequest
+    rotation: BondRotation
+    torsion: BondTorsion
+    source: str
+    scan: BondScan | None
+    misfit_cm: float
+    waves: int
+
+    @cached_property
+    def symmetry_number(self) -> int:
+        """σ of the rotation, isotopes told apart."""
+        return self.rotation.symmetry_number()
+
+    @cached_property
+    def levels(self) -> TorsionLevels:
+        """Levels up to v = vmax of each species; without symmetry vmax + 1 for each well."""
+        if self.torsion.fold == 1:
+            return self._levels_without_symmetry()
+        count, fold = self.request.vmax + 1, self.torsion.fold
+        energies = np.array([self.torsion.states(one, self.waves)[0][:count] for one in range(fold // 2 + 1)]).T
+        species = np.arange(fold // 2 + 1)
+        single = (species == 0) | (2 * species == fold)
+        v = np.repeat(np.arange(count), len(species))
+        return TorsionLevels(
+            v,
+            np.tile(species, count),
+            np.tile(np.where(single, 1, 2), count),
+            energies.ravel() / units.MHZ_PER_CM,
+            (energies - energies[:, :1]).ravel(),
+        )
+
+    def _levels_without_symmetry(self) -> TorsionLevels:
+        wells = self.torsion.wells()
+        count = (self.request.vmax + 1) * max(1, len(wells))
+        energies, vectors, m = self.torsion.states(0, self.waves)
+        splitting = np.full(count, np.nan)
+        shares = _shares(self.torsion, vectors[:, :count], m) if len(wells) > 1 else np.ones((count, 1))
+        lowest_top = self.torsion.lowest_barrier_mhz
+        for upper in range(1, count):
+            alike = np.abs(shares[upper] - shares[upper - 1]).max() < SAME_WELLS and shares[upper].max() < SHARED
+            if alike and energies[upper - 1] < lowest_top and np.isnan(splitting[upper - 1]):
+                splitting[upper] = energies[upper] - energies[upper - 1]
+        one = np.ones(count, dtype=np.int64)
+        return TorsionLevels(
+            np.arange(count), np.zeros(count, dtype=np.int64), one, energies[:count] / units.MHZ_PER_CM, splitting
+        )
+
+    def functions_of_levels(self, angles: Floats) -> Floats:
+        """Real wave functions (angles, levels) in the order of `levels`; of a pair ±σ the one that is even in its phase."""
+        found = []
+        for species in range(self.torsion.fold // 2 + 1):
+            rows = np.flatnonzero(self.levels.species == species)
+            _, vectors, m = self.torsion.states(species, self.waves)
+            waves = np.exp(1j * np.outer(angles, m)) @ vectors[:, : len(rows)] / math.sqrt(2 * math.pi)
+            found.append((rows, _real(waves)))
+        functions = np.empty((len(angles), len(self.levels)))
+        for rows, values in found:
+            functions[:, rows] = values
+        return functions
+
+    @cached_property
+    def functions(self) -> HinderedRotorFunctions:
+        """Thermodynamic functions at the temperatures of the request."""
+        return hindered_rotor_functions(self.torsion, self.request.temperatures_k, self.symmetry_number)
+
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the energies of the levels can be trusted."""
+        count, fold = self.request.vmax + 1, self.torsion.fold
+        smaller = [self.torsion.states(one, max(3 * self.waves // 4, fold))[0][:count] for one in range(fold)]
+        larger = [self.torsion.states(one, self.waves)[0][:count] for one in range(fold)]
+        size = min(map(len, smaller))
+        change = max(float(np.abs(a[:size] - b[:size]).max()) for a, b in zip(smaller, larger, strict=True))
+        largest = float(self.torsion.kinetic.values(np.zeros(1))[0]) * self.waves**2 + self.torsion.barrier_mhz
+        fit = "rest of the Fourier series of the scan" if self.scan is not None else "the potential has no stated error"
+        return ErrorBudget(
+            "torsional levels",
+            "MHz",
+            ErrorTerm(8 * float(np.finfo(float).eps) * largest, "eigenvalues"),
+            ErrorTerm(change, f"functions up to m = {self.waves}, from three quarters of them"),
+            ErrorTerm(None, "coupling with other vibrations and with the rotation of the whole"),
+            ErrorTerm(self.misfit_cm * units.MHZ_PER_CM if self.scan is not None else None, fit),
+            ErrorTerm(0.0, "nothing is sampled"),
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its tables, by the keys of docs/command_line.md."""
+        torsion, potential = self.torsion, self.torsion.potential
+        moments = units.ROTATIONAL_MHZ_U_ANGSTROM2 / torsion.sampled()[1]
+        wells, levels = torsion.wells(), self.levels
+        return {
+            **top_facts(self.request.top),
+            "bond": self.request.bond,
+            "turning_atoms": (self.rotation.top + 1).tolist(),
+            "potential_source": self.source,
+            "potential_cosines_cm": dict(zip(map(str, potential.n.tolist()), (potential.cosines / units.MHZ_PER_CM).tolist(), strict=True)),
+            "potential_sines_cm": dict(zip(map(str, potential.n.tolist()), (potential.sines / units.MHZ_PER_CM).tolist(), strict=True)),
+            "barrier_cm": torsion.barrier_mhz / units.MHZ_PER_CM,
+            "wells": [
+                {"angle_degrees": math.degrees(one.angle), "energy_cm": one.energy_mhz / units.MHZ_PER_CM,
+                 "harmonic_cm": one.quantum_mhz / units.MHZ_PER_CM} for one in wells
+            ],
+            "reduced_moment_u_angstrom2": self.rotation.reduced_moment(),
+            "reduced_moment_range_u_angstrom2": [float(moments.min()), float(moments.max())],
+            "f_mhz": units.ROTATIONAL_MHZ_U_ANGSTROM2 / self.rotation.reduced_moment(),
+            "fold": torsion.fold,
+            "symmetry_number": self.symmetry_number,
+            "zero_point_cm": float(levels.energy_cm.min()),
+            "scan_misfit_cm": self.misfit_cm if self.scan is not None else None,
+            "scan_closure_cm": self.scan.closure_cm if self.scan is not None else None,
+            "waves": self.waves,
+            "errors": self.errors.as_json(),
+        }  # fmt: skip
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must know of the scan."""
+        if self.scan is None or abs(self.scan.closure_cm) < max(1.0, 0.01 * self.torsion.barrier_mhz / units.MHZ_PER_CM):
+            return ()
+        return (
+            f"the scan does not close: after a whole period the energy differs by {self.scan.closure_cm:.3g} cm⁻¹, so that another part "
+            "of the molecule has moved into another valley; start from its lowest conformer",
+        )
+
+
+def answer_torsion(request: TorsionRequest, progress: Progress | None = None) -> TorsionAnswer:
+    """The torsion of a request. progress: called with points of the scan that are done, and all.
+
+    >>> from rotor.molecules.readers.read import read_molecule
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_torsion(TorsionRequest(Top.from_molecule(read_molecule("C2H6")), "1-2", "V3=1013 cm-1", vmax=0))
+    >>> answer.symmetry_number, round(answer.facts()["barrier_cm"], 6)
+    (3, 1013.0)
+    """
+    rotation = request.rotation
+    potential, kinetic, source, scan, misfit = _made(request, rotation, progress)
+    fold = int(np.gcd.reduce([rotation.symmetry_number(), *(int(n) for n in (*potential.n, *kinetic.n))]))
+    torsion = BondTorsion(kinetic, potential, fold)
+    wells = max(1, len(torsion.wells()))
+    highest = 4 * float(kinetic.values(np.zeros(1))[0]) * ((request.vmax + 1) * max(wells, fold)) ** 2
+    return TorsionAnswer(request, rotation, torsion, source, scan, misfit, torsion.waves_for(highest))
+
+
+def _made(
+    request: TorsionRequest, rotation: BondRotation, progress: Progress | None
+) -> tuple[FourierSeries, FourierSeries, str, BondScan | None, float]:
+    """V and F in MHz, where V is from, the scan and the misfit (cm⁻¹) of its series."""
+    given = request.potential
+    if isinstance(given, TorsionalPotential) or (isinstance(given, str) and ("=" in given or given == TABLE)):
+        terms, source = given, "given"
+        if given == TABLE:
+            terms, source = table_barrier(rotation)
+        elif isinstance(given, str):
+            terms = given_terms(given, rotation)
+        return _series(terms), _rigid_kinetic(rotation, request.points), source, None, 0.0
+    try:
+        scan = relaxed_scan(rotation, given, points=request.points, progress=progress)
+    except ValueError as error:
+        raise ValueError(f"potential: {error}") from None
+    period = rotation.symmetry_number(isotopes=False)
+    harmonics = max(1, len(scan.angles) // 3)
+    potential = FourierSeries.fitted(scan.angles, scan.energies_cm * units.MHZ_PER_CM, period, harmonics)
+    misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
+    moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
+    own = rotation.symmetry_number()
+    if own != period:  # isotopes: the masses repeat less often than the potential, and are scanned rigidly
+        return potential, _rigid_kinetic(rotation, request.points), scan.source, scan, float(misfit)
+    kinetic = FourierSeries.fitted(scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics)
+    return potential, kinetic, scan.source, scan, float(misfit)
+
+
+def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
+    """F(α) of the geometry with its top turned rigidly."""
+    period = rotation.symmetry_number()
+    count = max(6, math.ceil(points / period))
+    angles = 2 * math.pi / period * np.arange(count) / count
+    moments = [
+        rotation.reduced_moment(rotation.turned_positions(rotation.molecule.positions_angstrom, x)) for x in angles
+    ]
+    return FourierSeries.fitted(angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / np.array(moments), period, count // 3)
+
+
+def _series(terms: TorsionalPotential) -> FourierSeries:
+    """Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα as a mean, cosines and sines."""
+    n = np.array(sorted({*terms.cosines, *terms.sines}), dtype=np.int64)
+    cosines = np.array([-0.5 * terms.cosines.get(int(i), 0.0) for i in n])
+    sines = np.array([0.5 * terms.sines.get(int(i), 0.0) for i in n])
+    return FourierSeries(-float(cosines.sum()), n, cosines, sines)
+
+
+def given_terms(text: str, rotation: BondRotation) -> TorsionalPotential:
+    """The potential that "V3=400 V6=-10 cm-1" means: ½ V_n (1 - cos nα), ½ W_n sin nα; cm⁻¹ without a unit.
+
+    Raises ValueError for another text, a term twice, and a term that the symmetry of the group excludes.
+    """
+    matches = list(_TERM.finditer(text))
+    rest = _TERM.sub("", text).replace(",", " ").strip()
+    names = [match[1] + match[2] for match in matches]
+    if not matches or rest or len(set(names)) < len(names):
+        raise ValueError(f"potential: {text!r}: expected terms such as 'V3=400 V6=-10 cm-1', each once")
+    unit = next((match[4] for match in reversed(matches) if match[4]), "cm-1")
+    tables: dict[str, dict[int, float]] = {"V": {}, "W": {}}
+    fold = rotation.symmetry_number(isotopes=False)
+    for match in matches:
+        n = int(match[2])
+        if n < 1 or n % fold:
+            raise ValueError(
+                f"potential: {match[1]}{n}: the bond has {fold} equal positions in a turn; expected n = {fold}, {2 * fold}, ..."
+            )
+        value = units.parse_quantity(f"{match[3]} {match[4] or unit}", "cm-1")
+        tables[match[1]][n] = value * units.MHZ_PER_CM
+    return TorsionalPotential(tables["V"], tables["W"])
+
+
+def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
+    """V3 of a similar molecule, and which; ValueError where the bond bears no methyl group or the table has no such one."""
+    from rotor.quantum.estimates.methyl_groups import barrier_beside
+
+    molecule = rotation.molecule
+    bonds = bonded_atoms(molecule)
+    for carbon in (rotation.last, rotation.first):
+        hydrogens = [i for i in bonds[carbon].tolist() if molecule.symbols[i] == "H"]
+        if molecule.symbols[carbon] == "C" and len(hydrogens) == 3 and len(bonds[carbon]) == 4:
+            barrier = barrier_beside(molecule, bonds, carbon)
+            if barrier is not None:
+                doubt = "" if barrier.safe else ", within a factor of about 2"
+                return TorsionalPotential({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3 of {barrier.molecule}{doubt}"
+    raise ValueError(
+        "potential: the table has methyl groups alone, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
+    )
+
+
+def _shares(torsion: BondTorsion, vectors: NDArray[np.complex128], m: Ints) -> Floats:
+    """Probability (levels, wells) between neighbouring maxima of V."""
+    angles = torsion.sampled()[0]
+    density = np.abs(np.exp(1j * np.outer(angles, m)) @ vectors) ** 2 / len(angles)
+    place = np.searchsorted(torsion.potential.extrema(-1.0), angles)
+    wells = place % max(1, len(torsion.wells()))
+    return np.array([density[wells == i].sum(axis=0) for i in range(len(torsion.wells()))]).T
+
+
+def _real(waves: NDArray[np.complex128]) -> Floats:
+    """Real functions (angles, levels) of norm 1: the phase is taken at the largest value; √2 Re of a running wave."""
+    peak = np.argmax(np.abs(waves), axis=0)
+    phase = waves[peak, np.arange(waves.shape[1])]
+    real = (waves * np.conj(phase / np.abs(phase))).real
+    norm = np.sqrt(2 * np.pi * np.mean(real**2, axis=0))
+    return np.asarray(real / norm)

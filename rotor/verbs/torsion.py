@@ -1,0 +1,150 @@
+"""`torsion`: rotation about a bond: potential, reduced moment, levels, tunnelling splittings, hindered-rotor thermodynamics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rotor import units
+from rotor.formats import write
+from rotor.reports import top_facts
+from rotor.reports.progress import progress_bar
+from rotor.reports.screen import Table, rows_of, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Work
+
+EXAMPLES = """\b
+Examples:
+  rotor torsion C2H6 --bond 1-2
+  rotor torsion "SMILES:CC=O" --bond 1-2 --potential table --plot acetaldehyde.png
+  rotor torsion C2H6 --bond 1-2 --potential "V3=1013 cm-1" --temperature 100:1000K:10
+  rotor torsion butane.xyz --bond 2-3 --potential xtb --csv levels.csv --thermo-csv heat.csv"""
+
+SHOWN = 30  # levels of the report
+
+
+def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
+    """The torsion, with a bar on a terminal while the scan is made."""
+    if not work.progress:
+        return answer_torsion(request)
+    with progress_bar("angles of the scan") as show:
+        return answer_torsion(request, show)
+
+
+def draw(answer: TorsionAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.torsion import plot_torsion
+
+    plot_torsion(answer, path, view=report.view, provenance=report.command)
+
+
+def write_functions(answer: TorsionAnswer, path: Path, report: Report) -> None:
+    """The thermodynamic functions as a file."""
+    write(answer.functions, path, settings=dict(report.provenance))
+
+
+def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
+    """The thermodynamic functions of every method."""
+    return {"functions": rows_of(answer.functions)}
+
+
+def show(answer: TorsionAnswer, report: Report) -> None:
+    """Print the potential, the reduced moment, levels, and functions by temperature."""
+    print(top_facts.heading(answer.request.top))
+    show_facts(_facts(answer, report.content))
+    print()
+    show_table(_level_table(answer))
+    print()
+    show_table(_thermo_table(answer))
+    print()
+    show_facts([*source_facts(answer.request.top, ("constants",), report.sources), *top_facts.error_facts(report.content)])
+
+
+def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    low, high = record["reduced_moment_range_u_angstrom2"]
+    spread = f", {low:.6g} to {high:.6g} over a turn" if high - low > 1e-6 * high else ""
+    wells = [f"{one['angle_degrees']:.4g}° ({one['energy_cm']:.4g} cm⁻¹)" for one in record["wells"]]
+    quanta = sorted({round(one["harmonic_cm"], 1) for one in record["wells"]})
+    harmonic = ", ".join(f"{one:g}" for one in quanta)
+    facts = [
+        ("bond", f"{_bond_text(answer)}; {len(answer.rotation.top)} atoms turn"),
+        ("potential", f"{record['potential_source']}: {_terms_text(record)}"),
+        ("barrier", f"{record['barrier_cm']:.6g} cm⁻¹ from the lowest to the highest point"),
+        ("minima", ", ".join(wells) + f"; harmonic {harmonic} cm⁻¹" if wells else "none: a free rotor"),
+        ("reduced moment", f"{record['reduced_moment_u_angstrom2']:.6g} u Å²{spread}"),
+        ("F", f"{record['f_mhz'] / units.MHZ_PER_CM:.6g} cm⁻¹ ({record['f_mhz']:.6g} MHz)"),
+        ("symmetry", f"{record['symmetry_number']} equal positions in a turn"),
+    ]
+    if record["scan_misfit_cm"] is not None:
+        facts.append(("scan", f"Fourier series within {record['scan_misfit_cm']:.2g} cm⁻¹ (root mean square)"))
+    return facts
+
+
+def _bond_text(answer: TorsionAnswer) -> str:
+    symbols, rotation = answer.rotation.molecule.symbols, answer.rotation
+    return f"{symbols[rotation.first]}{rotation.first + 1}-{symbols[rotation.last]}{rotation.last + 1}"
+
+
+def _terms_text(record: Mapping[str, Any]) -> str:
+    """V_n and W_n of the largest terms, cm⁻¹."""
+    terms = [(f"V{n}", -2 * value) for n, value in record["potential_cosines_cm"].items()]
+    terms += [(f"W{n}", 2 * value) for n, value in record["potential_sines_cm"].items()]
+    largest = max((abs(value) for _, value in terms), default=0.0)
+    kept = [f"{name} = {value:.5g}" for name, value in terms if abs(value) > 1e-3 * largest]
+    return (", ".join(kept) + " cm⁻¹") if kept else "none"
+
+
+def _level_table(answer: TorsionAnswer) -> Table:
+    columns = answer.levels.columns
+    rows = []
+    for row in range(min(len(answer.levels), SHOWN)):
+        splitting = float(columns["splitting_mhz"][row])
+        hidden = math.isnan(splitting) or (splitting == 0.0 and columns["species"][row] == 0)
+        rows.append(
+            [str(columns["v"][row]), str(columns["species"][row]), str(columns["degeneracy"][row]),
+             f"{columns['energy_cm'][row]:.5f}", f"{columns['above_lowest_cm'][row]:.5f}", "" if hidden else f"{splitting:.4f}"]
+        )  # fmt: skip
+    title = "levels; E above the foot of the potential; splitting from σ = 0 of the same v, or of a tunnelling pair"
+    return Table(title, ("v", "σ", "g", "E (cm-1)", "above lowest", "splitting (MHz)"), rows)
+
+
+def _thermo_table(answer: TorsionAnswer) -> Table:
+    functions = answer.functions
+    methods = list(dict.fromkeys(functions.method.tolist()))
+    exact = functions.of_method("levels")
+    by_method = {name: functions.of_method(name).cv_over_r for name in methods}
+    rows = [
+        [f"{t:g}", f"{math.exp(exact.ln_q[i]):.5g}", f"{exact.entropy_j_per_mol_k[i]:.5g}", *(f"{by_method[name][i]:.5f}" for name in methods)]
+        for i, t in enumerate(exact.temperature_k.tolist())
+    ]
+    title = "thermodynamics: Q from the foot of the potential and S by the levels; C_v/R by the levels and by approximations"
+    return Table(title, ("T (K)", "Q", "S (J/mol K)", *methods), rows)
+
+
+VERB = Verb(
+    name="torsion",
+    about="Rotation about a bond: potential, levels, tunnelling, thermodynamics.",
+    examples=EXAMPLES,
+    request=TorsionRequest,
+    answer=answer,
+    table=lambda answer: answer.levels,
+    rows="levels",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
+        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of every method as CSV", write_functions, "thermo.csv"),
+        Output("plot", PICTURES, "Draw potential, levels and wave functions (.png, .pdf, .svg)", draw, "torsion.png"),
+    ),
+    subject=OneMolecule(
+        ("constants", "dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins",
+         "state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names", "hessian", "symmetry_tolerance"),
+    ),
+    content=content,
+    notes=lambda answer: answer.warnings,
+    drawn="",
+    start={"molecule": "C2H6", "observables.bond": "1-2"},
+)  # fmt: skip
