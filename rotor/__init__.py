@@ -48,6 +48,7 @@ VERBS = (
     "zeeman",
     "emission",
     "assign",
+    "torsion",
 )  # each a function of that name
 
 _MODULES = {

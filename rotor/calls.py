@@ -34,6 +34,9 @@ EXAMPLES = {
         'rotor.emission(["CO"], column_per_cm2="1e16", excitation_k="20 K", range_mhz="115:116GHz").table.names', "('carbon monoxide',)",
     ),
     "assign": ("rotor.assign([[7000.0, 1.0], [9000.0, 2.0]]).word", "'not found'"),
+    "torsion": (
+        'rotor.torsion("C2H6", bond="1-2", potential="V3=1013 cm-1", vmax=0).table.energy_cm.round(2).tolist()', "[150.15, 150.15]",
+    ),
     "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
 }  # fmt: skip  # of each function: an expression and its value, which a test evaluates
 

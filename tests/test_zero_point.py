@@ -13,11 +13,11 @@ import pytest
 import rotor
 from rotor import units
 from rotor.geometry.inertia import point_masses, principal_frame
+from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import model_limits
-from rotor.molecules.bonds import bonded_atoms
 from rotor.quantum.estimates.zero_point import (
     F_HYDROGEN,
     F_OTHER,

@@ -34,6 +34,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "isotopologues": "Isotopologues: abundance, constants, axes, dipole.",
     "raman": "Rotational Raman lines and their cross sections.",
     "thermo": "Partition function, entropy, heat capacity.",
+    "torsion": "Rotation about a bond: levels, tunnelling, heat.",
     "tumble": "The exact free rotation of a molecule or a body.",
     "stark": "Levels in a static electric field.",
     "zeeman": "Levels in a static magnetic field.",
@@ -75,6 +76,7 @@ Examples:
   rotor isotopologues water
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
+  rotor torsion C2H6 --bond 1-2 --plot ethane.png
   rotor tumble water --plot water.png
   rotor stark OCS --field 0:200kV/cm --plot stark.png
   rotor zeeman --constants "B=6081.5 MHz" --g -0.03 --field 0:5T

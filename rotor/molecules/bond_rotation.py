@@ -28,7 +28,9 @@ from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 
 ON_AXIS_ANGSTROM = 0.1  # atoms nearer to the line of the bond do not turn: the group is linear
-SYMMETRIC_ANGSTROM = 0.25  # how far atoms of a group may be off an n-fold axis along the bond: hydrogens of a methyl group are by 0.05
+SYMMETRIC_ANGSTROM = (
+    0.25  # how far atoms of a group may be off an n-fold axis along the bond: hydrogens of a methyl group are by 0.05
+)
 MOST_FOLD = 6
 
 
@@ -60,9 +62,7 @@ class BondRotation:
 
     def turned(self, angle: float) -> Molecule:
         """The molecule with the top turned rigidly by an angle, radian."""
-        return replace(
-            self.molecule, positions_angstrom=self.turned_positions(self.molecule.positions_angstrom, angle)
-        )
+        return replace(self.molecule, positions_angstrom=self.turned_positions(self.molecule.positions_angstrom, angle))
 
     def turned_positions(self, positions: Floats, angle: float) -> Floats:
         """Positions (n, 3) with the top turned about the bond, right-handed seen from first to last."""
@@ -118,7 +118,9 @@ class BondRotation:
 
         One dihedral angle would count the tilt of a single bond as rotation; a mean over a methyl group does not.
         """
-        turns = [self._mean_turn(positions, end, other) for end, other in ((self.last, self.first), (self.first, self.last))]
+        turns = [
+            self._mean_turn(positions, end, other) for end, other in ((self.last, self.first), (self.first, self.last))
+        ]
         return float(np.angle(turns[0] * np.conj(turns[1])))
 
     def _mean_turn(self, positions: Floats, end: int, other: int) -> complex:

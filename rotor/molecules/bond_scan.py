@@ -15,7 +15,9 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.optimise import ase_atoms, calculator_by_name
 from rotor.units import AVOGADRO_PER_MOL, CM_PER_EV, ELEMENTARY_CHARGE_C
 
-MOST_FORCE_EV_PER_ANGSTROM = 5e-4  # the energy is then converged to some 1e-6 eV, 0.01 cm⁻¹: it is of second order in what is left
+MOST_FORCE_EV_PER_ANGSTROM = (
+    5e-4  # the energy is then converged to some 1e-6 eV, 0.01 cm⁻¹: it is of second order in what is left
+)
 MOST_STEPS = 500
 EV_PER_KCAL_MOL = 4184.0 / AVOGADRO_PER_MOL / ELEMENTARY_CHARGE_C  # exact
 MMFF = "mmff"
@@ -93,17 +95,16 @@ def relaxed_scan(
     )
 
 
-def _relaxed(
-    rotation: BondRotation, positions: Floats, engine: Any, name: str, degrees: float
-) -> tuple[Floats, float]:
+def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, degrees: float) -> tuple[Floats, float]:
     """Positions and energy (eV) at the minimum of all coordinates but the dihedral angle."""
-    from ase.constraints import FixInternals
+    from ase import constraints
     from ase.optimize import BFGS
 
+    library: Any = constraints  # ASE has no types
     atoms = ase_atoms(rotation.molecule)
     atoms.set_positions(positions)
     quartet = list(rotation.dihedral_atoms())
-    atoms.set_constraint(FixInternals(dihedrals_deg=[[atoms.get_dihedral(*quartet), quartet]], epsilon=1e-9))
+    atoms.set_constraint(library.FixInternals(dihedrals_deg=[[atoms.get_dihedral(*quartet), quartet]], epsilon=1e-9))
     atoms.calc = engine
     try:
         search: Any = BFGS(atoms, logfile=None)
@@ -137,7 +138,7 @@ def mmff_calculator(molecule: Molecule) -> Any:
 
     Raises ValueError where no bonds fit the geometry or MMFF94 has no parameters.
     """
-    from ase.calculators.calculator import Calculator, all_changes
+    from ase.calculators import calculator as library
     from rdkit import Chem, rdBase
     from rdkit.Chem import rdForceFieldHelpers
 
@@ -153,12 +154,16 @@ def mmff_calculator(molecule: Molecule) -> Any:
     field = rdForceFieldHelpers.MMFFGetMoleculeForceField(mol, parameters)
     conformer = mol.GetConformer()
 
-    class Mmff94(Calculator):  # type: ignore[misc]  # ASE has no types
+    base: Any = library.Calculator  # ASE has no types
+
+    class Mmff94(base):  # type: ignore[misc]
         """Energy and forces of RDKit's force field."""
 
-        implemented_properties = ("energy", "forces")
+        implemented_properties = ["energy", "forces"]  # noqa: RUF012  # ASE expects a list
 
-        def calculate(self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = all_changes) -> None:
+        def calculate(
+            self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = library.all_changes
+        ) -> None:
             """Energy (eV) and forces (eV/Å) of the atoms."""
             super().calculate(atoms, properties, system_changes)
             for i, position in enumerate(atoms.get_positions().tolist()):  # the force field follows its conformer
@@ -170,4 +175,5 @@ def mmff_calculator(molecule: Molecule) -> Any:
                 "forces": -gradient * EV_PER_KCAL_MOL,
             }
 
-    return Mmff94()
+    made: Any = Mmff94
+    return made()

@@ -46,8 +46,13 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
         axes = figure.subplots()
         axes.plot(degrees, potential, color="black", linewidth=1.4, label="V(α)")
         if answer.scan is not None:
-            shift = (torsion.potential.mean - torsion.foot_mhz) / units.MHZ_PER_CM  # of the fitted series: the scan has its own zero
-            fitted = torsion.potential.values(answer.scan.angles).mean() / units.MHZ_PER_CM - torsion.potential.mean / units.MHZ_PER_CM
+            shift = (
+                torsion.potential.mean - torsion.foot_mhz
+            ) / units.MHZ_PER_CM  # of the fitted series: the scan has its own zero
+            fitted = (
+                torsion.potential.values(answer.scan.angles).mean() / units.MHZ_PER_CM
+                - torsion.potential.mean / units.MHZ_PER_CM
+            )
             place = np.degrees(answer.scan.angles) % 360
             offset = shift + fitted - answer.scan.energies_cm.mean()
             axes.plot(place, answer.scan.energies_cm + offset, "o", color=GREY, markersize=3, label="scan")
@@ -64,7 +69,7 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
         axes.set_xlabel("angle from that of the geometry (degrees)")
         axes.set_ylabel("energy above the foot (cm$^{-1}$)")
         axes.set_title(_title(answer) if view.title is None else view.title, loc="left")
-        axes.legend(frameon=False, fontsize=7.5, loc="upper right")
+        axes.legend(frameon=False, fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         show_part(axes, view)
     return figure
 

@@ -23,7 +23,7 @@ from rotor.arrays import Floats, Ints
 
 SAMPLES = 512  # angles of a turn at which V and F are sampled: exact for terms up to n = 255
 MOST_WAVES = 2500  # largest |m|: some seconds for a torsion without symmetry
-MARGIN = 1.15, 12  # of the classical |m| at the highest energy: factor, and waves beyond, into the forbidden range
+MARGIN = 1.2, 20  # of the classical |m| at the highest energy: factor, and waves beyond, into the forbidden range
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,8 @@ class FourierSeries:
             slope = sign * self.derivative(here)
             step = np.divide(slope, curvature, out=np.zeros_like(slope), where=curvature > 0)
             here = here - np.clip(step, -angles[1], angles[1])
-        return np.sort(here % (2 * np.pi))
+        turned = here % (2 * np.pi)
+        return np.sort(np.where(turned > 2 * np.pi - 1e-9, 0.0, turned))
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,11 @@ class BondTorsion:
     @cached_property
     def foot_mhz(self) -> float:
         """The lowest value of the series of V, from which energies count."""
-        return float(self.potential.values(self.potential.extrema()).min(initial=np.inf)) if self._hindered else self.potential.mean
+        return (
+            float(self.potential.values(self.potential.extrema()).min(initial=np.inf))
+            if self._hindered
+            else self.potential.mean
+        )
 
     @cached_property
     def barrier_mhz(self) -> float:
@@ -145,7 +150,7 @@ class BondTorsion:
         if not self._hindered:
             return []
         angles = self.potential.extrema()
-        v = self.potential.values(angles) - self.foot_mhz
+        v = np.maximum(self.potential.values(angles) - self.foot_mhz, 0.0)
         curvature = np.maximum(self.potential.derivative(angles, 2), 0.0)
         quanta = np.sqrt(2 * self.kinetic.values(angles) * curvature)
         return [Well(*one) for one in zip(angles.tolist(), v.tolist(), quanta.tolist(), strict=True)]

@@ -396,8 +396,29 @@ def _assign(request: Any) -> Plan:
     return plan_of_assign(request)
 
 
+def _torsion(request: Any) -> Plan:
+    from rotor.thermodynamics.torsion_request import answer_torsion
+
+    found: list[Any] = []
+    seconds = timed(lambda: found.append(answer_torsion(request)))
+    answer = found[-1]
+    scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
+    return Plan(
+        kind="torsion",
+        effects=(f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
+        good=("species",) if answer.torsion.fold > 1 else (),
+        parts=(("basis", f"exp(imα) up to m = {answer.waves}, {answer.torsion.fold} species{scanned}"),),
+        counts={"levels": len(answer.levels), "temperatures": len(request.temperatures_k)},
+        seconds=seconds,
+        memory_mb=peak_mb(lambda: answer_torsion(request)),
+        left_out=(
+            left_out.LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),
+        ),
+    )
+
+
 _PLANS: dict[str, Callable[[Any], Plan]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _in_field, "zeeman": _in_field,
     "align": _align, "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
-    "assign": _assign,
+    "assign": _assign, "torsion": _torsion,
 }  # fmt: skip

@@ -8,10 +8,13 @@ Energies count from the foot of the potential, σ is the symmetry number of the 
 | free rotor | (1/σ) Σ exp(-E/kT), the levels with V = 0 |
 | harmonic | (1/σ) Σ_wells exp(-V_i/kT) exp(-u/2)/(1 - exp(-u)) |
 | classical | (1/σ)(1/2π) ∫ dα √(πkT/F(α)) exp(-x), from ∫∫ dp dα/h |
-| Pitzer-Gwinn | Q_classical · Q_harmonic/Q_classical harmonic, the latter with 1/u (K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, as
-  the documentation of RMG-Py, "Torsional degrees of freedom", gives it) |
-| tanh | Q_harmonic · tanh(Q_classical free/Q_classical harmonic): harmonic where it is cold, the free rotor where it is hot. The form is
-  known by the name of D. G. Truhlar (J. Comput. Chem. 12 (1991) 266), which was not read: it is made from these two limits |
+| Pitzer-Gwinn | Q_classical · Q_harmonic/Q_classical harmonic, the latter with 1/u in place of the oscillator |
+| tanh | Q_harmonic · tanh(Q_classical free/Q_classical harmonic) |
+
+The classical Q is exact for a classical motion. The next one is that of K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, as
+the documentation of RMG-Py ("Torsional degrees of freedom") gives it: with the quantum correction of the harmonic wells. The last is
+harmonic where it is cold and the free rotor where it is hot; the form goes by the name of D. G. Truhlar (J. Comput. Chem. 12 (1991)
+266), a paper that was not read: it is made here from its two limits, and only they are tested.
 
 From ln Q follow U/RT = d ln Q/d ln T, C_v/R = U/RT + d(U/RT)/d ln T and S/R = ln Q + U/RT. Spins of the nuclei are counted by σ alone:
 where kT is not above the splittings of the species, their weights would matter.
@@ -182,7 +185,7 @@ def _classical_harmonic(energies: Floats, quanta: Floats, kt: Floats) -> LogPart
 
 
 def _log_tanh(ratio: LogPartition) -> LogPartition:
-    """ln tanh y of ln y and its derivatives: with g = d ln y/d ln T, d ln tanh y/d ln T = g h, h = 2y/sinh 2y, h' = g h (1 - 2y coth 2y)."""
+    """ln tanh y and its derivatives: g = d ln y/d ln T, d ln tanh y/d ln T = g h, h = 2y/sinh 2y, dh/d ln T = g h (1 - 2y coth 2y)."""
     double = 2 * np.exp(np.minimum(ratio.ln_q, 5.0))  # tanh of 148 is 1 to all digits, and so is what follows
     g, h = ratio.u, double / np.sinh(double)
     slope = (ratio.cv - ratio.u) * h + g * g * h * (1 - double / np.tanh(double))

@@ -34,7 +34,7 @@ TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
 TABLE = "table"
 SAME_WELLS = 0.05  # largest difference of the probabilities in wells of two components of one tunnelling doublet
 SHARED = 0.75  # of one well: a state with more there is no tunnelling component
-_TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s,][^\s,]*)?")
+_TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
 Progress = Callable[[int, int], object]
 
 
@@ -241,7 +241,9 @@ class TorsionAnswer(TextOf):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user must know of the scan."""
-        if self.scan is None or abs(self.scan.closure_cm) < max(1.0, 0.01 * self.torsion.barrier_mhz / units.MHZ_PER_CM):
+        if self.scan is None or abs(self.scan.closure_cm) < max(
+            1.0, 0.01 * self.torsion.barrier_mhz / units.MHZ_PER_CM
+        ):
             return ()
         return (
             f"the scan does not close: after a whole period the energy differs by {self.scan.closure_cm:.3g} cm⁻¹, so that another part "
@@ -267,17 +269,20 @@ def answer_torsion(request: TorsionRequest, progress: Progress | None = None) ->
     return TorsionAnswer(request, rotation, torsion, source, scan, misfit, torsion.waves_for(highest))
 
 
+def is_scan(potential: Any) -> bool:
+    """Whether a potential is made by a scan, by MMFF94 or a calculator, instead of terms."""
+    if isinstance(potential, str):
+        return "=" not in potential and potential != TABLE
+    return not isinstance(potential, TorsionalPotential)
+
+
 def _made(
     request: TorsionRequest, rotation: BondRotation, progress: Progress | None
 ) -> tuple[FourierSeries, FourierSeries, str, BondScan | None, float]:
     """V and F in MHz, where V is from, the scan and the misfit (cm⁻¹) of its series."""
     given = request.potential
-    if isinstance(given, TorsionalPotential) or (isinstance(given, str) and ("=" in given or given == TABLE)):
-        terms, source = given, "given"
-        if given == TABLE:
-            terms, source = table_barrier(rotation)
-        elif isinstance(given, str):
-            terms = given_terms(given, rotation)
+    if not is_scan(given):
+        terms, source = _named_terms(given, rotation)
         return _series(terms), _rigid_kinetic(rotation, request.points), source, None, 0.0
     try:
         scan = relaxed_scan(rotation, given, points=request.points, progress=progress)
@@ -293,6 +298,13 @@ def _made(
         return potential, _rigid_kinetic(rotation, request.points), scan.source, scan, float(misfit)
     kinetic = FourierSeries.fitted(scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics)
     return potential, kinetic, scan.source, scan, float(misfit)
+
+
+def _named_terms(given: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
+    """The terms that are given, or those of the table, and where they are from."""
+    if given == TABLE:
+        return table_barrier(rotation)
+    return (given_terms(given, rotation) if isinstance(given, str) else given), "given"
 
 
 def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
@@ -367,7 +379,8 @@ def _shares(torsion: BondTorsion, vectors: NDArray[np.complex128], m: Ints) -> F
 
 def _real(waves: NDArray[np.complex128]) -> Floats:
     """Real functions (angles, levels) of norm 1: the phase is taken at the largest value; √2 Re of a running wave."""
-    peak = np.argmax(np.abs(waves), axis=0)
+    size = np.abs(waves)
+    peak = np.argmax(size > (1 - 1e-6) * size.max(axis=0), axis=0)  # the first of equal maxima
     phase = waves[peak, np.arange(waves.shape[1])]
     real = (waves * np.conj(phase / np.abs(phase))).real
     norm = np.sqrt(2 * np.pi * np.mean(real**2, axis=0))

@@ -61,13 +61,15 @@ def show(answer: TorsionAnswer, report: Report) -> None:
     print()
     show_table(_thermo_table(answer))
     print()
-    show_facts([*source_facts(answer.request.top, ("constants",), report.sources), *top_facts.error_facts(report.content)])
+    show_facts(
+        [*source_facts(answer.request.top, ("constants",), report.sources), *top_facts.error_facts(report.content)]
+    )
 
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     low, high = record["reduced_moment_range_u_angstrom2"]
     spread = f", {low:.6g} to {high:.6g} over a turn" if high - low > 1e-6 * high else ""
-    wells = [f"{one['angle_degrees']:.4g}° ({one['energy_cm']:.4g} cm⁻¹)" for one in record["wells"]]
+    wells = [f"{one['angle_degrees']:.4g}° ({round(one['energy_cm'], 6):.4g} cm⁻¹)" for one in record["wells"]]
     quanta = sorted({round(one["harmonic_cm"], 1) for one in record["wells"]})
     harmonic = ", ".join(f"{one:g}" for one in quanta)
     facts = [
@@ -118,7 +120,12 @@ def _thermo_table(answer: TorsionAnswer) -> Table:
     exact = functions.of_method("levels")
     by_method = {name: functions.of_method(name).cv_over_r for name in methods}
     rows = [
-        [f"{t:g}", f"{math.exp(exact.ln_q[i]):.5g}", f"{exact.entropy_j_per_mol_k[i]:.5g}", *(f"{by_method[name][i]:.5f}" for name in methods)]
+        [
+            f"{t:g}",
+            f"{math.exp(exact.ln_q[i]):.5g}",
+            f"{exact.entropy_j_per_mol_k[i]:.5g}",
+            *(f"{by_method[name][i]:.5f}" for name in methods),
+        ]
         for i, t in enumerate(exact.temperature_k.tolist())
     ]
     title = "thermodynamics: Q from the foot of the potential and S by the levels; C_v/R by the levels and by approximations"
@@ -145,6 +152,7 @@ VERB = Verb(
     ),
     content=content,
     notes=lambda answer: answer.warnings,
+    sound=False,  # a potential is read, and a scan fails, where it is made
     drawn="",
     start={"molecule": "C2H6", "observables.bond": "1-2"},
 )  # fmt: skip

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from rotor import units
-from rotor.quantum.estimates.methyl_groups import MethylGroup, bonded_atoms, methyl_groups
+from rotor.molecules.bonds import bonded_atoms
+from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.top import Top
 

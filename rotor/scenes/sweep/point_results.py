@@ -107,7 +107,15 @@ def _tumble(answer: Any) -> Numbers:
     return {name: facts[name] for name in names if facts.get(name) is not None}
 
 
+def _torsion(answer: Any) -> Numbers:
+    """The barrier, the zero-point energy, and C_v by the levels at the last temperature."""
+    facts = answer.facts()
+    exact = answer.functions.of_method("levels")
+    names = ("barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2")
+    return {name: facts[name] for name in names} | {"cv_over_r": exact.cv_over_r[-1]}
+
+
 _RESULTS: Mapping[str, Callable[[Any], Numbers]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _field_map, "zeeman": _field_map,
-    "align": _align, "fit": _fit, "emission": _emission, "gas": _gas, "fluid": _fluid, "tumble": _tumble,
+    "align": _align, "fit": _fit, "emission": _emission, "gas": _gas, "fluid": _fluid, "tumble": _tumble, "torsion": _torsion,
 }  # fmt: skip

@@ -1,0 +1,80 @@
+"""`rotor torsion`: what docs/command_line.md promises."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+import rotor
+from rotor.cli.shared.output import plain, rows_of
+from rotor.formats import read
+from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+
+ETHANE = ("torsion", "C2H6", "--bond", "1-2", "--potential", "V3=1013 cm-1")
+
+
+def test_the_command_gives_what_python_gives(call):
+    code, out, err = call(*ETHANE, "--vmax", "1", "--temperature", "100,300 K", "--json", "-")
+    assert code == 0, err
+    command = json.loads(out)
+    answer = answer_torsion(TorsionRequest(read("C2H6"), "1-2", "V3=1013 cm-1", vmax=1, temperatures_k=(100.0, 300.0)))
+    facts = {**answer.facts(), "levels": rows_of(answer.levels), "functions": rows_of(answer.functions)}
+    for key, value in plain(facts).items():
+        assert command[key] == value, key
+    assert command["levels"][1]["degeneracy"] == 2
+    assert len(command["functions"]) == 12  # six methods, two temperatures
+
+
+def test_files_and_report(call):
+    code, out, _ = call(*ETHANE, "--csv", "levels.csv", "--thermo-csv", "heat.csv", "--plot", "ethane.png")
+    assert code == 0
+    assert "reduced moment  1.5696 u Å²" in out
+    assert "barrier         1013 cm⁻¹" in out
+    with open("levels.csv", encoding="utf-8") as handle:
+        levels = list(csv.DictReader(handle))
+    assert [row["species"] for row in levels[:3]] == ["0", "1", "0"]
+    with open("heat.csv", encoding="utf-8") as handle:
+        heat = list(csv.DictReader(handle))
+    assert {row["method"] for row in heat} == {"levels", "free rotor", "harmonic", "classical", "Pitzer-Gwinn", "tanh"}
+    assert Path("ethane.png").stat().st_size > 20000
+
+
+def test_the_function_of_that_name():
+    result = rotor.torsion("C2H6", bond="1-2", potential="V3=1013 cm-1", vmax=0)
+    assert result.table.energy_cm.round(2).tolist() == [150.15, 150.15]
+    assert result.errors.truncation.value < 1e-3  # MHz
+
+
+def test_a_scene_says_the_same(call):
+    _, out, _ = call(*ETHANE, "--vmax", "1", "--save-scene", "s.toml", "--json", "-")
+    code, again, err = call("run", "s.toml", "--json", "-")
+    assert code == 0, err
+    assert json.loads(again)["levels"] == json.loads(out)["levels"]
+    code, plan, err = call("plan", "s.toml")
+    assert code == 0, err
+    assert "exp(imα)" in plan
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (("C2H6",), "error: --bond: none is named; give two atom numbers, such as 1-2"),
+        (("C2H6", "--bond", "3-6"), "error: --bond: atoms 3 (H) and 6 (H) are not bonded"),
+        (("C2H6", "--bond", "1-3"), "error: --bond: atoms 1 (C) and 3 (H): atom 3 (H) is bonded to no further atom"),
+        (("SMILES:C1CC1", "--bond", "1-2"), "error: --bond: atoms 1 (C) and 2 (C): the bond is part of a ring"),
+        (("C2H6", "--bond", "1-2", "--potential", "V2=3"), "error: --potential: V2: the bond has 3 equal positions in a turn"),
+        (("C2H6", "--bond", "1-2", "--potential", "nothing"), "error: --potential: calculator 'nothing' is unknown to ASE"),
+        (("C2H6", "--bond", "1-2", "--vmax", "-1"), "error: --vmax: -1: expected a whole number"),
+        (("C2H6", "--bond", "1-2", "--points", "3"), "error: --points: 3: expected a whole number from 6"),
+        (("C2H6", "--bond", "1-2", "--temperature", "0"), "error: --temperature: '0': expected"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line(call, words, error):
+    code, out, err = call("torsion", *words, "--csv", "a.csv")
+    assert (code, out) == (2, "")
+    last = err.rstrip("\n").splitlines()[-1]
+    assert last.startswith(error)
+    assert not Path("a.csv").exists()
