@@ -378,6 +378,7 @@ LOADED = {  # of HEAVY, what a kind has a use for
     "thermo": {"rotor.thermodynamics.functions"},
     "tumble": {"rotor.classical", "numba"},
     "driven": {"rotor.classical", "rotor.classical.effects.drag", "numba"},
+    "torsion": {"rotor.thermodynamics.functions", "ase"},  # which reads the molecule
     "gas": {"rotor.classical", "rotor.classical.gas", "numba"},
     "align": {"rotor.alignment", "numba"},
     "emission": {"rotor.spectra", "rotor.spectra.emission"},
@@ -394,6 +395,7 @@ OF_KIND = {
     "gas": OCS + "[numerics]\nmolecules = 100\n",
     "align": OCS + '[[pulses]]\nshape = "gaussian"\npeak = "1e11 W/cm2"\nfwhm = 0.3\n[conditions]\ntemperature = 0\npoints = 11\n',
     "emission": '[[molecules]]\nsource = "CO"\n[conditions]\nrange = "100:120GHz"\n',
+    "torsion": 'molecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n',
     "fit": '[molecule]\nconstants = "B=57600 D=0.18 MHz"\n[lines]\nsource = "l.csv"\n[parameters]\nfree = ["B", "D"]\n',
     "fluid": '[conditions]\nmolecules = 8\nsteps = 1\n[numerics]\ncutoff = "3 Å"\n',
 }  # fmt: skip

@@ -27,6 +27,10 @@ SMALL = {
         'molecule = "HCOOH"\n[magnetic]\ng = [-0.28, -0.09, -0.03]\n[conditions]\nfield = "0:2T:2"\n[observables]\njmax = 1\n',
         {"levels", "largest_shift_mhz"},
     ),
+    "torsion": (
+        'molecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n',
+        {"barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2", "cv_over_r"},
+    ),
     "tumble": ('molecule = "water"\n', {"energy", "period", "turning_rate"}),
     "gas": ('molecule = "water"\n[numerics]\nmolecules = 100\n', {"p_value", "chi2"}),
     "emission": (
