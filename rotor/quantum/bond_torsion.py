@@ -98,7 +98,7 @@ class BondTorsion:
     Examples
     --------
     >>> free = BondTorsion(FourierSeries(150.0, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
-    >>> free.species_levels(1, 2)[0].tolist()  # F m² of m = 1, -2
+    >>> free.species_levels(1, 2).round(6).tolist()  # F m² of m = 1, -2
     [150.0, 600.0]
     """
 
