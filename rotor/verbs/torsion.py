@@ -148,7 +148,8 @@ VERB = Verb(
     ),
     subject=OneMolecule(
         ("constants", "dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins",
-         "state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names", "hessian", "internal_rotation", "symmetry_tolerance"),
+         "state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names", "hessian", "internal_rotation",
+         "symmetry_tolerance"),
     ),
     content=content,
     notes=lambda answer: answer.warnings,
