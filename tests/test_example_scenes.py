@@ -254,7 +254,7 @@ def cold_core(result):
     """The optical depth of CO 1-0 from its Einstein coefficient: τ0 = c³ A g' N/8πν³Q · e^-E'/kT (e^hν/kT - 1)/(Δv √(π/4 ln 2))."""
     from scipy.constants import Boltzmann, Planck, c
 
-    row = np.flatnonzero(column(result, "molecule") == 0)[0]
+    row = np.flatnonzero(column(result, "molecule") == "carbon monoxide")[0]
     frequency, a, upper = (
         column(result, name)[row] for name in ("frequency_mhz", "einstein_a_per_s", "energy_upper_k")
     )
