@@ -313,13 +313,79 @@ def test_the_steps_of_a_fluid_are_counted_about_the_mean():
     assert temperature_budget(record, Settings(), 6.0, 1, [few]).statistics.value is None
 
 
+SEPARATRIX = ((1.0, 2.0, 3.0), (1.0, 0.3, math.sqrt(3.0) * (1 + 1e-13)))
+
+
 def test_attitudes_are_within_their_bound():
-    """A symmetric top against its closed form in long double: body angle (1/I3 - 1/I1) L3 t about the axis, |L| t/I1 about L."""
-    answer = answer_tumble(TumbleRequest((1.0, 1.0, 2.0), (0.3, 0.0, 0.9), times=(0.0, 1e6)))
-    bound = answer.errors.rounding.value
-    spin = 1e6 * 0.9 * (1.0 - 0.5)
-    cosine = answer.table.momentum[-1, 0] / 0.3
-    assert np.arccos(np.clip(cosine, -1, 1)) == pytest.approx(math.acos(math.cos(spin)), abs=bound)
-    assert bound == pytest.approx(
-        ROUNDING * 1e6 * math.hypot(0.3, 0.9), rel=1e-12
-    )  # |L|/I1 is the sum of both rates here
+    """A symmetric top against its body angle (1/I1 - 1/I3) L3 t, and a body near the separatrix against powers of one period."""
+    answer = answer_tumble(TumbleRequest((1.0, 1.0, 2.0), (0.375, 0.0, 0.875), times=(0.0, 2.0**20)))
+    cosine = answer.table.momentum[-1, 0] / 0.375
+    spin = 2.0**20 * 0.875 * 0.5  # exact in binary
+    assert cosine == pytest.approx(math.cos(spin), abs=answer.errors.rounding.value)
+    assert answer.errors.rounding.value < 1e-14
+
+
+def test_the_phase_of_flips_follows_from_the_last_digits():
+    """Periods of bodies whose data differ by one unit in the last place, against the stated error of the phase."""
+    from rotor.classical.free.budget import flip_phase_error
+
+    for moments, momentum in (SEPARATRIX, ((1.0, 2.0, 3.0), (1.0, 0.3, 1.8))):
+        answer = answer_tumble(TumbleRequest(moments, momentum, times=(0.0, 1e3)))
+        period, moved = float(answer.motion.period), 0.0
+        for place in range(3):
+            others = [list(moments), list(momentum)]
+            for numbers in others:
+                kept, numbers[place] = numbers[place], math.nextafter(numbers[place], 9.0)
+                other = answer_tumble(TumbleRequest(tuple(others[0]), tuple(others[1]), times=(0.0,)))
+                moved = max(moved, abs(float(other.motion.period) - period))
+                numbers[place] = kept
+        stated = flip_phase_error(period, 1e3, answer.stability.growth_rate)
+        actual = 2 * math.pi * 1e3 * moved / period**2
+        assert actual / 3 <= stated <= 30 * actual
+
+
+def test_a_scene_near_the_separatrix_runs(call, folder):
+    """1 - k² of about 1e-13 and t = 1e13: right about L; what cannot be known there, the phase of the flips, is said."""
+    moments, momentum = SEPARATRIX
+    (folder / "s.toml").write_text(
+        f'schema = 1\nkind = "tumble"\naccuracy = "1e-6 rad"\n[body]\nmoments = {list(moments)}\n'
+        f"angular_momentum = {list(momentum)}\n[conditions]\ntimes = [0.0, 1e13]\n"
+    )
+    for verb in ("plan", "run"):
+        code, out, err = call(verb, "s.toml")
+        assert code == 0, err
+    assert "numerical error at most 7.2e-15 rad" in " ".join(out.split())
+    free = answer_tumble(TumbleRequest(moments, momentum, times=(0.0, 1e13)))
+    assert free.errors.data.source.startswith("the phase of the flips is not known")
+    assert answer_tumble(TumbleRequest(moments, momentum, times=(0.0, 10.0))).errors.data.source.startswith("moments")
+
+
+RIGID = '[molecule]\nconstants = "B=6000(1) D=0.001 MHz"\n[observables]\njmax = 3\n'
+
+
+@pytest.mark.parametrize(
+    ("body", "accuracy", "says"),
+    [
+        (RIGID, '{ total = "100 MHz" }', ""),
+        (
+            RIGID,
+            '{ total = "1 MHz" }',
+            "accuracy.total: 1 MHz cannot be given: the total is 12 MHz; data 12 MHz is larger",
+        ),
+        (RIGID, '"1 kHz"', ""),
+        (
+            'molecule = "SMILES:CC(Cl)C#N"\n',
+            '{ total = "1 MHz" }',
+            "data not estimated: no uncertainties of the constants",
+        ),
+        (RIGID, '{ totl = "1 MHz" }', "totl"),
+    ],
+)
+def test_the_accuracy_of_the_total_is_refused_where_it_cannot_be_given(call, folder, body, accuracy, says):
+    """σ(E) of J = 3 is 12 σ(B)."""
+    given = f'schema = 1\nkind = "levels"\naccuracy = {accuracy}\n' + body + '[outputs]\ncsv = "l.csv"\n'
+    (folder / "s.toml").write_text(given)
+    code, _, err = call("run", "s.toml")
+    assert code == (2 if says else 0), err
+    assert says in " ".join(err.split())
+    assert (folder / "l.csv").exists() == (not says)

@@ -19,7 +19,7 @@ from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
 from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift, sampled
-from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+from rotor.requests.budget import ErrorBudget
 from rotor.table import TextOf
 
 PERIODS, TURNS, POINTS = 2, 10, 201
@@ -153,21 +153,12 @@ class TumbleAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the attitude can be trusted, in rad at the last time."""
-        period = abs(float(self.motion.period))
-        going_round = 2 * math.pi / period if period else 0.0  # 0 where the momentum never comes back
-        rate = abs(float(self.motion.turning_rate)) + going_round
-        turned = rate * float(np.abs(self.table.times).max()) / self.request.units.time_factor
-        given = "moments and angular momentum have no stated uncertainty"
-        return ErrorBudget(
-            of="attitude",
-            unit="rad",
-            rounding=ErrorTerm(ROUNDING * max(turned, 1.0), f"{turned:.2g} rad turned, in double precision"),
-            truncation=ErrorTerm(0.0, "closed form"),
-            model=ErrorTerm(None, "a rigid body without torques"),
-            data=ErrorTerm(None, given),
-            statistics=ErrorTerm(0.0, "nothing is sampled"),
-        )
+        """How far the attitude can be trusted, in rad at the last time, for moments and momentum that are exact."""
+        from rotor.classical.free.budget import attitude_budget
+
+        factors = (self.request.units.time_factor, self.request.units.momentum_factor)
+        last = float(np.abs(self.table.times).max()) / self.request.units.time_factor
+        return attitude_budget(self.motion, last, self.stability.growth_rate, converted=factors != (1.0, 1.0))
 
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from rotor.requests.budget import ROUNDING
-from rotor.scenes.choice import NOTHING_CHEAPER, Choice, Reached
+from rotor.requests.budget import ROUNDING, ErrorBudget
+from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy
 from rotor.scenes.kind import quantity
 from rotor.scenes.scene import Scene
 
@@ -50,7 +50,7 @@ def asked_of(scene: Scene) -> float | None:
     >>> asked_of(StarkScene(molecule="OCS", accuracy="1 kHz")), asked_of(ThermoScene(molecule="CO", accuracy="0.1 %"))
     (0.001, 0.001)
     """
-    given = getattr(scene, "accuracy", None)
+    given = accuracy_text(scene)
     if given is None:
         return None
     if scene.kind in SAMPLED:
@@ -69,6 +69,12 @@ def asked_of(scene: Scene) -> float | None:
     return value
 
 
+def accuracy_text(scene: Any) -> str | float | None:
+    """The accuracy as the scene gives it, of the total or of the numerical error."""
+    given: Accuracy = getattr(scene, "accuracy", None)
+    return given.total if isinstance(given, TotalAccuracy) else given
+
+
 def unit_of(scene: Scene) -> str:
     """The unit of the accuracy of a scene.
 
@@ -78,7 +84,7 @@ def unit_of(scene: Scene) -> str:
     """
     if scene.kind not in SAMPLED:
         return UNITS[scene.kind]
-    text = str(getattr(scene, "accuracy", "")).strip()
+    text = str(accuracy_text(scene)).strip()
     return "" if _of_curves(scene, text) else "%" if text.endswith("%") else "K"
 
 
@@ -133,7 +139,32 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
             f"accuracy: {asked:g} {unit}".rstrip()
             + f" cannot be given: the error here is {error:.2g} ({choice.how}); ask for less"
         )
+    if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):
+        refuse_total(answer.errors, asked, unit)
     return Reached(asked, error, unit, choice.how)
+
+
+def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
+    """ValueError where the total of a budget is larger than an accuracy, or not estimated: with the terms, and what would lower them."""
+    wanted = f"accuracy.total: {accuracy:g} {unit}".rstrip()
+    if budget.unit != unit:
+        raise ValueError(
+            f"{wanted}: the errors here are of {budget.of} in {budget.unit or 'parts of 1'}; use that unit"
+        )
+    alone = "an accuracy without total is that of the numerical error alone"
+    unknown = [(name, term) for name, term in budget.shown() if term.value is None]
+    if unknown:
+        texts = [
+            f"{name} {term.text(unit)}" + (f" ({term.remedy} would lower it)" if term.remedy else "")
+            for name, term in unknown
+        ]
+        raise ValueError(f"{wanted} cannot be given: {'; '.join(texts)}; {alone}")
+    total = budget.total
+    if total is not None and total > accuracy:
+        largest = budget.shortfall(accuracy) or budget.line()
+        raise ValueError(
+            f"{wanted} cannot be given: the total is {total:.2g} {unit}".rstrip() + f"; {largest}; {alone}"
+        )
 
 
 def _sampled_error(kind: str, answer: Any, unit: str) -> float:

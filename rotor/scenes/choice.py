@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
 
 NOTHING_CHEAPER = "exact: nothing cheaper"
+
+
+class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An accuracy of the whole error budget, not of its numerical part alone."""
+
+    total: Annotated[str | float, msgspec.Meta(description="of all sources of error together")]
+
+
+Accuracy = str | float | TotalAccuracy | None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 from msgspec import Struct, field
 
+from rotor.scenes.choice import Accuracy
 from rotor.scenes.effect_sections import EffectSection
 from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import (
@@ -90,7 +91,7 @@ class TumbleScene(Scene, frozen=True, tag="tumble"):
     molecule: Annotated[str | MoleculeSection | None, said("a name, a file, SMILES:..., or a table", "water")] = None
     body: Annotated[BodySection | None, said("instead of a molecule")] = None
     effects: Annotated[list[EffectSection], said("what acts on a body")] = field(default_factory=list)
-    accuracy: Annotated[str | float | None, said("of the attitude", "1e-6 rad")] = None
+    accuracy: Annotated[Accuracy, said("of the attitude", "1e-6 rad")] = None
     conditions: TumbleConditions = TumbleConditions()
     numerics: TumbleNumerics = TumbleNumerics()
     outputs: TableOutputs = TableOutputs()
@@ -123,7 +124,7 @@ def _scene_class(kind: str) -> Any:
         found.append((name, type_) if default is msgspec.NODEFAULT else (name, type_, default))
     if verb.accuracy:
         meta = said(verb.accuracy, verb.accuracy_example)
-        found.append(("accuracy", Annotated[str | float | None, meta], None))
+        found.append(("accuracy", Annotated[Accuracy, meta], None))
     found += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
     scene = msgspec.defstruct(
         f"{kind.capitalize()}Scene", found, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",
