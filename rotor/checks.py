@@ -84,3 +84,7 @@ def require_top(value: object) -> None:
     """Refuse what is no top, such as its name; a top is known by its constants, since nothing is imported here."""
     if not hasattr(value, "constants"):
         raise ValueError(f"top: {value!r:.60}: expected a Top; rotor.read makes one of a name, a file or a molecule")
+
+
+class RunStopped(ValueError):
+    """A run that began could not continue; what was written before stays."""

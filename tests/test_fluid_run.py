@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from ase.io import read
 
+from rotor.checks import RunStopped
 from rotor.fluids.checkpoint import AseTrajectory, TextFile, read_checkpoint
 from rotor.fluids.forces.models import model_of
 from rotor.fluids.initial_box import lattice_box
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import Outputs, RunStopped, calculator_of, dynamics_of, pressure_bar, run_fluid
+from rotor.fluids.run import Outputs, calculator_of, dynamics_of, pressure_bar, run_fluid
 from rotor.fluids.settings import Settings
 
 SETTINGS = Settings(steps=60, every=4, step_fs=1.0, cutoff_angstrom=4.5, friction_per_ps=5.0)

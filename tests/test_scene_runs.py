@@ -418,3 +418,15 @@ def test_modules_of_absent_effects_are_not_imported(kind, folder):
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(eval(ran.stdout)) <= LOADED[kind]
+
+
+@pytest.mark.parametrize("kind", ["spectrum", "levels", "raman", "thermo"])
+def test_the_command_imports_nothing_of_other_kinds(kind, folder):
+    """`rotor run` of a plain scene, as the interpreter itself lists its imports."""
+    (folder / "s.toml").write_text(f'schema = 1\nkind = "{kind}"\n' + OF_KIND.get(kind, OCS))
+    command = [sys.executable, "-X", "importtime", "-m", "rotor", "run", "s.toml"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    imported = {line.rpartition("|")[2].strip() for line in ran.stderr.splitlines()}
+    assert "rotor.scenes.run" in imported
+    others = ("rotor.fluids", "rotor.alignment", "rotor.fitting", "rotor.quantum.fields", "rotor.quantum.effects.stark")
+    assert not [name for name in imported if name.startswith(others)]

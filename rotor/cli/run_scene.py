@@ -139,7 +139,7 @@ def _folder(options: Options) -> Path:
 
 
 def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
-    from rotor.fluids.run import RunStopped
+    from rotor.checks import RunStopped
     from rotor.scenes.kind import NoResultError
     from rotor.scenes.run import run_scene
 

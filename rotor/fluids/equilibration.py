@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.checks import RunStopped
 from rotor.fluids.initial_box import at_rest
-from rotor.fluids.run import Progress, RunStopped, dynamics_of, ns_per_day
+from rotor.fluids.run import Progress, dynamics_of, ns_per_day
 from rotor.fluids.settings import Settings
 from rotor.fluids.summary import mean_of
 from rotor.units import EV_PER_K

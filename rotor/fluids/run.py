@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.checks import RunStopped
 from rotor.fluids.checkpoint import (
     AseTrajectory,
     Checkpoint,
@@ -51,10 +52,6 @@ MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
 BAR_EVERY_S = 0.2
 
 Progress = Callable[[int, int, float], None]
-
-
-class RunStopped(ValueError):
-    """A run that began could not continue; what was written before stays."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import RunStopped
 from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
-from rotor.fluids.run import Outputs, RunStopped
+from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.checks import RunStopped
 from rotor.fluids.checkpoint import TextFile, csv_line, trajectory_file
 from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities
 from rotor.fluids.engines.results import engine_frames, row_of
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import COLUMNS, Outputs, RunStopped, ns_per_day, progress_bar
+from rotor.fluids.run import COLUMNS, Outputs, ns_per_day, progress_bar
 from rotor.fluids.settings import Settings
 
 if TYPE_CHECKING:
