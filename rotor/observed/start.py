@@ -24,6 +24,7 @@ _UNIT_COLUMN = 1e6  # thin for every line; templates are per column density
 _MIDDLE_K = 80.0
 _MOST_POINTS = 1 << 20
 _CORRELATED_K = (30.0, 80.0, 150.0, 300.0)
+_CLEAR = 0.8  # of the width at which a velocity stands out most
 _APART = 3.0  # widths from the best shift, beyond which another is an alternative
 _CLIPPED = 8.0  # standard deviations
 
@@ -133,7 +134,7 @@ def velocity_and_width(
 ) -> tuple[float, float]:
     """Velocity and width (km/s) at which the spectrum correlates best with the lines of all species; what is given stays.
 
-    The width is that at which the best velocity stands out most.
+    The width is that of the best score among those at which a velocity stands out clearly.
     """
     if velocity_km_s is not None and fwhm_km_s is not None:
         return velocity_km_s, fwhm_km_s
@@ -147,13 +148,15 @@ def velocity_and_width(
     allowed = np.arange(len(shifts))
     if velocity_km_s is not None:
         allowed = np.array([int(np.argmin(np.abs(velocities - velocity_km_s)))])
-    best = (-np.inf, 0.0, widths[0])
+    found: list[tuple[float, float, float, float]] = []  # how far it stands out, score, velocity, width
     for width in widths:
         score = _score(data, grid * (1 + sight.redshift), species, width, shifts)
         place = int(allowed[np.argmax(score[allowed])])
         elsewhere = score[np.abs(velocities - velocities[place]) > _APART * width].max(initial=1e-300)
-        best = max(best, (float(score[place] / elsewhere), float(velocities[place]), width))
-    return (best[1] if velocity_km_s is None else velocity_km_s), best[2]
+        found.append((float(score[place] / elsewhere), float(score[place]), float(velocities[place]), width))
+    clear = _CLEAR * max(one[0] for one in found)
+    _, _, velocity, width = max((one for one in found if one[0] >= clear), key=lambda one: one[1])
+    return (velocity if velocity_km_s is None else velocity_km_s), width
 
 
 def _score(data: Floats, grid: Floats, species: Sequence[SpeciesLines], width: float, shifts: Ints) -> Floats:
