@@ -5,6 +5,7 @@ What the program itself does otherwise than it documents is an option, and each 
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -128,6 +129,22 @@ def test_levels_have_the_basis_of_the_lines(tmp_path):
     for option, levels in (([], cut), (["--full-basis"], every)):
         assert run(["spectrum", str(tmp_path / "a.int"), "--egy", str(tmp_path / "a.egy"), "--top", "0", *option]) == 0
         assert len((tmp_path / "a.egy").read_text().splitlines()) == len(levels)
+
+
+def test_a_comparison_lifts_the_limits_too(tmp_path, capsys):
+    """`rotor cat --compare case.int` had no --full-basis: beside the list of the whole basis it lacks the lines of other K."""
+    (tmp_path / "a.var").write_bytes(TOP % (b"1", 0, 3))
+    (tmp_path / "a.int").write_bytes(ASKED % 8)
+    files = str(tmp_path / "a.int"), str(tmp_path / "a.cat")
+    assert run(["spectrum", files[0], "--full-basis", "--cat", files[1]]) == 0
+    missing = {}
+    for option in ([], ["--full-basis"]):
+        capsys.readouterr()
+        assert run(["cat", files[1], "--compare", files[0], "--json", "-", *option]) == 0
+        missing[tuple(option)] = json.loads(capsys.readouterr().out)["compared"]["missing"]
+    assert missing[()] > missing[("--full-basis",)] == 0
+    assert run(["cat", files[1], "--compare", files[1], "--full-basis"]) == 2
+    assert "--full-basis: expected with --compare and an .int file" in capsys.readouterr().err
 
 
 def test_the_option_needs_an_int_file(capsys):

@@ -43,6 +43,11 @@ class CompareOptions:
         "--as-spcat",
         help="OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum.",
     )
+    full_basis: bool = option(
+        False,
+        "--full-basis",
+        help="OTHER, an .int, is predicted with every K in the basis, whatever KNMIN and KNMAX say.",
+    )
 
     @property
     def other(self) -> str:
@@ -60,9 +65,10 @@ class Compared:
 
 
 def refuse_without_molecule(options: CompareOptions) -> None:
-    """--temperature and --isotope belong to a molecule that is predicted, --as-spcat to an .int file."""
-    if options.as_spcat and not (options.compare or "").lower().endswith(".int"):
-        raise ValueError("--as-spcat: expected with --compare and an .int file to predict")
+    """--temperature and --isotope belong to a molecule that is predicted, --as-spcat and --full-basis to an .int file."""
+    for flag, on in (("--as-spcat", options.as_spcat), ("--full-basis", options.full_basis)):
+        if on and not (options.compare or "").lower().endswith(".int"):
+            raise ValueError(f"{flag}: expected with --compare and an .int file to predict")
     given = {"--temperature": options.temperature, "--isotope": options.isotope}
     name = next((name for name, value in given.items() if value), None)
     if name is None:
@@ -82,7 +88,7 @@ def beside(lines: Catalogue, file: str, options: CompareOptions, chosen: Any) ->
     if other.lower().endswith((".cat", ".cat.gz")):
         return Compared(compare(lines, chosen(read_catalogue(other))))
     if other.lower().endswith(".int"):
-        prediction = predict_file(other, as_spcat=options.as_spcat)
+        prediction = predict_file(other, as_spcat=options.as_spcat, full_basis=options.full_basis)
         for text in prediction.notes:
             note(text)
         return Compared(compare(lines, chosen(prediction.catalogue)))
