@@ -144,15 +144,15 @@ def _next_factor(error: float, control: Any) -> Any:
 def to_time(
     form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float
 ) -> Any:
-    """Carry state (n, 7), L in space and attitude, from span[0] to span[1]; the next step, the count and the time reached.
+    """Carry state (n, 7), L in space and attitude, from span[0] to span[1]; the next step, the count, the time reached, success.
 
-    The time is short of span[1] where no step is short enough (span[2]: the smallest). control[0]: tolerance, 0 for a step that
-    never changes.
+    span[2]: the smallest step; False where none is short enough. span[3]: the most steps; the time is short of span[1] after them.
+    control[0]: tolerance, 0 for a step that never changes.
     """
-    time, end, smallest = span
+    time, end, smallest, most = span
     work = np.zeros((STAGES, state.shape[0], 6)), np.zeros((state.shape[0], 6))
     forward, steps = (1.0 if end > time else -1.0), 0
-    while (end - time) * forward > smallest:
+    while (end - time) * forward > smallest and steps < most:
         last = step >= abs(end - time) * (1.0 - 1e-12)
         h = end - time if last else forward * step
         error = _stepped(form, rolling, inverse, tableau, time, h, state, work)
@@ -163,37 +163,47 @@ def to_time(
                 step = abs(h) * _next_factor(error, control)
             if not error <= 1.0:
                 if step < smallest:
-                    return step, steps, time
+                    return step, steps, time, False
                 continue
         _accept(state, work[1])
         time = end if last else time + h
-    return step, steps, end
+    return step, steps, (end if (end - time) * forward <= smallest else time), True
 
 
 @njit(cache=True, nogil=True)
 def to_times(
-    form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, times: Any, path: Floats, step: float
+    form: Any,
+    rolling: Any,
+    inverse: Floats,
+    tableau: Any,
+    control: Any,
+    times: Any,
+    path: Floats,
+    state: Floats,
+    place: Any,
 ) -> Any:
-    """Fill path (t, n, 7), L in body axes and attitude, from its first rows, which hold L in space; count and time reached.
+    """Fill rows of path (t, n, 7), L in body axes and attitude, while there are steps left; state (n, 7): L in space and attitude.
 
-    times: (times (t,), the smallest step of each interval (t - 1,)).
+    times: (times (t,), the smallest step of each interval (t - 1,)). place: (interval, time in it, next step, most steps). Returns the
+    place without the last of them, the count of steps, and False where no step is short enough.
     """
     grid, smallest = times
-    state, total = np.empty((path.shape[1], 7)), 0
-    for i in range(state.shape[0]):
-        for k in range(7):
-            state[i, k] = path[0, i, k]
-    for j in range(grid.shape[0] - 1):
-        step, steps, time = to_time(
-            form, rolling, inverse, tableau, control, (grid[j], grid[j + 1], smallest[j]), state, step
+    row, time, step, most = place
+    total = 0
+    while row < grid.shape[0] - 1 and total < most:
+        step, steps, time, good = to_time(
+            form, rolling, inverse, tableau, control, (time, grid[row + 1], smallest[row], most - total), state, step
         )
         total += steps
-        if time != grid[j + 1]:
-            return total, time
+        if not good:
+            return row, time, step, total, False
+        if time != grid[row + 1]:
+            break
+        row += 1
         for i in range(state.shape[0]):
             q = (state[i, 3], state[i, 4], state[i, 5], state[i, 6])
             m = turned(conjugate(q), (state[i, 0], state[i, 1], state[i, 2]))
-            path[j + 1, i, 0], path[j + 1, i, 1], path[j + 1, i, 2] = m
+            path[row, i, 0], path[row, i, 1], path[row, i, 2] = m
             for k in range(3, 7):
-                path[j + 1, i, k] = state[i, k]
-    return total, grid[-1]
+                path[row, i, k] = state[i, k]
+    return row, time, step, total, True

@@ -24,6 +24,7 @@ SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-13  # of the interval between two times asked for
 STAGES = 12
 PLAIN_STEPS = 400  # a tenth of a second in numpy, as long as loading the compiled form of all further ones
+STEPS_OF_A_CALL = 20_000  # of one body: a compiled call obeys no signal
 ROLLING_COST = 8  # of a plain step with added inertia, 1.7 ms, beside one with torques
 _TOO_SHORT = (
     "no step is short enough at time {time:g}: an effect is discontinuous or grows without bound there; "
@@ -93,25 +94,31 @@ class LieRungeKutta(Method):
         return path[..., :3], path[..., 3:], taken
 
     def _rest(self, system: System, times: Floats, state: Floats, step: float) -> tuple[Floats, int]:
-        """The states (t - 1, n, 7) at all times but the first, and the count of steps, by one compiled call.
+        """The states (t - 1, n, 7) at all times but the first, and the count of steps, by compiled calls.
 
-        state: (n, 7), L in space and attitude at times[0].
+        Between them, every tenth of a second or so, Python sees signals. state: (n, 7), L in space and attitude at times[0].
         """
         from scipy.integrate import DOP853
 
         from rotor.classical.integrators._lie_kernels import to_times
 
         path = np.empty((len(times), *state.shape))
-        path[0] = state
+        state = np.array(state)
         tableau = DOP853.A[:STAGES, :STAGES], DOP853.B[None], DOP853.C[:STAGES], DOP853.E3[:STAGES], DOP853.E5[:STAGES]
         control = (0.0 if self.fixed_step else self.tolerance, SHRINK, GROW, SAFETY, 8.0)
         smallest = SMALLEST_STEP * np.abs(np.diff(times))
         arrays = tuple(np.ascontiguousarray(part) for part in tableau)
         forms = system.compiled, system.rolling
-        steps, reached = to_times(*forms, system.start_acting, arrays, control, (times, smallest), path, step)
-        if reached != times[-1]:
-            raise ValueError(_TOO_SHORT.format(time=reached))
-        return path[1:], steps
+        row, time, taken, most = 0, float(times[0]), 0, max(1, STEPS_OF_A_CALL // len(state))
+        while row < len(times) - 1:
+            place = row, time, float(step), most
+            row, time, step, steps, good = to_times(
+                *forms, system.start_acting, arrays, control, (times, smallest), path, state, place
+            )
+            taken += steps
+            if not good:
+                raise ValueError(_TOO_SHORT.format(time=time))
+        return path[1:], taken
 
     def _first_step(self, system: System, time: float, momentum: Floats, attitude: Floats) -> float:
         """A tenth of a radian of the fastest body, or a time unit for bodies at rest; the control corrects it."""
