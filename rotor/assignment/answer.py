@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,6 @@ from rotor.fitting.assignment import Assignments
 from rotor.table import Table, TextOf
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
-
-if TYPE_CHECKING:
-    from rotor.assignment.request import AssignRequest
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +138,7 @@ class AssignAnswer(TextOf):
 
     shown = "table"
 
-    request: AssignRequest
+    request: Any  # the AssignRequest, whose module makes answers
     species: tuple[AssignedSpecies, ...]
     unexplained: NDArray[np.bool_]
     spurs: NDArray[np.bool_]

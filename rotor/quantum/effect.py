@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
-    from rotor.quantum.levels import Levels
     from rotor.quantum.moments import Moment
     from rotor.quantum.spins.terms import Spin, SpinTerm
     from rotor.quantum.states import Coupling, State
@@ -114,7 +113,7 @@ class QuantumEffect(ABC):
         """Moments that make lines besides plain dipoles, such as those of a spin."""
         return ()
 
-    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Levels | None:
+    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Any:
         """Levels of all effects together where this one needs functions of its own; None where the functions of the rotation serve.
 
         Without vectors the levels serve sums over states: all that the functions have, whose names may be those of others.

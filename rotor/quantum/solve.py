@@ -82,7 +82,8 @@ def solve_levels(
                 f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.api.stark_map`"
             )
     for effect in effects:
-        if (levels := effect.solve(top, effects, jmin, jmax, vectors)) is not None:
+        levels: Levels | None = effect.solve(top, effects, jmin, jmax, vectors)
+        if levels is not None:
             return levels
     if any(effect.spins(top) for effect in effects):
         from rotor.quantum.spins.levels import spin_levels

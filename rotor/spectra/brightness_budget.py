@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from rotor.spectra.emitters import CatalogueLines
 
 if TYPE_CHECKING:
     from rotor.quantum.estimates.beyond import Limit
-    from rotor.spectra.emission_request import EmissionAnswer
 
 STEEPEST = math.sqrt(8 * math.log(2) / math.e)
 
@@ -38,7 +37,7 @@ def steepness(depth: float) -> float:
     return STEEPEST * min(depth, 1 + math.sqrt(math.log(max(depth, 1.0))))
 
 
-def brightness_budget(answer: EmissionAnswer) -> ErrorBudget:
+def brightness_budget(answer: Any) -> ErrorBudget:
     """The errors of T_B in K at the brightest line; those of the background alone where there is no line."""
     request, peak = answer.request, answer.peak
     number = 0 if peak is None else int(answer.lines.molecule[peak.row])

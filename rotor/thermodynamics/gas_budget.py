@@ -10,25 +10,22 @@ from __future__ import annotations
 import math
 import sys
 from statistics import NormalDist
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rotor import units
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-
-if TYPE_CHECKING:
-    from rotor.thermodynamics.classical_gas import GasAnswer
 
 EXACT_MOTION = ErrorTerm(0.0, "free motion in closed form")
 FASTEST = 6.0  # of the root mean square rate: 1 of 1e8 molecules turns faster about an axis
 LEFT_OUT = ErrorTerm(None, "a classical gas without collisions and vibrations", "the quantum calculation")
 
 
-def gas_budget(answer: GasAnswer) -> ErrorBudget:
+def gas_budget(answer: Any) -> ErrorBudget:
     """The errors of the temperature in K, or of C1 and C2 at all their times."""
     return _of_temperature(answer) if answer.correlations is None else _of_curves(answer)
 
 
-def _of_temperature(answer: GasAnswer) -> ErrorBudget:
+def _of_temperature(answer: Any) -> ErrorBudget:
     request = answer.request
     degrees = round(answer.ensemble.kinetic.total)
     return ErrorBudget(
@@ -44,7 +41,7 @@ def _of_temperature(answer: GasAnswer) -> ErrorBudget:
     )
 
 
-def _of_curves(answer: GasAnswer) -> ErrorBudget:
+def _of_curves(answer: Any) -> ErrorBudget:
     curves, request = answer.correlations, answer.request
     assert curves is not None
     spread = max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)
@@ -62,7 +59,7 @@ def _of_curves(answer: GasAnswer) -> ErrorBudget:
     )
 
 
-def _sampled(answer: GasAnswer, deviation: float) -> ErrorTerm:
+def _sampled(answer: Any, deviation: float) -> ErrorTerm:
     request = answer.request
     z = NormalDist().inv_cdf(0.5 + 0.5 * request.confidence)
     return ErrorTerm(
