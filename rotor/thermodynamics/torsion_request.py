@@ -198,14 +198,22 @@ class TorsionAnswer(TextOf):
         size = min(map(len, smaller))
         change = max(float(np.abs(a[:size] - b[:size]).max()) for a, b in zip(smaller, larger, strict=True))
         largest = float(self.torsion.kinetic.values(np.zeros(1))[0]) * self.waves**2 + self.torsion.barrier_mhz
-        fit = "rest of the Fourier series of the scan" if self.scan is not None else "the potential has no stated error"
+        unknown = (
+            "the error of the scanned energies is not known"
+            if self.scan is not None
+            else "the potential has no stated error"
+        )
+        rest = self.misfit_cm * units.MHZ_PER_CM if self.scan is not None else 0.0
         return ErrorBudget(
             "torsional levels",
             "MHz",
             ErrorTerm(8 * float(np.finfo(float).eps) * largest, "eigenvalues"),
-            ErrorTerm(change, f"functions up to m = {self.waves}, from three quarters of them"),
+            ErrorTerm(
+                change + rest,
+                f"functions up to m = {self.waves}, from three quarters of them, and terms of the Fourier series",
+            ),
             ErrorTerm(None, "coupling with other vibrations and with the rotation of the whole"),
-            ErrorTerm(self.misfit_cm * units.MHZ_PER_CM if self.scan is not None else None, fit),
+            ErrorTerm(None, unknown, "measured levels or a better calculator" if self.scan is not None else ""),
             ErrorTerm(0.0, "nothing is sampled"),
         )
 
