@@ -12,9 +12,9 @@ Energies count from the foot of the potential, σ is the symmetry number of the 
 | tanh | Q_harmonic · tanh(Q_classical free/Q_classical harmonic) |
 
 The classical Q is exact for a classical motion. The next one is that of K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, as
-the documentation of RMG-Py ("Torsional degrees of freedom") gives it: with the quantum correction of the harmonic wells. The last interpolates
-between the harmonic oscillator, where it is cold, and the free rotor, where it is hot. Unverified: the form is usually attributed to D. G.
-Truhlar, but no source was read; only its two limits are tested.
+the documentation of RMG-Py ("Torsional degrees of freedom") gives it: with the quantum correction of the harmonic wells. The last
+interpolates between the harmonic oscillator, where it is cold, and the free rotor, where it is hot. Unverified: the form is usually
+attributed to D. G. Truhlar, but no source was read; only its two limits are tested.
 
 From ln Q follow U/RT = d ln Q/d ln T, C_v/R = U/RT + d(U/RT)/d ln T and S/R = ln Q + U/RT. Spins of the nuclei are counted by σ alone:
 where kT is not above the splittings of the species, their weights would matter.
