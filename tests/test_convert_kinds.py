@@ -61,7 +61,7 @@ def test_what_is_written_is_read_as_the_same_top(source, tmp_path, capsys):
     assert read_par(format_par(back)).options == back.options
 
 
-def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path, capsys):
+def test_a_state_without_weights_beside_one_with_them_is_refused(tmp_path, capsys):
     given = copied("weights_of_states_i_tot", tmp_path)
     lines = [line for line in given.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
     given.write_text("".join(lines))
@@ -70,11 +70,9 @@ def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path, capsy
     beside = given.with_suffix(".var")
     file = read_par(beside)
     beside.write_bytes(format_par(replace(file, parameters=tuple(p for p in file.parameters if p.value != 1e-6))))
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
-    assert run(["convert", str(tmp_path / "x.toml"), str(tmp_path / "y.var")]) == 0
-    weights = rotor.read(tmp_path / "x.toml").states.weights
-    assert weights[1].rule == "none"
-    assert weights[0].to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    assert "I1 and I2 in a total spin: the spin weights" in capsys.readouterr().err  # they count the pair a second time
+    assert not (tmp_path / "x.toml").exists()
 
 
 def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(tmp_path, capsys):

@@ -12,6 +12,7 @@ from rotor.scenes.sweep import run_sweep
 
 MEASURED = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,20000.0,0.01\n2,1,40000.0,0.01\n3,2,60000.0,0.01\n"
 SMALL = {
+    "assign": ('spectrum = { file = "peaks.csv" }\n', {"species", "peaks", "unexplained"}),
     "spectrum": ('molecule = "CO"\n[numerics]\njmax = 2\n', {"lines", "strongest_mhz", "strongest_lgint", "q", "jmax"}),
     "levels": ('molecule = "CO"\n[observables]\njmax = 2\n', {"levels", "lowest_cm", "highest_cm"}),
     "raman": ('molecule = "N2"\n[numerics]\njmax = 4\n', {"lines", "strongest_cm", "strongest_cm2_per_sr", "q"}),
@@ -60,6 +61,7 @@ def test_every_kind_is_here():
 @pytest.mark.parametrize("kind", SMALL)
 def test_a_point_of_each_kind_has_its_results(folder, kind):
     Path("lines.csv").write_text(MEASURED)
+    Path("peaks.csv").write_text("".join(f"{7000 + 131.7 * n**1.5:.3f},{1 + n % 5}\n" for n in range(20)))
     text, names = SMALL[kind]
     result = run_sweep(parse_scene(f'schema = 1\nkind = "{kind}"\ntitle = "a"\nsweep = {{ title = ["b"] }}\n{text}'))
     assert result.failed == ()

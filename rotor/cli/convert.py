@@ -149,9 +149,13 @@ def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
     from rotor.formats.molecules.molecule_file import parse_molecule_file
     from rotor.formats.molecules.molecule_writer import molecule_file_text
     from rotor.formats.read_write import top_of_file
+    from rotor.quantum.effects.of_top import effects_of
 
     try:
-        refuse_weights_of_another_kind(top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET")))
+        top = top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
+        refuse_weights_of_another_kind(top)
+        if top.spin_constants is not None:
+            effects_of(top, True)  # weights that count a total spin of the file a second time
     except ValueError as reason:
         raise ValueError(
             f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "

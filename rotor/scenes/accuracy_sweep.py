@@ -104,7 +104,7 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
 _FILES = {
     "levels": "of_levels", "spectrum": "of_levels", "raman": "of_levels", "thermo": "of_fields", "stark": "of_fields",
     "zeeman": "of_fields", "align": "of_fields", "tumble": "of_motion", "gas": "of_motion", "fluid": "of_motion", "fit": "of_measured",
-    "emission": "of_measured", "torsion": "of_torsion",
+    "emission": "of_measured", "torsion": "of_torsion", "assign": "of_measured",
 }  # fmt: skip
 
 

@@ -246,7 +246,7 @@ def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: Fi
         states = solve_block(request, block, problem, strongest, jmax)
         return float(states.error[:, block.levels.j[states.rows] <= request.j_highest].max()) <= request.tolerance_mhz
 
-    least = _round_off(problem, strongest)
+    least = _round_off(problem.over(np.sort(basis_order(block, lowest))), strongest)
     if least > request.tolerance_mhz:
         raise ValueError(
             f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"

@@ -56,5 +56,10 @@ def emission(request: Any) -> Knobs:
     return Knobs((Knob("observables.least_depth", (measure,), settings, finest, against, answer_emission),))
 
 
+def assign(request: Any) -> Knobs:
+    """Of a scene of an assignment: the search is seeded and has no setting of accuracy."""
+    return Knobs((), ("search: seeded; how sure the answer is stands with it as a probability",))
+
+
 def _brightness(found: Any, reference: Any) -> float:
     return float(np.max(np.abs(found.spectrum.brightness_k - reference.spectrum.brightness_k), initial=0.0))

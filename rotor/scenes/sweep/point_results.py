@@ -115,7 +115,15 @@ def _torsion(answer: Any) -> Numbers:
     return {name: facts[name] for name in names} | {"cv_over_r": exact.cv_over_r[-1]}
 
 
+def _assign(answer: Any) -> Numbers:
+    """The number of species and of peaks, and how sure the first species is."""
+    facts = answer.facts()
+    numbers = {name: facts[name] for name in ("peaks", "unexplained")} | {"species": len(facts["species"])}
+    return numbers | ({"probability": facts["species"][0]["probability"]} if facts["species"] else {})
+
+
 _RESULTS: Mapping[str, Callable[[Any], Numbers]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _field_map, "zeeman": _field_map,
     "align": _align, "fit": _fit, "emission": _emission, "gas": _gas, "fluid": _fluid, "tumble": _tumble, "torsion": _torsion,
+    "assign": _assign,
 }  # fmt: skip
