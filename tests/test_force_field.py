@@ -251,6 +251,6 @@ def test_hessian_on_the_command_line(tmp_path, capsys):
     assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
     assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2
     errors = capsys.readouterr().err
-    assert "needs --calculator NAME" in errors
+    assert "needs --calculator" in errors
     assert "--hessian: bare constants" in errors
     assert "none.txt: No such file" in errors

@@ -63,7 +63,7 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
         if one.name == "schema":
             continue
         structures = structures_in(hints[one.name])
-        if structures:
+        if structures and one.name != "accuracy":
             inner.append((one.name, structures[0], one.name == "body" or (one.name == "effects" and kind == "tumble")))
         else:
             yield _key_line(one, hints[one.name], _start(kind).get(f"{place}{one.name}"))

@@ -48,8 +48,6 @@ class LongAnswer(SpectrumAnswer):
 
 def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> bool:
     """Whether a list is made on disk: so many transitions that memory may not hold them, and no output that needs it."""
-    from rotor.formats.streamed_lines import transition_count
-
     plain = request.shape == "sticks" and request.layer is None and resolution is None and not request.untrusted
     if (
         not plain
@@ -61,6 +59,8 @@ def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: floa
         return False
     if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
         return False
+    from rotor.formats.streamed_lines import transition_count
+
     return transition_count(request.top, _highest_j(request)) > TRANSITIONS
 
 
