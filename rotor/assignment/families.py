@@ -65,8 +65,8 @@ def sample_tops(bounds: Bounds, count: int, rng: np.random.Generator) -> Floats:
         planar = a * b / (a + b)
         least, most = np.maximum(planar, bounds.low[2]), np.minimum(b, bounds.high[2])
         c = least + (most - least) * u[:, 2] ** 1.5
-        kept = (a > 1.02 * b) & (c < 0.999 * b) & (most > least)
-        rows.append(np.column_stack([a, b, c])[kept])
+        selected = (a > 1.02 * b) & (c < 0.999 * b) & (most > least)
+        rows.append(np.column_stack([a, b, c])[selected])
         total += len(rows[-1])
         if total >= count:
             return np.concatenate(rows)[:count]
@@ -130,8 +130,8 @@ def _members(table: RigidTable, rows: Ints, slopes: Floats) -> tuple[Ints, Ints,
     # errors of all lines in units of the errors of the family's lines
     errors = np.abs(slopes[place] @ np.linalg.inv(matrix)).sum(axis=2)
     good = (errors < LARGEST_ERROR) & (lines[place] >= 0)
-    kept = good.sum(axis=1) >= 3 + FEWEST_COMPANIONS
-    return np.sort(chosen[kept], axis=1), place[kept], lines[place[kept]], good[kept]
+    selected = good.sum(axis=1) >= 3 + FEWEST_COMPANIONS
+    return np.sort(chosen[selected], axis=1), place[selected], lines[place[selected]], good[selected]
 
 
 def _cover(

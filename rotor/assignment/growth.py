@@ -109,11 +109,11 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     below = energy[table.lower[row]]
     expected = np.log(s_nu[:count]) - below / (MHZ_PER_K * temperature_k)
     kind = table.kind[row]
-    kept = np.zeros(count, dtype=bool)
+    selected = np.zeros(count, dtype=bool)
     for q in range(3):
         rows = np.flatnonzero(kind == q)
-        kept[rows[np.argsort(-expected[rows], kind="stable")[:most]]] = True
-    return Predicted(row[kept], f[kept], expected[kept], kind[kept], below[kept])
+        selected[rows[np.argsort(-expected[rows], kind="stable")[:most]]] = True
+    return Predicted(row[selected], f[selected], expected[selected], kind[selected], below[selected])
 
 
 def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
@@ -278,10 +278,10 @@ def merged_lines(
     """Lines above the threshold, those nearer than the width of a peak as one."""
     lines = predict(field, constants, temperature_k, most)
     level = lines.expected + scales[lines.kind]
-    kept = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
-    kept = kept[np.argsort(lines.frequency[kept], kind="stable")]
-    row, f, level = lines.row[kept], lines.frequency[kept], level[kept]
-    if not len(kept):
+    selected = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
+    selected = selected[np.argsort(lines.frequency[selected], kind="stable")]
+    row, f, level = lines.row[selected], lines.frequency[selected], level[selected]
+    if not len(selected):
         none = np.zeros(0)
         return Merged(row, none, row, none, none, row, np.zeros((0, 8)))
     blend = np.concatenate([[0], np.cumsum(np.diff(f) > BLENDED_MHZ)])

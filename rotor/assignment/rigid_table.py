@@ -127,11 +127,11 @@ def _lines(jmax: int) -> tuple[Ints, Ints, Ints, Ints]:
     quanta = np.column_stack([levels.quanta[name][order] for name in ("j", "ka", "kc")]).astype(np.int64)
     upper, lower = np.nonzero(np.abs(quanta[:, None, 0] - quanta[None, :, 0]) <= 1)
     j, ka, kc = (quanta[upper] - quanta[lower]).T
-    kept = (np.minimum(quanta[upper, 1], quanta[lower, 1]) <= KA_MAX) & ((j != 0) | (upper > lower))
+    selected = (np.minimum(quanta[upper, 1], quanta[lower, 1]) <= KA_MAX) & ((j != 0) | (upper > lower))
     change = (ka % 2) * 2 + kc % 2
     kind = np.array([-1, 0, 2, 1])[change]  # (even, odd): a, (odd, odd): b, (odd, even): c
-    kept &= (kind >= 0) & ~((kind == 0) & (ka == 0) & (j < 0))
-    return quanta, kind[kept], upper[kept], lower[kept]
+    selected &= (kind >= 0) & ~((kind == 0) & (ka == 0) & (j < 0))
+    return quanta, kind[selected], upper[selected], lower[selected]
 
 
 def _interpolation(nodes: Floats, points: Floats) -> Floats:

@@ -152,10 +152,10 @@ def _set_energy(atoms: Atoms, dynamics: RigidDynamics, energy_ev: float, tempera
     """Take out the total momentum and scale the momenta to an energy, that of the momentum (3/2 kT) taken off."""
     bodies, state = dynamics.bodies, dynamics.state
     atoms.set_momenta(bodies.momenta(at_rest(bodies, state.momentum), state.angular, state.attitude))
-    wanted = energy_ev - 1.5 * EV_PER_K * temperature_k - float(atoms.get_potential_energy())
+    requested = energy_ev - 1.5 * EV_PER_K * temperature_k - float(atoms.get_potential_energy())
     kinetic = float(atoms.get_kinetic_energy())
-    if wanted > 0 and kinetic > 0:
-        atoms.set_momenta(atoms.get_momenta() * math.sqrt(wanted / kinetic))
+    if requested > 0 and kinetic > 0:
+        atoms.set_momenta(atoms.get_momenta() * math.sqrt(requested / kinetic))
 
 
 def _other_seed(seed: int) -> int:

@@ -181,11 +181,11 @@ def identify(
     bank = _Bank(spectrum, known, choices, velocity, width, sight)
     search = _Search(spectrum, known, sight, choices, bank, progress)
     search.run()
-    fit, kept = search.pruned()
+    fit, selected = search.pruned()
     evidence = (
         tuple(
             sorted(
-                (_evidence(fit, k, signal, bank, search) for k, signal in enumerate(kept.tolist())),
+                (_evidence(fit, k, signal, bank, search) for k, signal in enumerate(selected.tolist())),
                 key=lambda one: -one.signal,
             )
         )

@@ -167,18 +167,18 @@ def _refuse_bad_axis(frequency: Floats, source: str) -> None:
 
 def line_free(intensity: Floats, widen: int = 2) -> NDArray[np.bool_]:
     """Channels (n,) without a line, by clipping at three deviations; `widen` neighbours of each clipped channel go with it."""
-    kept = np.ones(len(intensity), dtype=np.bool_)
+    selected = np.ones(len(intensity), dtype=np.bool_)
     for _ in range(50):
-        middle, deviation = _middle(intensity[kept])
+        middle, deviation = _middle(intensity[selected])
         beyond = np.abs(intensity - middle) > _CLIP * deviation
         # a single channel beyond three deviations is noise as often as a line: only pairs take their neighbours along
         pairs = beyond & (np.roll(beyond, 1) | np.roll(beyond, -1))
         wide = np.convolve(pairs, np.ones(2 * widen + 1), mode="same") > 0
         now = ~(wide | beyond)
-        if now.sum() < max(_LEAST_CHANNELS, len(intensity) // 50) or (now == kept).all():
+        if now.sum() < max(_LEAST_CHANNELS, len(intensity) // 50) or (now == selected).all():
             break
-        kept = now
-    return kept
+        selected = now
+    return selected
 
 
 def _middle(values: Floats) -> tuple[float, float]:

@@ -56,14 +56,14 @@ def plot_overlay(
         A suffix that is no picture.
     """
     suffix = checked_suffix(path)
-    wanted = panels or max(1, round(len(spectrum) / CHANNELS))
-    count = len(panel_ranges(spectrum, wanted))
+    requested = panels or max(1, round(len(spectrum) / CHANNELS))
+    count = len(panel_ranges(spectrum, requested))
     pages = (
         [list(range(count))]
         if suffix != ".pdf"
         else [list(range(i, min(i + PANELS, count))) for i in range(0, count, PANELS)]
     )
-    arguments = (spectrum, components, sight or Sight(), tuple(unidentified_mhz), wanted)
+    arguments = (spectrum, components, sight or Sight(), tuple(unidentified_mhz), requested)
     text = title or os.path.basename(spectrum.source) or "spectrum"
     if len(pages) == 1:
         save(overlay_figure(*arguments, pages[0], title=text), path, text, provenance or {})

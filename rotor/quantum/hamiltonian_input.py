@@ -85,8 +85,8 @@ def effects_of_each(given: HamiltonianInput, subject: Any) -> Any:
     _refuse_method_alone(given, subject)
     molecules: Sequence[Any] = subject.values["molecules"]
     tops = [one for one in molecules if isinstance(one, Top)]
-    known, wanted = [one for one in tops if one.spin_constants is not None], takes_spins(given.hyperfine, subject)
-    mixed = wanted and 0 < len(known) < len(tops)
+    known, requested = [one for one in tops if one.spin_constants is not None], takes_spins(given.hyperfine, subject)
+    mixed = requested and 0 < len(known) < len(tops)
     if mixed:
         unsplit = ", ".join(one.name or "a molecule" for one in tops if one.spin_constants is None)
         subject.note(f"--hyperfine: no constants of spins are known of {unsplit}, whose lines are not split")
@@ -95,7 +95,7 @@ def effects_of_each(given: HamiltonianInput, subject: Any) -> Any:
     def effects(one: Any) -> tuple[QuantumEffect, ...]:
         if not isinstance(one, Top):
             return ()
-        split = wanted and not (mixed and one.spin_constants is None)
+        split = requested and not (mixed and one.spin_constants is None)
         return effects_of_top(given if split else plain, one, split)
 
     return tuple(map(effects, molecules))

@@ -146,10 +146,10 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
 
 def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
     """ValueError where the total of a budget is larger than an accuracy, or not estimated: with the terms, and what would lower them."""
-    wanted = f"accuracy.total: {accuracy:g} {unit}".rstrip()
+    requested = f"accuracy.total: {accuracy:g} {unit}".rstrip()
     if budget.unit != unit:
         raise ValueError(
-            f"{wanted}: the errors here are of {budget.of} in {budget.unit or 'parts of 1'}; use that unit"
+            f"{requested}: the errors here are of {budget.of} in {budget.unit or 'parts of 1'}; use that unit"
         )
     alone = "an accuracy without total is that of the numerical error alone"
     unknown = [(name, term) for name, term in budget.shown() if term.value is None]
@@ -158,12 +158,12 @@ def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
             f"{name} {term.text(unit)}" + (f" ({term.remedy} would lower it)" if term.remedy else "")
             for name, term in unknown
         ]
-        raise ValueError(f"{wanted} cannot be given: {'; '.join(texts)}; {alone}")
+        raise ValueError(f"{requested} cannot be given: {'; '.join(texts)}; {alone}")
     total = budget.total
     if total is not None and total > accuracy:
         largest = budget.shortfall(accuracy) or budget.line()
         raise ValueError(
-            f"{wanted} cannot be given: the total is {total:.2g} {unit}".rstrip() + f"; {largest}; {alone}"
+            f"{requested} cannot be given: the total is {total:.2g} {unit}".rstrip() + f"; {largest}; {alone}"
         )
 
 

@@ -134,7 +134,7 @@ class TorsionAnswer(TextOf):
 
     @cached_property
     def symmetry_number(self) -> int:
-        """σ of the rotation, isotopes told apart."""
+        """σ of the rotation, different isotopes counted apart."""
         return self.rotation.symmetry_number()
 
     @cached_property

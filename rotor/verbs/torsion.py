@@ -96,8 +96,8 @@ def _terms_text(record: Mapping[str, Any]) -> str:
     terms = [(f"V{n}", -2 * value) for n, value in record["potential_cosines_cm"].items()]
     terms += [(f"W{n}", 2 * value) for n, value in record["potential_sines_cm"].items()]
     largest = max((abs(value) for _, value in terms), default=0.0)
-    kept = [f"{name} = {value:.5g}" for name, value in terms if abs(value) > 1e-3 * largest]
-    return (", ".join(kept) + " cm⁻¹") if kept else "none"
+    selected = [f"{name} = {value:.5g}" for name, value in terms if abs(value) > 1e-3 * largest]
+    return (", ".join(selected) + " cm⁻¹") if selected else "none"
 
 
 def _level_table(answer: TorsionAnswer) -> Table:

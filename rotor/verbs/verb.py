@@ -27,7 +27,7 @@ class NoAnswerError(RuntimeError):
 
 
 def silent(_: str) -> None:
-    """Takes a remark that nobody reads."""
+    """Discards a remark."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Extra:
 
 
 class SubjectKind:
-    """How a verb is told what it computes of; the base class: of nothing."""
+    """What a verb computes of; the base class: of nothing."""
 
     fields: Mapping[str, Field] = {}
 

@@ -66,7 +66,7 @@ class ObservedOptions:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class EmissionInputs:
     """The options of `rotor emission` as texts, None where they were not typed."""
 
     sources: Sequence[str]
@@ -81,23 +81,23 @@ class Wanted:
 
 
 def run_observed(
-    context: typer.Context, wanted: Wanted, given: ObservedOptions, file: SpectrumOptions, files: Files
+    context: typer.Context, requested: EmissionInputs, given: ObservedOptions, file: SpectrumOptions, files: Files
 ) -> None:
     """Read, model or fit, and deliver."""
     from rotor.observed.model import Sight
 
-    spectrum = read_observed(given.file or "", file, wanted.range_mhz)
+    spectrum = read_observed(given.file or "", file, requested.range_mhz)
     beam = spectrum.beam_arcsec or beam_of(file)
     sight = Sight(
-        inputs.quantity("--background", wanted.background, "K"),
+        inputs.quantity("--background", requested.background, "K"),
         None if beam is None else (beam[0] * beam[1]) ** 0.5,
-        wanted.redshift,
+        requested.redshift,
     )
-    species = species_of(wanted.sources, given.catalogue, padded(spectrum, wanted.redshift), wanted.partition)
+    species = species_of(requested.sources, given.catalogue, padded(spectrum, requested.redshift), requested.partition)
     for one in species:
         if "note" in one.identity:
             note(f"{one.name}: {one.identity['note']}")
-    fit, components = None, _components(spectrum, species, sight, wanted, given, file)
+    fit, components = None, _components(spectrum, species, sight, requested, given, file)
     if given.fit is not None:
         fit = _fitted(spectrum, components, sight, given)
         components = list(fit.components)
@@ -111,7 +111,7 @@ def _components(
     spectrum: ObservedSpectrum,
     species: Sequence[Any],
     sight: Sight,
-    wanted: Wanted,
+    requested: EmissionInputs,
     given: ObservedOptions,
     file: SpectrumOptions,
 ) -> list[Component]:
@@ -123,7 +123,8 @@ def _components(
 
     count = len(species)
     typed = {
-        name: _each(f"--{name}", getattr(wanted, name), count) for name in ("column", "excitation", "velocity", "width")
+        name: _each(f"--{name}", getattr(requested, name), count)
+        for name in ("column", "excitation", "velocity", "width")
     }
     size = size_of(file)
     if given.fit is None:

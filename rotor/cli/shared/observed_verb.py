@@ -8,7 +8,7 @@ from typing import Any, get_type_hints
 
 import typer
 
-from rotor.cli.shared.observed_emission import ObservedOptions, Wanted, run_observed
+from rotor.cli.shared.observed_emission import EmissionInputs, ObservedOptions, run_observed
 from rotor.cli.shared.observed_options import SpectrumOptions
 from rotor.cli.shared.options import name_of, value_of
 from rotor.cli.shared.runner import asked_files, run_verb
@@ -41,7 +41,7 @@ def run(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
         return
     if "save_scene" in typed:
         raise ValueError("--save-scene: an observed spectrum is no part of a scene; expected without --over and --fit")
-    run_observed(context, _wanted(verb, typed), observed, spectrum, asked_files(verb, typed))
+    run_observed(context, _requested(verb, typed), observed, spectrum, asked_files(verb, typed))
 
 
 def _group(group: Any, typed: Mapping[str, Any]) -> Any:
@@ -51,7 +51,7 @@ def _group(group: Any, typed: Mapping[str, Any]) -> Any:
     return group(**{one.name: value_of(one, types[one.name], typed[name_of(one)]) for one in given})
 
 
-def _wanted(verb: Verb, typed: Mapping[str, Any]) -> Wanted:
+def _requested(verb: Verb, typed: Mapping[str, Any]) -> EmissionInputs:
     """What was typed of the source; a fit estimates the rest."""
     given = Given(typed, "option")
     window = [
@@ -69,7 +69,7 @@ def _wanted(verb: Verb, typed: Mapping[str, Any]) -> Wanted:
     if not typed.get("names"):
         raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
     redshift = verb.fields["conditions.redshift"].read(typed.get("conditions.redshift"), "option")
-    return Wanted(
+    return EmissionInputs(
         sources=typed["names"],
         background=typed.get("conditions.background", "2.725"),
         redshift=redshift or 0.0,

@@ -196,11 +196,11 @@ class LineCatalogue:
         """Texts of states that were not read before."""
         new = np.array([one for one in numbers.tolist() if one not in self._texts], dtype=np.int64)
         if len(new):
-            self._engine.register("wanted", {"number": new})
+            self._engine.register("requested", {"number": new})
             rows = self._engine.execute(
-                "SELECT states.number, text FROM states JOIN wanted ON states.number = wanted.number"
+                "SELECT states.number, text FROM states JOIN requested ON states.number = requested.number"
             ).fetchall()
-            self._engine.unregister("wanted")
+            self._engine.unregister("requested")
             self._texts |= dict(rows)
 
 

@@ -104,12 +104,12 @@ def exomol_species(path: Path, states: States) -> Iterator[SpeciesLines]:
     for file in files:
         for upper, lower, a in _transitions(file, states):
             frequency = (states.energy_k[upper] - states.energy_k[lower]) * units.MHZ_PER_K
-            kept = frequency > 0
-            up, low = upper[kept], lower[kept]
+            selected = frequency > 0
+            up, low = upper[selected], lower[selected]
             yield species_lines(
                 name,
-                frequency[kept],
-                strength_from_einstein(a[kept], frequency[kept], states.degeneracy[up]),
+                frequency[selected],
+                strength_from_einstein(a[selected], frequency[selected], states.degeneracy[up]),
                 states.energy_k[low],
                 states.degeneracy[up],
                 partition,

@@ -73,7 +73,7 @@ def _partition_of_intensities(rows: Columns) -> PartitionTable:
     population = np.exp(-lower_k / TEMPERATURE_K) * -np.expm1(-frequency / (units.MHZ_PER_K * TEMPERATURE_K))
     used = (rows["intensity"] > 0) & (strength > 0)
     if not used.any():
-        raise ValueError("no line with an intensity and an Einstein coefficient: Q cannot be told from the file")
+        raise ValueError("no line with an intensity and an Einstein coefficient: Q does not follow from the file")
     q = float(np.median((strength * population)[used] / nm2_mhz(rows["intensity"][used])))
     kelvin = np.array(_SCALED_K)
     return PartitionTable(kelvin, q * (kelvin / TEMPERATURE_K) ** 1.5, SCALED_NOTE)

@@ -263,7 +263,7 @@ def _spectrum(
         if header.get("BMAJ") and header.get("BMIN")
         else None
     )
-    kept = {
+    selected = {
         key: _plain(header[key])
         for key in ("OBJECT", "TELESCOP", "LINE", "VELO-LSR", "VLSR", "VELDEF", "DATE-OBS")
         if key in header
@@ -284,7 +284,7 @@ def _spectrum(
         frame=frame,
         beam_arcsec=beam,
         notes=notes,
-        header={key.lower().replace("-", "_"): value for key, value in kept.items()},
+        header={key.lower().replace("-", "_"): value for key, value in selected.items()},
     )
 
 
