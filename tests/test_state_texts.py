@@ -154,7 +154,7 @@ def test_what_is_given_of_states_is_named_in_sources_and_refusals(call):
     assert "--state-weights: dipole μa = 1 D in state 0" in err
     printed = call("spectrum", *STATE, *weights, "--dipole-abc", "0,1,0", "--jmax", "1", "--sources")[1]
     assert "given (--state-constants, --state-weights)" in printed
-    assert "spin weights of 1" in call("thermo", *STATE, *weights, "--temperature", "30")[1]
+    assert "spin weights  0:" in call("thermo", *STATE, *weights, "--temperature", "30")[1]
 
 
 @pytest.mark.parametrize("names", [",", "0+,0+"])

@@ -49,7 +49,7 @@ _AXES = {"z": (0, 0, 1), "x": (1, 0, 0), "y": (0, 1, 0), "circular": (1, 1j, 0)}
 def read_axis(given: Any) -> Axis:
     """The unit vector of polarization that a word, or real and imaginary parts of its components, mean.
 
-    >>> read_axis("circular")[0].real == 2**-0.5
+    >>> round(float(read_axis("circular")[0].real), 12) == round(2**-0.5, 12)
     True
     """
     if isinstance(given, str):

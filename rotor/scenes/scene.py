@@ -166,7 +166,7 @@ def __getattr__(name: str) -> Any:
 def molecule_of(scene: Scene) -> MoleculeSection | None:
     """The molecule of a scene as a table, a name alone being its source; None where the scene has none.
 
-    >>> molecule_of(ThermoScene(molecule="water")).source
+    >>> molecule_of(KINDS["thermo"](molecule="water")).source
     'water'
     """
     given = getattr(scene, "molecule", None)

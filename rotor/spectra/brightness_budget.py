@@ -32,7 +32,7 @@ def steepness(depth: float) -> float:
     """Bound of |dT_B/dx| over C, the brightness of an opaque layer.
 
     >>> round(steepness(1e-3) / 1e-3, 3), round(steepness(100.0), 3)
-    (1.428, 4.492)
+    (1.428, 4.493)
     """
     return STEEPEST * min(depth, 1 + math.sqrt(math.log(max(depth, 1.0))))
 

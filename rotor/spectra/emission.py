@@ -219,7 +219,7 @@ def contrast_k(frequency_mhz: ArrayLike, source: Source) -> Floats:
     """J_ν(T_ex/(1+z)) - J_ν(T_bg) at observed frequencies, in K: the brightness of an opaque layer that fills the beam.
 
     >>> round(float(contrast_k(115271.2, Source(1e14, 10.0, 1.0))), 3)
-    6.61
+    6.651
     """
     seen_k = source.excitation_k * source.frequency_ratio
     return planck_k(frequency_mhz, seen_k) - planck_k(frequency_mhz, source.background_k)

@@ -64,6 +64,7 @@ def estimated_errors_mhz(top: Top) -> dict[str, float]:
     """Estimated errors of A, B, C in MHz by name, where they were not measured: of a geometry, or of scaling to another isotopologue.
 
     >>> from rotor.molecules.molecule import Molecule
+    >>> from rotor.tops.top import Top
     >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]], source="a guess", uncertainty=0.01)
     >>> {name: round(error) for name, error in estimated_errors_mhz(Top.from_molecule(co)).items()}
     {'B': 577}

@@ -59,7 +59,7 @@ class Subject:
 @dataclass(frozen=True)
 class Work:
     """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
-    remarks. progress: whether somebody looks on. provenance: of files that grow.
+    remarks. progress: whether a terminal shows it. provenance: of files that grow.
     """
 
     executor: Executor | None = None

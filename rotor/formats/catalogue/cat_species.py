@@ -132,7 +132,7 @@ def read_cat_with(path: str | os.PathLike[str], partition: str | None) -> Specie
 def partition_of_text(text: str) -> PartitionTable:
     """Q(T) from `T=Q` pairs in K, separated by commas.
 
-    >>> partition_of_text("75=27.46, 300=108.87").at(300.0)
+    >>> round(partition_of_text("75=27.46, 300=108.87").at(300.0), 9)
     108.87
     """
     pairs = [pair.split("=") for pair in text.split(",") if pair.strip()]

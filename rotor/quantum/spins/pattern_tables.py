@@ -37,15 +37,15 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
     moving = np.ones(highest.shape[1], dtype=np.int64)
     if scheme.equivalent:
         moving[-2] = 0  # a total of equivalent spins does not rise with F
-    every = highest - moving * max(patterns)
-    numbers = {tuple(row): place for place, row in enumerate(every.tolist())}
-    places = {}
-    for f, own in patterns.items():
-        if len(own) == len(highest):
-            places[f] = np.arange(len(highest))
-        else:
-            places[f] = np.array([numbers[tuple(row)] for row in (own - moving * f).tolist()])
-    return PatternTable(patterns, places, np.column_stack([every, scheme.classes(highest)]))
+    classes = {}  # by distances from F: of the highest F first, then those that equivalent spins have at lower F alone
+    for f in sorted(patterns, reverse=True):
+        distances = (patterns[f] - moving * f).tolist()
+        for row, number in zip(distances, np.asarray(scheme.classes(patterns[f])).tolist(), strict=True):
+            classes.setdefault(tuple(row), number)
+    numbers = {row: place for place, row in enumerate(classes)}
+    places = {f: np.array([numbers[tuple(row)] for row in (own - moving * f).tolist()]) for f, own in patterns.items()}
+    every = np.array(list(classes), dtype=np.int64)
+    return PatternTable(patterns, places, np.column_stack([every, list(classes.values())]))
 
 
 @lru_cache(maxsize=64)
