@@ -141,13 +141,22 @@ def public_page(package: Any) -> str:
     import rotor
 
     known, rows = api_pages.documented(package, ROOT), []
-    for name in sorted(set(rotor.__all__) - {"__version__"}):
-        thing = getattr(rotor, name)
+    names = [(rotor, name) for name in sorted(set(rotor.__all__) - {"__version__"})]
+    for module, name in [*names, *((rotor.api, name) for name in rotor.api.__all__)]:
+        thing = getattr(module, name)
+        if module is rotor and name in (
+            *rotor.VERBS,
+            "api",
+        ):  # made from the declaration of the verb; the options page has its arguments
+            rows.append(f"| `rotor.{name}` | {thing.__doc__.strip().splitlines()[0]} |")
+            continue
         place = f"{thing.__module__}.{thing.__qualname__}"
         if place not in known:
-            raise ValueError(f"rotor.{name} is {place}, which has no entry in the reference: its module must be public")
+            raise ValueError(
+                f"{module.__name__}.{name} is {place}, which has no entry in the reference: its module must be public"
+            )
         summary = (thing.__doc__ or "").strip().splitlines()[0].replace("|", "\\|")
-        rows.append(f"| {{py:obj}}`rotor.{name} <{place}>` | {summary} |")
+        rows.append(f"| {{py:obj}}`{module.__name__}.{name} <{place}>` | {summary} |")
     table = "\n".join(["| name | what it is |", "|---|---|", *rows])
     return f"# API\n\nThe public names of the package:\n\n{table}\n\nThe other pages of this part have all modules, folder by folder.\n"
 

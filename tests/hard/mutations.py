@@ -202,7 +202,7 @@ MUTATIONS = (
     Mutation(
         23, "rotor/quantum/fields/solver.py",
         "if error.max() <= tolerance_mhz else", "if True else",
-        "tests/test_field_bounds.py::test_a_state_that_the_basis_missed_is_noticed",
+        "tests/test_field_bounds.py::test_stated_errors_are_bounds",
     ),
     Mutation(
         23, "rotor/quantum/fields/solver.py",
