@@ -200,7 +200,7 @@ class Grid(Reader):
 
     def _of_text(self, text: str) -> tuple[float, ...]:
         count = text.rpartition(":")[2].strip()
-        if text.count(":") == 2 and count.isdecimal() and int(count) > self.most_points:
+        if text.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
             raise ValueError(f"{text!r}: at most {self.most_points} numbers; ask for fewer")
         return tuple(parse_grid(text, self.unit, self.points).tolist())
 

@@ -177,7 +177,10 @@ class SpectrumAnswer(TextOf):
             return tuple(lines.warnings)
         from rotor.thermodynamics import partition_function
 
-        summed = partition_function(lines.top, lines.temperature_k, effects=lines.levels.effects).q
+        try:
+            summed = partition_function(lines.top, lines.temperature_k, effects=lines.levels.effects).q
+        except ValueError:  # the sum does not converge: the value that was given stands alone
+            return tuple(lines.warnings)
         if Q_TOO_SMALL * summed <= given <= Q_TOO_LARGE * summed:
             return tuple(lines.warnings)
         factor = f"intensities differ by a factor of {summed / given:.3g}"
