@@ -40,12 +40,12 @@ from rotor.scenes.sections import (
     GasNumerics,
     GasObservables,
     LevelsObservables,
-    MagneticSection,
     SpectrumConditions,
     SpectrumObservables,
     StarkConditions,
     ThermoConditions,
     ZeemanConditions,
+    ZeemanMagnetic,
 )
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -78,7 +78,7 @@ OTHERS: dict[str, Scene] = {
     "OCS, levels to 100000": LevelsScene(molecule="OCS", observables=LevelsObservables(jmax=100_000)),
     "formaldehyde, Stark map": StarkScene(molecule="H2CO", conditions=StarkConditions(field="0:100kV/cm:2001")),
     "a top in magnetic fields": ZeemanScene(
-        molecule="H2CO", magnetic=MagneticSection(g=[0.6, -0.2, 0.3]), conditions=ZeemanConditions(field="0:20T:1001")
+        molecule="H2CO", magnetic=ZeemanMagnetic(g=[0.6, -0.2, 0.3]), conditions=ZeemanConditions(field="0:20T:1001")
     ),
     "water, 400 temperatures": ThermoScene(molecule="water", conditions=ThermoConditions(temperature="10:1000K:400")),
     "CO2, Raman lines": RamanScene(molecule="CO2"),
