@@ -37,7 +37,8 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
     moving = np.ones(highest.shape[1], dtype=np.int64)
     if scheme.equivalent:
         moving[-2] = 0  # a total of equivalent spins does not rise with F
-    classes = {}  # by distances from F: of the highest F first, then those that equivalent spins have at lower F alone
+    # by distances from F: of the highest F first, then those that equivalent spins have at lower F alone
+    classes: dict[tuple[int, ...], int] = {}
     for f in sorted(patterns, reverse=True):
         distances = (patterns[f] - moving * f).tolist()
         for row, number in zip(distances, np.asarray(scheme.classes(patterns[f])).tolist(), strict=True):
