@@ -35,6 +35,7 @@ class Molecule:
     mass_numbers : n mass numbers; left out, they are those of `symbols` or of the most abundant isotopes
     charge : in elementary charges
     multiplicity : 2S + 1 of the electrons. None: not known
+    electron_spin_mhz : largest constant of the electron spin, such as |lambda| of a triplet. None: not known
     electronic : "even" where half turns leave the electronic state alike, as in every closed shell; "odd" where those that
         change places of like nuclei turn its sign, as in the Σg- of O2. Nuclear-spin weights need it
     dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; that of an ion
@@ -66,6 +67,7 @@ class Molecule:
     mass_numbers: tuple[int, ...] = ()
     charge: int = 0
     multiplicity: int | None = None
+    electron_spin_mhz: float | None = None
     electronic: str = "even"
     dipole_debye: Floats | None = None
     dipole_source: str = ""
@@ -94,6 +96,8 @@ class Molecule:
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
 
         _refuse_multiplicity(self.multiplicity, sum(one.element_number for one in nuclei) - int(charge))
+        if self.electron_spin_mhz is not None and not 0 < self.electron_spin_mhz < np.inf:
+            raise ValueError(f"electron_spin_mhz {self.electron_spin_mhz!r}: expected a finite number above 0")
         if self.electronic not in ELECTRONIC:
             raise ValueError(f"electronic {self.electronic!r}: expected 'even' (a closed shell) or 'odd' (such as Σg-)")
 

@@ -186,7 +186,17 @@ def geometry(
     if table is None:
         return None
     table.refuse_unknown(
-        ("kind", "source", "vibrational_difference", "atoms", "charge", "multiplicity", "electronic", "unverified")
+        (
+            "kind",
+            "source",
+            "vibrational_difference",
+            "atoms",
+            "charge",
+            "multiplicity",
+            "electronic",
+            "electron_spin_mhz",
+            "unverified",
+        )
     )
     symbols, positions = _atoms(table)
     try:
@@ -198,6 +208,7 @@ def geometry(
             uncertainty=table.number("vibrational_difference", 0.0),
             charge=table.content.get("charge", 0),
             multiplicity=table.content.get("multiplicity"),
+            electron_spin_mhz=table.number("electron_spin_mhz", 0.0),
             electronic=table.choice("electronic", ELECTRONIC) or "even",
         )
     except ValueError as reason:

@@ -7,7 +7,7 @@
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
 | a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of NH3; 1.6 GHz, that of ND3, where they are heavy |
-| an odd number of electrons, an odd electronic state | electron spin | not estimated |
+| an odd number of electrons, an odd electronic state | electron spin | its largest known constant, else not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289). ν = 1150 cm⁻¹ (B/cm⁻¹)^0.3 was chosen on the
@@ -250,7 +250,7 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
         found.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
     electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
-        found.append(Limit(ELECTRON_SPIN, None, _MULTIPLETS))
+        found.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, _MULTIPLETS))
     return found
 
 
