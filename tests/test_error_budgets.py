@@ -399,7 +399,7 @@ def test_the_electron_spin_of_oxygen_has_a_size():
     sizes = {limit["name"]: limit["size_mhz"] for limit in answer.facts()["limits"]}
     spins = SpinConstants.parse("lambda(S)=59501.3 gamma(S)=-252.6 MHz", "S=1")
     split = Top.from_constants("B=43100.44 MHz", spin_constants=spins)
-    levels = rotor.solve_levels(split, 1, effects=effects_of(split, True))
+    levels = rotor.api.solve_levels(split, 1, effects=effects_of(split, True))
     widest = np.ptp(levels.energy_mhz[levels.rotational == 1])
     assert widest / 3 <= sizes["electron spin"] <= 3 * widest
     assert answer.errors.model.value > 5e4
