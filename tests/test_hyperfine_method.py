@@ -10,9 +10,9 @@ import pytest
 
 import rotor
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.estimates.splittings import casimir
+from rotor.quantum.hyperfine_method import used_method
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spins.method import used_method
-from rotor.quantum.spins.splittings import casimir
 from rotor.spectra.lines import line_list
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.states.state_constants import StateConstants

@@ -18,7 +18,7 @@ from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
-from rotor.quantum.spins.method import used_method
+from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.accuracy import asked_of, unit_of
 from rotor.scenes.accuracy_sampled import conserved_bound_k, force_error, made_of
 from rotor.scenes.effect_sections import DriveSection, LinearDragSection

@@ -13,7 +13,7 @@ from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.spins.splittings import casimir, splitting_nuclei
+from rotor.quantum.estimates.splittings import casimir, splitting_nuclei
 from rotor.spectra.lines import line_list
 from rotor.tops.isotopes.isotopic_spins import chi_tensor, named_chi
 from rotor.tops.isotopes.isotopologues import isotopologue

@@ -17,11 +17,11 @@ from rotor.quantum.effects.spin_rotation import SpinRotation
 from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.hyperfine_method import HyperfineMethod
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.coupling import patterns
 from rotor.quantum.spins.levels import unmixed_levels
-from rotor.quantum.spins.method import HyperfineMethod
 from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.spectra.transitions import all_transitions
 from rotor.thermodynamics.partition import partition_function

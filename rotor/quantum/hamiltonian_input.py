@@ -132,7 +132,7 @@ def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput
     distortion, method = "centrifugal distortion" in every, every.get("hyperfine method")
     if method is None:
         return HamiltonianInput(distortion=distortion, hyperfine=hyperfine)
-    from rotor.quantum.spins.method import HyperfineMethod
+    from rotor.quantum.hyperfine_method import HyperfineMethod
 
     assert isinstance(method, HyperfineMethod)
     return HamiltonianInput(distortion, hyperfine, method.method, method.tolerance_mhz)

@@ -17,9 +17,9 @@ from rotor.quantum.estimates.budgets import levels_budget
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
+from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spins.method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Quantity, Whole

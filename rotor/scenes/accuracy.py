@@ -239,7 +239,7 @@ def rounding_mhz(levels: Any) -> float:
 
 def _levels_error(top: Any, levels: Any) -> float:
     """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
-    from rotor.quantum.spins.method import used_method
+    from rotor.quantum.hyperfine_method import used_method
 
     rounding = rounding_mhz(levels)
     has_spins = any(effect.spins(top) for effect in levels.effects)

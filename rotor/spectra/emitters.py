@@ -19,7 +19,7 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.spins.method import hyperfine_facts
+from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.spectra.emission import KM_PER_S, Source, peak_depth
 from rotor.spectra.lines import line_list
 from rotor.spectra.opacity import NM2_IN_CM2

@@ -15,7 +15,7 @@ from rotor.quantum.estimates.budgets import parameter_names
 from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.hamiltonian_input import effects_field
-from rotor.quantum.spins.method import hyperfine_facts
+from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Quantity, Whole

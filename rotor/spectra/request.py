@@ -17,7 +17,7 @@ from rotor.checks import require_one_of, require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
-from rotor.quantum.spins.method import hyperfine_facts
+from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Flag, Quantity, Range, Text, Whole

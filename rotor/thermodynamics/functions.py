@@ -261,7 +261,7 @@ def _with_spins(
     progress: Progress | None,
 ) -> ThermoFunctions:
     """The functions of rotation with spins."""
-    from rotor.quantum.spins.method import EXACT, HyperfineMethod
+    from rotor.quantum.hyperfine_method import EXACT, HyperfineMethod
     from rotor.thermodynamics.spin_factor import spin_functions
     from rotor.thermodynamics.spin_sums import spin_sums
 

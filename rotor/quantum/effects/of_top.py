@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
+from rotor.quantum.hyperfine_method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
@@ -185,7 +185,7 @@ def effects_of(
     hyperfine : bool
     method : str
         "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep the tolerance, see
-        `rotor.quantum.spins.method`.
+        `rotor.quantum.hyperfine_method`.
     tolerance_mhz : float
         By how much lines may differ from exact ones with "auto".
 

@@ -34,7 +34,6 @@ from rotor.quantum.fields.map_request import (
     checked_tolerance_mhz,
 )
 from rotor.quantum.fields.space import field_space
-from rotor.quantum.spins import scheme_of
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -254,6 +253,8 @@ def doubled_m(
     ValueError
         For values that no F of these spins has.
     """
+    from rotor.quantum.spins import scheme_of
+
     total = scheme_of(top, tuple(effects)).total
     possible = range(total % 2, 2 * j_highest + total + 1, 2)
     values = tuple(possible) if m_values is None else tuple(sorted({round(2 * m) for m in m_values}))

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
-from rotor.quantum.spins.method import used_method
+from rotor.quantum.hyperfine_method import used_method
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:

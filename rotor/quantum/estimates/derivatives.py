@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, elements_between
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.levels import Levels, MomentBlock
-from rotor.quantum.spins.method import are_with_spins
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.rotation import hamiltonian

@@ -2,7 +2,7 @@
 
 | sign | effect | size |
 |---|---|---|
-| a nucleus of spin 1 or more | nuclear quadrupole coupling | known, or the gradient in covalent bonds (`spins.splittings`) |
+| a nucleus of spin 1 or more | nuclear quadrupole coupling | known, or the gradient in covalent bonds (`splittings`) |
 | constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² |
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
@@ -29,11 +29,10 @@ from rotor.arrays import Ints
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
 from rotor.quantum.estimates.beyond import COMPUTE, Limit, known_couplings, next_order
 from rotor.quantum.estimates.internal_rotation import LineShifts, line_shifts
-from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
+from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
-    from rotor.quantum.effects.hyperfine import NuclearQuadrupole
     from rotor.quantum.estimates.methyl_groups import MethylGroup
     from rotor.tops.top import Top
 
@@ -41,11 +40,12 @@ VIBRATION_CM, VIBRATION_POWER = 1150.0, 0.3  # ν = 1150 (B/cm⁻¹)^0.3 cm⁻¹
 HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
 LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
 ELECTRON_SPIN = "electron spin"
+QUADRUPOLE = "nuclear quadrupole"
 _MULTIPLETS = (
     "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
 )
 ZERO_POINT = "vibration-rotation difference"
-OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
+OF_SPINS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
     24_000.0,
     1_600.0,
@@ -66,23 +66,15 @@ def populated_j(top: Top, temperature_k: float) -> int:
 
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
     """The sizes of the effects of a calculation and of those that it leaves out, largest first, at one J."""
-    return effect_sizes(top, j, effects, absent_effects(top, effects))
+    return sorted([*effect_sizes(top, j, effects), *absent_sizes(top, effects)], key=lambda one: -one.size_mhz)
 
 
-def absent_effects(top: Top, effects: Sequence[QuantumEffect]) -> tuple[QuantumEffect, ...]:
-    """Effects that the molecule is known to have and the calculation has not, with estimated values."""
-    coupling = _quadrupole(splitting_nuclei(top))
-    return () if coupling is None or coupling.name in {effect.name for effect in effects} else (coupling,)
-
-
-def _quadrupole(nuclei: Sequence[Splitting]) -> NuclearQuadrupole | None:
-    if not nuclei:
-        return None
-    from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.spins.terms import Spin
-
-    values = {f"chi_aa({one.nucleus})": one.chi_mhz for one in nuclei}
-    return NuclearQuadrupole(values, tuple(Spin(one.nucleus, round(2 * one.spin)) for one in nuclei))
+def absent_sizes(top: Top, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
+    """The size of quadrupole coupling where the molecule has it and the calculation has not, as `NuclearQuadrupole.size_mhz` adds it."""
+    nuclei = {one.nucleus: abs(one.chi_mhz) for one in splitting_nuclei(top)}
+    if not nuclei or QUADRUPOLE in {effect.name for effect in effects}:
+        return []
+    return [EffectSize(QUADRUPOLE, sum(nuclei.values()), False)]
 
 
 def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
@@ -94,9 +86,7 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
     ['centrifugal distortion']
     """
-    couplings = [
-        one for one in known_couplings(top, j, effects) if one.name != "nuclear quadrupole"
-    ]  # which _of_nuclei has
+    couplings = [one for one in known_couplings(top, j, effects) if one.name != QUADRUPOLE]  # which _of_nuclei has
     present = {effect.name for effect in effects} | {one.name for one in couplings}
     found = [*couplings, *_of_constants(top, j), *_of_nuclei(top, j, effects, present)]
     if top.molecule is not None:
@@ -204,10 +194,10 @@ def _largest(top: Top) -> float:
 def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collection[str]) -> list[Limit]:
     """Couplings of nuclear spins that no effect of the calculation has; known: names of those that have a size already."""
     found = []
-    if absent_effects(top, effects):
+    if absent_sizes(top, effects):
         nuclei = splitting_nuclei(top)
         size = max(one.splitting_mhz if one.known else abs(one.chi_mhz) for one in nuclei)
-        found.append(Limit("nuclear quadrupole", size, _split_text(nuclei)))
+        found.append(Limit(QUADRUPOLE, size, _split_text(nuclei)))
     if top.molecule is None:
         return found
     magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0} - _with_magnetic_constants(top))

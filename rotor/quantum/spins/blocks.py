@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.hyperfine_method import FIRST_ORDER, BlockWithSpins, Used
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_pairs, links_of_stacks
 from rotor.quantum.spins.many_f import Group
-from rotor.quantum.spins.method import FIRST_ORDER, BlockWithSpins, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
 from rotor.quantum.spins.rotor import (

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
+from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
-from rotor.quantum.spins.method import FIRST_ORDER
 from rotor.quantum.spins.parts import SpinPart, labels_of_alike, names_of_tables
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.hyperfine_method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
 from rotor.quantum.spins.blocks import Operators, Plan
 from rotor.quantum.spins.contraction import Contracted
-from rotor.quantum.spins.method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
 from rotor.quantum.spins.neglected import largest_shifts
 
 

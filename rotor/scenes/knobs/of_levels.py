@@ -129,7 +129,7 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
     list of Knob
     """
     from rotor.quantum.effects.of_top import effects_of
-    from rotor.quantum.spins.method import HyperfineMethod
+    from rotor.quantum.hyperfine_method import HyperfineMethod
 
     if not any(one.name in SPINS for one in request.effects):
         return []
