@@ -1,12 +1,15 @@
 """Only the effects that a scene calls for are imported: of every kind, from the command and from Python."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from test_assignment import spectrum
 
+ROOT = Path(__file__).resolve().parents[1]
 FAMILIES = (
     "rotor.fluids", "rotor.alignment", "rotor.fitting", "rotor.structures", "rotor.assignment", "rotor.observed",
     "rotor.classical", "rotor.classical.gas", "rotor.classical.effects", "rotor.classical.lyapunov",
@@ -63,7 +66,8 @@ WAYS = {
 
 def loaded_families(way: str) -> set[str]:
     code = f"import sys\n{WAYS[way]}\nprint('loaded', *sys.modules)"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     modules = ran.stdout.rpartition("loaded ")[2].split()
     return {family for family in FAMILIES for name in modules if name == family or name.startswith(family + ".")}
 
