@@ -1,4 +1,4 @@
-"""The page docs/full_run.md from the log of `.ci/run all`: what ran, how long each step took, and how it ended."""
+"""The page docs/validation/full_run.md from the log of `.ci/run all`: what ran, how long each step took, and how it ended."""
 
 from __future__ import annotations
 

@@ -307,7 +307,7 @@ SUBJECTS: Sequence[Subject] = (
         "orders",
         "Orders of centrifugal distortion",
         "Constants of the library up to each order, beside lines measured in laboratories, inside the range that "
-        "[measured_lines.md](measured_lines.md) names.",
+        "[measured_lines.md](validation/measured_lines.md) names.",
         "Take every order that the constants have, since fewer save milliseconds at the most; rigid constants alone miss these "
         "lines by 0.5 to 5 GHz.",
         orders,

@@ -2,7 +2,8 @@
 
     python benchmarks/scenes_measured.py [--only SCENE ...] [--page]
 
-Each scene is measured in a process of its own; benchmarks/results/scenes_measured.json and docs/scenes_measured.md are written. Seconds
+Each scene is measured in a process of its own; benchmarks/results/scenes_measured.json and docs/validation/scenes_measured.md are
+written. Seconds
 are of the processor, the second run, without start-up and compilation; memory is the peak of what Python and NumPy allocate in one run.
 The error is against a calculation about a hundred times finer, or the exact value, by the knobs that `rotor accuracy` sweeps. --page
 measures nothing.
@@ -30,7 +31,7 @@ from rotor.scenes.scene_file import read_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENES, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "scenes_measured.json"
-PAGE = ROOT / "docs" / "scenes_measured.md"
+PAGE = ROOT / "docs" / "validation" / "scenes_measured.md"
 LIMIT_SECONDS = 60.0
 LONG_SECONDS = 5.0
 CHEAPEST = "nothing cheaper"

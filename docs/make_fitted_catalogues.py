@@ -22,7 +22,7 @@ from rotor.fitting.parameters import with_names
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.tops.constants import Constants
 
-PAGE = Path(__file__).with_name("fitted_catalogues.md")
+PAGE = Path(__file__).with_name("validation") / "fitted_catalogues.md"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rotor.formats.spcat.compare import Agreement, Comparison, agreement, compar
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.quantum.effects.of_top import effects_of
 
-PAGE = Path(__file__).with_name("measured_lines.md")
+PAGE = Path(__file__).with_name("validation") / "measured_lines.md"
 MOLECULES = (
     "CO", "OCS", "N2O", "HCN", "HC3N", "HC5N", "CH3CN", "CH3CCH", "H2O", "HDO", "D2O", "H2S", "H2CO", "H2CS", "SO2", "HNCO",
     "CH2CO", "HCOOH", "c-C2H4O", "HCONH2", "CH2OHCHO",

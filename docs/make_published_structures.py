@@ -29,7 +29,7 @@ from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
-PAGE = Path(__file__).with_name("published_structures.md")
+PAGE = Path(__file__).with_name("validation") / "published_structures.md"
 MALEIC = Path(__file__).resolve().parents[1] / "examples" / "maleic_anhydride.toml"
 
 # From measured lines: start geometry, isotopologues and their catalogues of JPL and CDMS, published r_s in Å

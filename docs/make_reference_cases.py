@@ -22,7 +22,7 @@ from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.par import read_par
 from rotor.units import MHZ_PER_CM
 
-PAGE = Path(__file__).with_name("reference_cases.md")
+PAGE = Path(__file__).with_name("validation") / "reference_cases.md"
 CASES = (
     "abc_ared6", "abc_rigid_j20_all", "abc_sred", "ch3cn", "h2co", "h2o_octic", "h2o_quartic_diag3", "h2o_sextic",
     "hard_nearsym_j150", "hc3n", "ocs", "pyridine_oblate_s", "so2",

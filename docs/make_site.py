@@ -27,7 +27,8 @@ CONTENTS = {
     "Notebooks": ["notebooks/*"],
     "Command line": ["command_line", "rotor_*"],
     "Subjects": [],  # all pages of docs/ that no other part names
-    "Data and checks": ["library", "measured_lines", "reference_cases", "spcat_codes", "spin_weights"],
+    "Data": ["library", "spcat_codes", "spin_weights"],
+    "Validation": ["validation/*"],
     "API": ["api/index", "api/rotor*"],
 }
 
@@ -41,6 +42,9 @@ def prepare(folder: Path) -> None:
         (folder / page.name).write_text(
             on_the_site(_shared_part(text) if page.stem == "command_line" else text), encoding="utf-8"
         )
+    (folder / "validation").mkdir()
+    for page in sorted((DOCS / "validation").glob("*.md")):
+        (folder / "validation" / page.name).write_text(one_level_down(page.read_text("utf-8")), encoding="utf-8")
     (folder / "conventions.md").write_text(
         on_the_site((ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")), encoding="utf-8"
     )
@@ -61,6 +65,13 @@ def on_the_site(text: str) -> str:
     text = re.sub(r"\]\((?:\.\./)?CONVENTIONS\.md\)", "](conventions.md)", text)
     text = re.sub(r"\]\(docs/", "](", text)
     return re.sub(r"\[([^\]]+)\]\(\.\./[^)]*\)", r"\1", text)  # files that are not on the site: their name remains
+
+
+def one_level_down(text: str) -> str:
+    """Links of a page of docs/validation: to pages and pictures of the site, elsewhere the name of the file alone."""
+    text = re.sub(r"\]\(\.\./command_line\.md#rotor-(\w+)\)", r"](../rotor_\1.md)", text)
+    text = re.sub(r"\]\(\.\./\.\./CONVENTIONS\.md\)", "](../conventions.md)", text)
+    return re.sub(r"\[([^\]]+)\]\(\.\./\.\./[^)]*\)", r"\1", text)
 
 
 def contents(folder: Path) -> str:

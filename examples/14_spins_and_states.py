@@ -5,7 +5,7 @@
 # and pushes the levels of the first. Five sections: Casimir's formula for HCN; measured components of formamide and vinyl
 # cyanide; what the cheaper methods leave out; ammonia's inversion and an avoided crossing; sum rules. Every claim is asserted.
 # Names of constants and options: `docs/spins_and_states.md`; all molecules that were compared:
-# `docs/measured_lines.md`.
+# `docs/validation/measured_lines.md`.
 
 # %%
 from dataclasses import replace

@@ -64,7 +64,7 @@ def _same_text_apart(page: str) -> tuple[list[list[str]], np.ndarray]:
 
 def test_the_pages_claim_what_they_should():
     """Every molecule and case has its row; shares and differences are what the words around the tables say."""
-    measured = (DOCS / "measured_lines.md").read_text(encoding="utf-8")
+    measured = (DOCS / "validation" / "measured_lines.md").read_text(encoding="utf-8")
     held = {
         row.split("|")[1].strip(): float(row.split("|")[7]) for row in measured.splitlines() if "held against:" in row
     }
@@ -74,7 +74,7 @@ def test_the_pages_claim_what_they_should():
     assert {name for name, share in held.items() if share < 0.9} == {"H2CO", "H2S", "HNCO"}
     assert all(f"- **{name}**" in measured for name in ("H2O", "H2CO", "SO2", "H2S", "HNCO"))
 
-    cases = (DOCS / "reference_cases.md").read_text(encoding="utf-8").splitlines()
+    cases = (DOCS / "validation" / "reference_cases.md").read_text(encoding="utf-8").splitlines()
     rows = [
         [word.strip() for word in row.split("|")[1:-1]] for row in cases if row.startswith("| ") and "case" not in row
     ]
@@ -104,7 +104,7 @@ def test_figures_in_the_text_are_those_that_the_benchmarks_wrote():
 
     cost = results("free_motion")
     one, many, most = (cost[f"setting up {n} bodies, each"] for n in (1, 1000, 100_000))
-    for page, text in (("speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
+    for page, text in (("validation/speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
         stated = f"{one / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
         assert stated in (DOCS / page).read_text(encoding="utf-8")
 

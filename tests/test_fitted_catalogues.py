@@ -1,4 +1,4 @@
-"""docs/fitted_catalogues.md is what its script makes: one row in every run, the others in the slow proofs, a part of them each day."""
+"""docs/validation/fitted_catalogues.md is what its script makes: one row in every run, the others among the slow proofs."""
 
 from __future__ import annotations
 

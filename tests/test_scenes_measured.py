@@ -1,4 +1,4 @@
-"""docs/scenes_measured.md: every scene that asks for an accuracy reached it and could hardly be coarser; plans of all scenes."""
+"""docs/validation/scenes_measured.md: every scene that asks for an accuracy reached it and could hardly be coarser; plans of all scenes."""
 
 from __future__ import annotations
 
