@@ -37,6 +37,17 @@ EXAMPLES = {
     "torsion": (
         'rotor.torsion("C2H6", bond="1-2", potential="V3=1013 cm-1", vmax=0).table.energy_cm.round(2).tolist()', "[150.15, 150.15]",
     ),
+    "tumble": (
+        'rotor.tumble(moments="1,2,3", angular_velocity="0,1,0", times="0:1:2").motion_kind', "'steady'",
+    ),
+    "align": (
+        'rotor.align("OCS", pulses="kick fluence=0.5J/cm2", temperature_k=1, points=3).table.columns["cos2theta"][:1].round(4).tolist()',
+        "[0.3333]",
+    ),
+    "fluid": (
+        'rotor.fluid("water", molecules=27, steps=2, every=1, equilibration=0, cutoff_angstrom=4).table.columns["time_ps"].tolist()',
+        "[0.0, 0.002, 0.004]",
+    ),
     "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
 }  # fmt: skip  # of each function: an expression and its value, which a test evaluates
 

@@ -12,7 +12,6 @@ import pytest
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
-from rotor.scenes.effect_sections import GravitySection, LinearDragSection
 from rotor.scenes.fit_sections import FitLines
 from rotor.scenes.knobs.knob import Knob, Measure, Setting
 from rotor.scenes.knobs.of_levels import energies_like, to_order
@@ -40,7 +39,9 @@ from rotor.scenes.sections import (
     FluidNumerics,
     GasNumerics,
     GaussianSection,
+    GravityAboutPivotSection,
     LevelsObservables,
+    LinearDragSection,
     MoleculeSection,
     SpectrumConditions,
     SpectrumObservables,
@@ -137,7 +138,7 @@ def test_a_partition_function_reaches_each_error():
 @pytest.mark.slow
 def test_the_step_of_a_splitting_has_its_order():
     rod = BodySection(moments=[2.0, 2.0, 0.1], angular_velocity=[0.0, 0.0, 1.0], attitude=[0.8, 0.6, 0.0, 0.0])
-    weight = GravitySection(mass=1.0, centre=[0.0, 0.0, 1.0], gravity=[0.0, 0.0, -9.8])
+    weight = GravityAboutPivotSection(mass=1.0, centre=[0.0, 0.0, 1.0], gravity=[0.0, 0.0, -9.8])
     table = work_precision(
         TumbleScene(body=rod, effects=[weight], conditions=TumbleConditions(times=[0.0, 1.0, 2.0])), limit_seconds=20
     )

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.scenes.effect_sections import effect_of, section_of
-from rotor.scenes.effect_text import SECTIONS, effect_section
+from rotor.classical.driven import BODY_EFFECTS
+from rotor.requests.field import all_fields
 
 CONTRACT = Path(__file__).resolve().parents[1] / "docs" / "command_line.md"
 BODY = ("tumble", "--moments", "1,2,3", "--omega", "0.1,1,0")
@@ -28,19 +28,21 @@ LINES = {  # each effect once, as it stands on the command line
 
 
 def test_every_effect_is_read_from_a_line_and_written_down_again():
-    assert set(LINES) == set(SECTIONS)
+    assert set(LINES) == set(BODY_EFFECTS.load())
     for name, parameters in LINES.items():
-        effect = effect_of(effect_section(f"{name} {parameters}"))
-        again = effect_of(section_of(effect))
+        (effect,) = BODY_EFFECTS.read(f"{name} {parameters}")
+        tables = BODY_EFFECTS.write([effect])
+        (again,) = BODY_EFFECTS.read(tables)
         assert type(again) is type(effect)
-        assert section_of(again) == section_of(effect)
+        assert BODY_EFFECTS.write([again]) == tables
+        assert BODY_EFFECTS.read(BODY_EFFECTS.line(effect))[0].__class__ is type(effect)
 
 
 def test_the_contract_names_every_effect_and_parameter():
     text = CONTRACT.read_text(encoding="utf-8").partition("## rotor tumble")[2].partition("\n## ")[0]
     rows = {line.split("|")[1].strip(" `"): line.split("|")[2] for line in text.splitlines() if line.startswith("| `")}
-    for name, kind in SECTIONS.items():
-        assert all(f"`{one}`" in rows[name] for one in kind.__struct_fields__), name
+    for name, kind in BODY_EFFECTS.load().items():
+        assert all(f"`{one.last}`" in rows[name] for one in all_fields(kind).values()), name
 
 
 def test_drag_slows_a_sphere_as_the_closed_form_says(call):
@@ -75,7 +77,7 @@ def test_a_pendulum_swings_with_its_period_and_keeps_its_energy(call):
 def test_the_report_and_the_files(call, tmp_path):
     code, out, err = call(*BODY, "--effect", "spinning rotor momentum=0,0,0.7", "--times", "0:3:31", "--csv", "a.csv")
     assert code == 0, err
-    assert "1,2,3: under spinning rotor" in out
+    assert "moments 1, 2, 3: asymmetric top, under spinning rotor" in out
     assert "conserved to" in out
     assert "the motion, 11 of 31 times" in out
     lines = (tmp_path / "a.csv").read_text().splitlines()
@@ -132,3 +134,23 @@ def test_a_motion_that_does_not_stay_finite_is_an_answer_that_was_not_reached(ca
     assert code == 1
     assert err.startswith("error: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_effect_of_one_file_reaches_command_scene_and_schema(folder):
+    """Spin-up about axis 3: I ω = rate t²/2."""
+    import subprocess
+    import sys
+
+    toy = str(Path(__file__).with_name("toy_body_effect.py"))
+    words = ["tumble", "--moments", "1,2,4", "--omega", "0,0,0", "--times", "0,1,2", "--effect", "rising torque rate=0.5"]
+    ran = subprocess.run([sys.executable, toy, *words, "--json", "a.json", "--save-scene", "s.toml"], capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert "under rising torque" in ran.stdout
+    spins = [row["w3"] for row in json.loads(Path("a.json").read_text())["motion"]]
+    assert spins == pytest.approx([0, 0.5 / 2 / 4, 0.5 * 4 / 2 / 4], abs=1e-9)  # tolerance of a step 1e-10
+    assert 'effect = "rising torque"\nrate = 0.5' in Path("s.toml").read_text()
+    again = subprocess.run([sys.executable, toy, "run", "s.toml", "--json", "-"], capture_output=True, text=True)
+    assert [row["w3"] for row in json.loads(again.stdout)["motion"]] == spins
+    wrong = subprocess.run([sys.executable, toy, *words[:-1], "rising torque rat=1"], capture_output=True, text=True)
+    assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)
+    assert "the nearest is 'rate'" in wrong.stderr

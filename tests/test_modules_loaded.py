@@ -30,7 +30,7 @@ LOADED = {  # of FAMILIES, what a kind has a use for
     "stark": {"rotor.spectra", "rotor.spectra.fields", "rotor.quantum.effects.stark", "rotor.quantum.fields"},
     "zeeman": {"rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman", "rotor.quantum.fields"},
     "thermo": {"rotor.thermodynamics.functions"},
-    "tumble": {"rotor.classical", "numba"},
+    "tumble": {"rotor.classical", "rotor.classical.effects", "numba"},  # the tables of effects are made from their declarations
     "driven": {"rotor.classical", "rotor.classical.effects", "numba"},
     "torsion": {"rotor.thermodynamics.functions", "ase"},  # which reads the molecule
     "gas": {"rotor.classical", "rotor.classical.gas", "numba"},

@@ -9,16 +9,22 @@ import pytest
 from rotor.classical.driven import answer_driven
 from rotor.geometry.rotations import distance
 from rotor.scenes import accuracy_motion, motion_steps
-from rotor.scenes.effect_sections import ConstantTorqueSection, DriveSection, LinearDragSection, RotorSection
 from rotor.scenes.kind import kind_of
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import TumbleScene
-from rotor.scenes.sections import BodySection, TumbleConditions
+from rotor.scenes.sections import (
+    BodySection,
+    ConstantTorqueSection,
+    LinearDragSection,
+    PeriodicDriveSection,
+    SpinningRotorSection,
+    TumbleConditions,
+)
 
 BODY = BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
 DRIVEN = [
-    DriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
+    PeriodicDriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
     LinearDragSection(coefficients=[0.1, 0.1, 0.1]),
 ]
 REGULAR = TumbleScene(body=BODY, effects=DRIVEN, conditions=TumbleConditions(times="0:60:13"), accuracy="1e-7 rad")
@@ -55,7 +61,9 @@ def test_a_wobble_below_the_tolerance_is_in_the_error_that_is_stated():
     """All tolerances from 1e-5 to 1e-8 do not see it and agree among themselves; their error is its size, 1e-5 rad."""
     body = BodySection(moments=[1.0, 1.2, 1.5], angular_velocity=[1e-5, 0.0, 0.3])
     when = TumbleConditions(times="0:40000:101")
-    scene = TumbleScene(body=body, effects=[RotorSection(momentum=[0, 0, 0.7])], conditions=when, accuracy="1e-5 rad")
+    scene = TumbleScene(
+        body=body, effects=[SpinningRotorSection(momentum=[0, 0, 0.7])], conditions=when, accuracy="1e-5 rad"
+    )
     result = run_scene(scene)
     assert found_error(result) <= result.reached.error <= 1e-5
 

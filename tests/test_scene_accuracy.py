@@ -21,7 +21,6 @@ from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.accuracy import asked_of, unit_of
 from rotor.scenes.accuracy_sampled import conserved_bound_k, force_error, made_of
-from rotor.scenes.effect_sections import DriveSection, LinearDragSection
 from rotor.scenes.kind import kind_of
 from rotor.scenes.knobs.of_levels import line_error
 from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
@@ -49,7 +48,9 @@ from rotor.scenes.sections import (
     GasObservables,
     GaussianSection,
     LevelsObservables,
+    LinearDragSection,
     MoleculeSection,
+    PeriodicDriveSection,
     QuantumEffects,
     SpectrumConditions,
     StarkConditions,
@@ -134,7 +135,7 @@ def test_a_partition_function():
 
 BODY = BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
 DRIVEN = [
-    DriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
+    PeriodicDriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
     LinearDragSection(coefficients=[0.1, 0.1, 0.1]),
 ]
 TIMES = TumbleConditions(times=[0.0, 5.0, 10.0])

@@ -12,12 +12,13 @@ import numpy as np
 
 from rotor.alignment.acting import acted_on, revival_period_ps
 from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
-from rotor.alignment.pulse import Pulse
+from rotor.alignment.pulse import SHAPES, Pulse
 from rotor.arrays import Floats
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.requests.budget import ErrorBudget
-from rotor.requests.field import check_fields, declared
+from rotor.requests.choices import Choices
+from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Names, Pairs, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 LONGEST_PS = 100.0  # after the pulses, of a top without revivals, where no last time is given
 DEFAULT_POINTS = 2001
+PULSES = Choices("shape", lambda: SHAPES)
 FARTHEST_PS = 1e9  # a phase of 2π 1 THz times it has an error of 1e-6
 
 
@@ -42,7 +44,9 @@ class AlignRequest:
     """
 
     top: Top
-    pulses: tuple[Pulse, ...]
+    pulses: tuple[Pulse, ...] = declared(
+        REQUIRED, PULSES, "One or more; shape is gaussian, switched, kick, table or thz", "pulses", option=""
+    )
     temperature_k: float = declared(
         1.0,
         Quantity("K", least=0, metavar="T"),

@@ -13,18 +13,21 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.checks import require_between
-from rotor.classical.effect import ClassicalEffect
+from rotor.classical.bodies import NamedBody
+from rotor.classical.effect import ClassicalEffect, named_effects
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
 from rotor.classical.system import momentum_of, system_of
-from rotor.classical.tumble import Three
+from rotor.classical.tumble import COHERENT, Three, Units
 from rotor.geometry.rotations import continuous
+from rotor.requests.choices import Choices
 from rotor.table import Table
 
 Four = tuple[float, float, float, float]
 METHODS = ("lie-runge-kutta", "splitting")
 DEFAULT_TOLERANCE = 1e-10
+BODY_EFFECTS = Choices("effect", named_effects, "EFFECT")
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class DrivenRequest:
     moments: (3,), principal moments. times: (n,), the start first. effects: that act. angular_velocity: (3,) in body axes at the
     start; angular_momentum: instead, with what the effects add to it. attitude: quaternion, body to space, at the start.
     tolerance: of a step of the adaptive Runge-Kutta method, relative to |L| and to one radian. step: of a splitting of
-    `order` instead, which holds no torque of the angular velocity. Any coherent units.
+    `order` instead, which holds no torque of the angular velocity. units: any coherent ones. axes, named: as of a `TumbleRequest`.
     """
 
     moments: Three
@@ -46,6 +49,9 @@ class DrivenRequest:
     tolerance: float = DEFAULT_TOLERANCE
     step: float | None = None
     order: int = 4
+    units: Units = COHERENT
+    axes: tuple[str, str, str] = ("1", "2", "3")
+    named: NamedBody | None = None
 
     def __post_init__(self) -> None:
         moments = checked_moments(self.moments)
@@ -125,10 +131,13 @@ class DrivenAnswer:
         """
         energy = self.motion.energy
         conserved = all(effect.conserves_energy for effect in self.request.effects)
+        names = self.request.units
         size = 0.5 * float(np.max(np.sum(np.array(self.request.moments) * self.motion.omega**2, axis=-1)))
         return {
+            "units": {"time": names.time, "angular_momentum": names.angular_momentum, "energy": names.energy},
+            "axes": list(self.request.axes),
             "moments": list(self.request.moments),
-            "effects": [type(effect).__name__ for effect in self.request.effects],
+            "effects": [BODY_EFFECTS.line(effect) for effect in self.request.effects],
             "method": repr(self.request.method),
             "steps": self.motion.steps,
             "energy_first": float(energy[0]),

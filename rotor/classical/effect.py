@@ -7,10 +7,15 @@ what is in it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any, ClassVar
 
 from rotor.arrays import Floats
 from rotor.classical.torque_form import TorqueForm
+from rotor.requests.field import REQUIRED, declared
+from rotor.requests.readers import Array, Quantity, Text
 
 
 class ClassicalEffect:
@@ -23,6 +28,7 @@ class ClassicalEffect:
     time itself enters, as in a drive.
     """
 
+    name: ClassVar[str] = ""  # in scenes and on the command line; its declared fields are its parameters there
     conserves_energy: ClassVar[bool] = False
     conserves_momentum: ClassVar[bool] = False
     depends_on_time: ClassVar[bool] = False
@@ -89,3 +95,36 @@ class InertiaChange(ClassicalEffect, ABC):
     @abstractmethod
     def moments(self, time: float) -> Floats:
         """Principal moments (..., 3) at `time`, in place of those the motion was started with."""
+
+
+def vector_field(name: str, help: str, default: Any = REQUIRED) -> Any:
+    """The field of a parameter with three components or more, in coherent units."""
+    return declared(default, Array(), help, name, example=[0.0, 0.0, 1.0])
+
+
+def matrix_field(name: str, help: str) -> Any:
+    """The field of a matrix (3, 3) in body axes, or of its diagonal (3,)."""
+    return declared(REQUIRED, Array(list[float | list[float]]), help, name, example=[1.0, 1.0, 2.0])
+
+
+def number_field(name: str, help: str, default: Any = REQUIRED) -> Any:
+    """The field of a number in coherent units."""
+    return declared(default, Quantity(), help, name, example=1.0)
+
+
+def frame_field() -> Any:
+    """The field that says in which axes a vector is fixed."""
+    return declared("body", Text(), '"body" or "space"', "frame")
+
+
+def named_effects() -> dict[str, type[ClassicalEffect]]:
+    """Every effect that has a name, by it: those of `rotor.classical.effects`, and those of modules that are imported already."""
+    for path in sorted((Path(__file__).parent / "effects").glob("[a-z]*.py")):
+        import_module(f"rotor.classical.effects.{path.stem}")
+    return {one.name: one for one in _subclasses(ClassicalEffect) if one.name}
+
+
+def _subclasses(base: type[ClassicalEffect]) -> Iterator[type[ClassicalEffect]]:
+    for one in base.__subclasses__():
+        yield one
+        yield from _subclasses(one)

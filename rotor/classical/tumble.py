@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.classical.bodies import NamedBody
 from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
@@ -53,7 +54,7 @@ class TumbleRequest:
 
     moments: (3,), principal moments of inertia in any order. angular_momentum: (3,) at time 0 in the principal axes, in the
     unit that `units` names. times: (n,) in the unit that `units` names; None: two periods of the motion. axes: names of the
-    principal axes. source: how the angular momentum was chosen.
+    principal axes. source: how the angular momentum was chosen. named: an ordinary body that has these moments.
     """
 
     moments: Three
@@ -62,6 +63,7 @@ class TumbleRequest:
     units: Units = COHERENT
     axes: tuple[str, str, str] = ("1", "2", "3")
     source: str = "given"
+    named: NamedBody | None = None
 
     def __post_init__(self) -> None:
         moments = checked_moments(self.moments)
@@ -110,9 +112,15 @@ class TumbleRequest:
         equal = {(True, True): "spherical", (True, False): "oblate", (False, True): "prolate"}
         return equal.get((low == middle, middle == high), "asymmetric")
 
+    def about(self) -> dict[str, Any]:
+        """Kind and notes of the body, by the keys of docs/command_line.md."""
+        return {"kind": self.kind, "notes": list(self.notes), "temperature_k": None}
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What is unusual about the body."""
+        if self.named is not None:
+            return ()
         low, middle, high = sorted(self.moments)
         if low + middle >= high * (1 - 1e-12):
             return ()
@@ -164,6 +172,7 @@ class TumbleAnswer(TextOf):
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         request, units = self.request, self.request.units
         return {
+            **request.about(),
             "units": {"time": units.time, "angular_momentum": units.angular_momentum, "energy": units.energy},
             "moments": request.body,
             "axes": list(request.axes),

@@ -17,7 +17,7 @@ from dataclasses import field as dataclass_field
 from functools import cache
 from typing import Any
 
-from rotor.requests.readers import Reader
+from rotor.requests.readers import InsideError, Reader
 
 MOLECULE, SPINS, CONDITIONS, OBSERVABLES, NUMERICS, OUTPUT, PICTURE = PANELS = (
     "Molecule", "States and spins", "Conditions", "What to compute", "Numerics", "Output", "Picture",
@@ -95,6 +95,8 @@ class Field:
             return None
         try:
             return self.reader.read(given)
+        except InsideError as error:
+            raise ValueError(f"{self.called(style)}{error}") from None
         except ValueError as error:
             none = f", or {self.none!r}" if self.none and isinstance(given, str) else ""
             raise ValueError(f"{self.called(style)}: {error}{none}") from None
@@ -171,6 +173,12 @@ def own_fields(structure: Any) -> dict[str, Field]:
         for one in fields(structure)
         if _DECLARED in one.metadata
     }
+
+
+@cache
+def undeclared(structure: Any) -> list[Any]:
+    """The fields of a dataclass that no file holds."""
+    return [one for one in fields(structure) if not one.metadata.keys() & {_DECLARED, _PART}]
 
 
 @cache

@@ -90,7 +90,7 @@ def renaming(names: Mapping[str, str]) -> Iterator[None]:
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """A text with fields called by other names."""
-    patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b" for name in names]
+    patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b(?!\.)" for name in names]
     return re.sub("|".join(patterns), lambda found: names[found[0]], text) if patterns else text
 
 
@@ -113,11 +113,13 @@ def equal(value: Any, default: Any) -> bool:
     """Whether a value is the default, sequences compared item by item."""
     if value is default:
         return True
+    if hasattr(value, "tolist"):
+        value = tuple(value.tolist()) if value.ndim else value.item()
     if isinstance(value, list | tuple) and isinstance(default, list | tuple):
         return len(value) == len(default) and all(map(equal, value, default))
     return (type(value) is type(default) and bool(value == default)) or (
-        isinstance(value, int | float)
-        and isinstance(default, int | float)
+        isinstance(value, int | float | complex)
+        and isinstance(default, int | float | complex)
         and not isinstance(value, bool)
         and value == default
     )

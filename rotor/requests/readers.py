@@ -18,6 +18,10 @@ MOST_POINTS = 10_000_000  # of a grid on the command line or in a scene
 INFINITE = (0.0, math.inf)
 
 
+class InsideError(ValueError):
+    """An error of a part of a value; its text begins with the place inside the value, such as `[0].peak`."""
+
+
 class Reader:
     """A kind of value. metavar: of its option. scene_type: what a scene file holds. many: whether its option is repeatable."""
 
@@ -324,6 +328,28 @@ class Pairs(Reader):
     def _is_number(self, text: str) -> bool:
         pattern = r"\d+" if self.number is int else r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
         return re.fullmatch(pattern, text) is not None
+
+
+@dataclass(frozen=True)
+class Array(Reader):
+    """A vector or a matrix, whose shape the thing that it belongs to checks: numbers between commas, rows between semicolons."""
+
+    scene_type: Any = list[float]
+    metavar: str = "LIST"
+
+    def read(self, given: Any) -> Any:
+        """Numbers of a text; lists and arrays as they are."""
+        if not isinstance(given, str):
+            return given
+        try:
+            rows = [[float(one) for one in row.split(",")] for row in given.split(";")]
+        except ValueError:
+            raise ValueError(f"{given!r}: expected numbers, separated by commas; rows by semicolons") from None
+        return rows if ";" in given else rows[0]
+
+    def write(self, value: Any) -> Any:
+        """The numbers as lists."""
+        return value.tolist() if hasattr(value, "tolist") else list(value)
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,10 @@ import msgspec
 from msgspec import Struct, field
 
 from rotor.scenes.choice import Accuracy
-from rotor.scenes.effect_sections import EffectSection
 from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
-from rotor.scenes.sections import (
-    BodySection,
-    MoleculeSection,
-    TableOutputs,
-    TumbleConditions,
-    TumbleNumerics,
-)
+from rotor.scenes.sections import MoleculeSection
 from rotor.scenes.verbs import VERBS
-from rotor.verbs.scene_tables import tables_of
+from rotor.verbs.scene_tables import entries_before, tables_of
 from rotor.verbs.tables import said
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
@@ -85,18 +78,6 @@ class SceneResult:
     reached: Reached | None = None
 
 
-class TumbleScene(Scene, frozen=True, tag="tumble"):
-    """The free rotation of a molecule; the rotation of a body, free or under effects."""
-
-    molecule: Annotated[str | MoleculeSection | None, said("a name, a file, SMILES:..., or a table", "water")] = None
-    body: Annotated[BodySection | None, said("instead of a molecule")] = None
-    effects: Annotated[list[EffectSection], said("what acts on a body")] = field(default_factory=list)
-    accuracy: Annotated[Accuracy, said("of the attitude", "1e-6 rad")] = None
-    conditions: TumbleConditions = TumbleConditions()
-    numerics: TumbleNumerics = TumbleNumerics()
-    outputs: TableOutputs = TableOutputs()
-
-
 class FitScene(Scene, frozen=True, tag="fit"):
     """Constants fitted to measured lines."""
 
@@ -110,7 +91,6 @@ class FitScene(Scene, frozen=True, tag="fit"):
 
 
 _WRITTEN: Mapping[str, type[Scene]] = {
-    "tumble": TumbleScene,
     "fit": FitScene,
 }
 
@@ -119,9 +99,7 @@ _WRITTEN: Mapping[str, type[Scene]] = {
 def _scene_class(kind: str) -> Any:
     """The structure of a kind of scene."""
     verb = verb_of(kind)
-    found: list[Any] = []
-    for name, type_, default in verb.subject.scene_fields():
-        found.append((name, type_) if default is msgspec.NODEFAULT else (name, type_, default))
+    found = entries_before(verb)
     if verb.accuracy:
         meta = said(verb.accuracy, verb.accuracy_example)
         found.append(("accuracy", Annotated[Accuracy, meta], None))

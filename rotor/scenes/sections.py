@@ -6,10 +6,9 @@ description names, or a text with a unit of its own ("300 K"); a grid is a list 
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 from rotor.verbs.subjects import molecule_section
-from rotor.verbs.tables import Section, said
 
 Quantity = float | str
 Grid = list[float] | str
@@ -18,44 +17,9 @@ Grid = list[float] | str
 MoleculeSection: Any = molecule_section()
 
 
-class TableOutputs(Section, frozen=True):
-    """Files to write."""
-
-    csv: Annotated[str | None, said("the table", "out.csv")] = None
-    parquet: Annotated[str | None, said("the table", "out.parquet")] = None
-    json: Annotated[str | None, said("the table", "out.json")] = None
-    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "out.png")] = None
-
-
-class BodySection(Section, frozen=True):
-    """A rigid body instead of a molecule, in any coherent units."""
-
-    moments: Annotated[list[float], said("principal moments of inertia, in any order", [0.3, 0.35, 0.4])]
-    units: Annotated[str, said('"SI" (kg m², s, J), or "" for any coherent set')] = ""
-    angular_momentum: Annotated[list[float] | None, said("at time 0 in principal axes", [1.8, 0.4, -0.9])] = None
-    angular_velocity: Annotated[list[float] | None, said("instead of the angular momentum", [0.1, 15.0, 0.1])] = None
-    attitude: Annotated[list[float] | None, said("quaternion, body to space, at time 0", [1.0, 0.0, 0.0, 0.0])] = None
-
-
-class TumbleNumerics(Section, frozen=True):
-    """Knobs of a motion under effects; the free motion is exact."""
-
-    tolerance: Annotated[float, said("of a step, relative to |L| and one radian")] = 1e-10
-    step: Annotated[float | None, said("of a splitting, where no torque depends on the angular velocity", 0.01)] = None
-    order: Annotated[int, said("of the splitting: 2, 4, 6 or 8")] = 4
-
-
-class TumbleConditions(Section, frozen=True):
-    """How the molecule starts, and when it is looked at."""
-
-    temperature: Annotated[Quantity, said("whose thermal mean |L| is, half a degree off the middle axis (K)")] = "300 K"
-    angular_momentum: Annotated[list[float] | None, said("instead, along a, b, c (ħ)", [10.0, 0.1, 0.1])] = None
-    times: Annotated[Grid | None, said("ps of a molecule; by default two periods", "0:2:201")] = None
-
-
 _SHARED = {
     "QuantumEffects": "SpectrumEffects", "VibrationSection": "SpectrumVibration", "BasisNumerics": "SpectrumNumerics",
-    "FieldEffects": "StarkEffects",
+    "FieldEffects": "StarkEffects", "BodySection": "TumbleBody",
 }  # fmt: skip  # tables that several kinds have
 
 
@@ -66,10 +30,8 @@ def __getattr__(name: str) -> Any:
         from rotor.verbs.emission import emitting_molecule
 
         return emitting_molecule()
-    if (shape := name.removesuffix("Section").lower()) in ("gaussian", "switched", "kick", "thz"):
-        from rotor.verbs.align import PULSES
-
-        return PULSES.structures[shape]
+    if name.endswith("Section"):
+        return _section_of_list(name)
     from rotor.verbs.scene_tables import tables_of
     from rotor.verbs.verb import SCENE_VERBS, verb_of
 
@@ -78,3 +40,16 @@ def __getattr__(name: str) -> Any:
     if (table := name.removeprefix(kind.capitalize()).lower()) not in tables:
         raise AttributeError(f"module 'rotor.scenes.sections' has no attribute {name!r}")
     return tables[table]
+
+
+def _section_of_list(name: str) -> Any:
+    """The structure of a table of a list, such as GaussianSection of [[pulses]]."""
+    from rotor.alignment.request import PULSES
+    from rotor.classical.driven import BODY_EFFECTS
+    from rotor.verbs.tables import structures_of
+
+    for choices in (PULSES, BODY_EFFECTS):
+        for structure in structures_of(choices).values():
+            if structure.__name__ == name:
+                return structure
+    raise AttributeError(f"module 'rotor.scenes.sections' has no attribute {name!r}")

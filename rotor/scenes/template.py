@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Any, get_args, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -13,7 +13,6 @@ from rotor.scenes.scene_file import structures_in, toml_value
 from rotor.verbs.verb import verb_of
 
 STARTS: dict[str, dict[str, Any]] = {
-    "tumble": {"molecule.source": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},
     "fit": {
         "lines.source": "lines.csv", "molecule.source": "water", "parameters.free": ["A", "B", "C"],
         "outputs.csv": "fit.csv", "outputs.report": "out.fit",
@@ -64,17 +63,25 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
             continue
         structures = structures_in(hints[one.name])
         if structures and one.name != "accuracy":
-            inner.append((one.name, structures[0], one.name == "body" or (one.name == "effects" and kind == "tumble")))
+            inner.append(
+                (one.name, structures[0], one.name == "body" or (_is_list(hints[one.name]) and not one.required))
+            )
         else:
             yield _key_line(one, hints[one.name], _start(kind).get(f"{place}{one.name}"))
     for name, table, absent in inner:
-        many = name in ("pulses", "molecules") or (name == "effects" and kind == "tumble")
+        many = _is_list(hints[name])
         hash_ = "# " if absent else ""
         yield f"\n{hash_}[[{name}]]" if many else f"\n{hash_}[{name}]"
         if many and name in TAGS:
             yield _in_comment(TAGS[name]) if absent else TAGS[name]
         lines = _lines(table, kind, f"{place}{name}.")
         yield from map(_in_comment, lines) if absent else lines
+
+
+def _is_list(hint: Any) -> bool:
+    """Whether a type is that of a list of tables."""
+    inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return get_origin(inner) is list
 
 
 def _in_comment(line: str) -> str:

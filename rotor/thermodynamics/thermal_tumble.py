@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +13,8 @@ from rotor import units
 from rotor.checks import require_positive
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
 from rotor.classical.tumble import Three, TumbleRequest, Units
-
-if TYPE_CHECKING:
-    from rotor.tops.top import Top
+from rotor.tops.facts import top_facts
+from rotor.tops.top import Top
 
 TEMPERATURE_K = 300.0
 TILT_DEGREES = 0.5
@@ -23,13 +23,26 @@ MOLECULAR = Units(
 )  # moments in u Å², energies in eV
 
 
+@dataclass(frozen=True)
+class MolecularTumble(TumbleRequest):
+    """The free rotation of a molecule. top: whose moments these are. temperature_k: of the thermal mean of |L|, where it is that."""
+
+    top: Top | None = None
+    temperature_k: float | None = None
+
+    def about(self) -> dict[str, Any]:
+        """Everything about the top, by the keys of docs/command_line.md."""
+        assert self.top is not None
+        return {**top_facts(self.top), "temperature_k": self.temperature_k}
+
+
 def thermal_tumble(
     top: Top,
     *,
     temperature_k: float = TEMPERATURE_K,
     angular_momentum_hbar: Sequence[float] | None = None,
     times_ps: Sequence[float] | None = None,
-) -> TumbleRequest:
+) -> MolecularTumble:
     """The request for the free rotation of a top, distortion neglected.
 
     Parameters
@@ -45,7 +58,7 @@ def thermal_tumble(
 
     Returns
     -------
-    TumbleRequest
+    MolecularTumble
         With angular momenta in ħ, times in ps and energies in cm⁻¹.
 
     Raises
@@ -64,9 +77,11 @@ def thermal_tumble(
     times = None if times_ps is None else tuple(float(t) for t in times_ps)
     if angular_momentum_hbar is not None:
         x, y, z = (float(m) for m in angular_momentum_hbar)
-        return TumbleRequest((a, b, c), (x, y, z), times, MOLECULAR, ("a", "b", "c"))
+        return MolecularTumble((a, b, c), (x, y, z), times, MOLECULAR, ("a", "b", "c"), top=top)
     momentum, source = _thermal((a, b, c), temperature_k)
-    return TumbleRequest((a, b, c), momentum, times, MOLECULAR, ("a", "b", "c"), source)
+    return MolecularTumble(
+        (a, b, c), momentum, times, MOLECULAR, ("a", "b", "c"), source, top=top, temperature_k=temperature_k
+    )
 
 
 def _thermal(moments: Three, temperature_k: float) -> tuple[Three, str]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import msgspec
+from typing import TYPE_CHECKING, Any
 
 from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
@@ -16,17 +14,15 @@ from rotor.reports.sources import source_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
 from rotor.requests.fill import Given, read_fields
 from rotor.table import counted
-from rotor.verbs.choices import Choices
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.tables import said
-from rotor.verbs.verb import PICTURES, Extra, Output, Place, Report, Subject, Verb
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Subject, Verb
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
     from rotor.tops.top import Top
 
-PULSES = Choices("pulses", "shape", SHAPES)
+FIELDS = all_fields(AlignRequest)
 _TEXTS = {
     "--pulse": ("gaussian", ("peak", "fwhm", "centre")),
     "--switched": ("switched", ("peak", "rise", "plateau", "fall", "start")),
@@ -42,42 +38,10 @@ Examples:
   rotor align OCS --thz "500 kV/cm, 1 ps, 0.3 THz" --observable costheta"""
 
 
-class PulsedMolecule(OneMolecule):
-    """A molecule and the pulses that act on it."""
-
-    tables_read = ("pulses",)
-
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The molecule and the list of pulses."""
-        about = said("one or more; shape is gaussian, switched, kick, table or thz")
-        one: Any = PULSES.scene_type
-        return [*super().scene_fields(), ("pulses", Annotated[list[one], about], msgspec.NODEFAULT)]
-
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
-        """The top with what the pulses act on, and the pulses."""
-        pulses = given.values.get("pulses", ())
-        if given.style == "key":
-            pulses = PULSES.read(pulses)
-        with_pulses = Given({**given.values, "pulses": pulses}, given.style)
-        subject = super().read(with_pulses, place, verb)
-        return Subject({**subject.values, "pulses": pulses}, subject.molecules, subject.text, subject.note)
-
-    def saved(self, request: AlignRequest, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The molecule and the tables of the pulses."""
-        return {**super().saved(request, subject, folder), "pulses": saved_pulses(request.pulses)}
-
-
-def saved_pulses(pulses: tuple[Pulse, ...]) -> list[dict[str, Any]]:
-    """The tables of pulses; ValueError for one whose shape is a function, or whose field is not along Z."""
-    for pulse in pulses:
-        if getattr(pulse, "shape", None) is not None or (pulse.acts_on == "dipole" and pulse.axis != (0, 0, 1)):
-            raise ValueError(f"a scene holds no {type(pulse).__name__} of this form")
-    return PULSES.write(pulses)
-
-
 def prepare(top: Top, reading: Reading, given: Given) -> Top:
     """The top with what the pulses act on."""
-    acts_on = {pulse.acts_on for pulse in given.values["pulses"]}
+    pulses = FIELDS["pulses"].read(given.values.get("pulses"), given.style) or ()
+    acts_on = {pulse.acts_on for pulse in pulses}
     if "dipole" in acts_on:
         top = with_some_dipole(top, reading)
     return with_known_polarizability(top, reading) if "polarizability" in acts_on else top
@@ -158,6 +122,8 @@ def _rows(path: str) -> tuple[list[str], list[list[float]]]:
 def build(verb: Verb, given: Given, subject: Subject) -> AlignRequest:
     """The request of a top and its pulses."""
     values = read_fields(AlignRequest, given, subject)
+    if not values.get("pulses"):
+        raise ValueError('pulses: expected one or more, such as "gaussian peak=1e13W/cm2 fwhm=1ps"')
     if values.get("state") is not None and "temperature_k" in values and not values.get("classical_molecules"):
         temperature, state = (
             verb.fields[f"conditions.{name}"].called(given.style) for name in ("temperature", "state")
@@ -244,7 +210,7 @@ VERB = Verb(
         Output("parquet", (".parquet",), "Write the cosines as Parquet", example="out.parquet"),
         Output("plot", PICTURES, "Draw the cosines (.png, .pdf, .svg)", draw, "out.png"),
     ),
-    subject=PulsedMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),
+    subject=OneMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),
     drawn="ps",
     scaled=False,
     workers="blocks of initial states",

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 
 from rotor.requests.field import Field
 from rotor.requests.fill import Given, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
+from rotor.verbs.tables import said, section_class
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -63,16 +64,16 @@ class OneMolecule(SubjectKind):
 
 
 def _molecule_type() -> Any:
-    from typing import Annotated
+    return Annotated[str | molecule_section(), said("a name, a file, SMILES:..., or a table")]
 
-    about = msgspec.Meta(description="a name, a file, SMILES:..., or a table")
-    return Annotated[str | molecule_section(), about]
+
+def optional_molecule(about: str) -> tuple[str, Any, Any]:
+    """Name, type and default of the key `molecule` of scenes that may have none."""
+    return "molecule", Annotated[str | molecule_section() | None, said(about, "water")], None
 
 
 def molecule_section() -> Any:
     """The structure of a table of a molecule."""
-    from rotor.verbs.tables import section_class
-
     return section_class("molecule", tuple(FIELDS.values()))
 
 

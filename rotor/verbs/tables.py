@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 
 import msgspec
 from msgspec import Meta, Struct
 
-from rotor.requests.field import REQUIRED, Field
+from rotor.requests.choices import Choices
+from rotor.requests.field import REQUIRED, Field, all_fields
 from rotor.requests.readers import Each, Flag, Names, Quantity, Text
 from rotor.verbs.verb import Output
 
@@ -45,6 +46,29 @@ def section_class(table: str, inputs: tuple[Field, ...], owner: str = "") -> Any
     return _MADE[key]
 
 
+@cache
+def structures_of(choices: Choices) -> dict[str, Any]:
+    """The structure of the table of each kind of a list."""
+    made = {}
+    for name, kind in choices.load().items():
+        title = "".join(word.capitalize() for word in name.split())
+        entries = entries_of(tuple(all_fields(kind).values()))
+        made[name] = msgspec.defstruct(
+            f"{title}Section", entries, bases=(Section,), frozen=True, kw_only=True, tag=name, tag_field=choices.word,
+            forbid_unknown_fields=True, omit_defaults=True, module=__name__,
+        )  # fmt: skip
+        made[name].__doc__ = (kind.__doc__ or "").splitlines()[0]
+    return made
+
+
+def _type_of(one: Field) -> Any:
+    """The type of a key."""
+    if isinstance(one.reader, Choices):
+        tables: Any = Union[tuple(structures_of(one.reader).values())]  # noqa: UP007  # of types that are known when it runs
+        return list[tables]
+    return one.reader.scene_type
+
+
 def entries_of(inputs: tuple[Field, ...]) -> list[Any]:
     """Name, type and default of every key of a table; keys that must be given have no default."""
     return [_entry(one)[:2] if one.default is REQUIRED else _entry(one) for one in inputs]
@@ -62,10 +86,10 @@ def _structure(table: str, entries: list[Any], owner: str) -> Any:
 
 def _entry(one: Field) -> tuple[str, Any, Any]:
     help_ = one.help[:1].lower() + one.help[1:] if one.help[1:2].islower() else one.help
-    kind, default = one.reader.scene_type, _default(one)
+    kind, default = _type_of(one), _default(one)
     if one.none:
         kind |= str
-    if default is None:
+    if default is None and one.default is not REQUIRED:
         kind |= None
     if isinstance(default, list | dict):
         return one.last, Annotated[kind, said(help_, one.example)], _made_anew(default)
@@ -81,10 +105,10 @@ def _default(one: Field) -> Any:
     """What a template shows."""
     if one.typed is not None:
         return one.typed
-    if isinstance(one.reader, Names):
-        return list(one.default)
     if one.default is REQUIRED:
         return one.example
+    if isinstance(one.reader, Names | Choices):
+        return list(one.default)
     if one.default is None or isinstance(one.reader, Flag | Text):
         return one.default
     if isinstance(one.default, tuple) and not isinstance(one.reader, Each):  # a file that says nothing means the same

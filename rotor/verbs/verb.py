@@ -186,7 +186,8 @@ class Verb:
     files, a dataclass of declared fields. content: further keys of the JSON. notes: remarks on an answer. nothing: why there is nothing
     to draw. drawn: unit of the horizontal axis of the picture, None where there is none to change; spectral: a picture of a spectrum;
     scaled: with --plot-scale. workers: what --workers spreads. start: what a template has switched on. extras: options that stand for
-    several fields. accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
+    several fields. short: of a request that plain Python answers before a compiler would be loaded.
+    accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
 
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
     these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
@@ -215,6 +216,7 @@ class Verb:
     accuracy: str = ""
     accuracy_example: Any = "1 kHz"
     sound: bool = True
+    short: Callable[[Any], bool] = lambda request: False
     build: Callable[[Verb, Given, Subject], Any] | None = None
     adapt: Callable[[Any, Mapping[str, Any], Given], Any] | None = None
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None

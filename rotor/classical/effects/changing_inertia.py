@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import InertiaChange
+from rotor.classical.effect import InertiaChange, vector_field
 from rotor.classical.euler import checked_moments
+from rotor.requests.field import REQUIRED, declared
+from rotor.requests.readers import Array
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,15 @@ class MomentsByTime(InertiaChange):
     array([4., 4., 3.])
     """
 
+    name: ClassVar[str] = "changing inertia"
     conserves_momentum: ClassVar[bool] = True
     depends_on_time: ClassVar[bool] = True
 
-    times: ArrayLike
-    rows: ArrayLike
+    times: ArrayLike = vector_field("times", "rising")
+    rows: ArrayLike = declared(REQUIRED, Array(list[list[float]]), "three at each time", "moments")
 
-    def __init__(self, times: ArrayLike, moments: ArrayLike) -> None:
-        knots, rows = np.array(times, dtype=np.float64), checked_moments(moments)
+    def __post_init__(self) -> None:
+        knots, rows = np.array(self.times, dtype=np.float64), checked_moments(self.rows)
         if knots.ndim != 1 or rows.shape != (len(knots), 3) or not np.all(np.diff(knots) > 0.0) or np.any(rows == 0.0):
             raise ValueError(
                 f"moments by time: expected rising times and three positive moments at each; got {rows.tolist()}"

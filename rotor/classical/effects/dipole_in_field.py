@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, matrix_field, vector_field
 from rotor.classical.effects.torques import checked_vector, from_body, lever_torque
 from rotor.classical.torque_form import INDUCED, LEVER, TorqueForm, torque_form
 
@@ -24,10 +24,11 @@ class PermanentDipole(Torque):
     [0.0, -2.0, 0.0]
     """
 
+    name: ClassVar[str] = "permanent dipole"
     conserves_energy: ClassVar[bool] = True
 
-    dipole: ArrayLike
-    field: ArrayLike
+    dipole: ArrayLike = vector_field("dipole", "in body axes")
+    field: ArrayLike = vector_field("field", "in space")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dipole", checked_vector(self.dipole, "a dipole"))
@@ -58,10 +59,11 @@ class InducedDipole(Torque):
     -9.0
     """
 
+    name: ClassVar[str] = "induced dipole"
     conserves_energy: ClassVar[bool] = True
 
-    polarizability: ArrayLike
-    field: ArrayLike
+    polarizability: ArrayLike = matrix_field("polarizability", "diagonal (3,) or matrix (3, 3), in body axes")
+    field: ArrayLike = vector_field("field", "in space")
 
     def __post_init__(self) -> None:
         array = np.array(self.polarizability, dtype=np.float64)

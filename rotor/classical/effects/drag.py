@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, matrix_field, vector_field
 from rotor.classical.torque_form import LINEAR, QUADRATIC, TorqueForm, torque_form
 
 
@@ -25,9 +25,10 @@ class LinearDrag(Torque):
     [-1.0, -2.0, -3.0]
     """
 
+    name: ClassVar[str] = "linear drag"
     needs_velocity: ClassVar[bool] = True
 
-    coefficients: ArrayLike
+    coefficients: ArrayLike = matrix_field("coefficients", "diagonal (3,) or matrix (3, 3)")
 
     def __post_init__(self) -> None:
         array = np.array(self.coefficients, dtype=np.float64)
@@ -59,9 +60,10 @@ class QuadraticDrag(Torque):
     [-0.0, -15.0, -20.0]
     """
 
+    name: ClassVar[str] = "quadratic drag"
     needs_velocity: ClassVar[bool] = True
 
-    coefficients: ArrayLike
+    coefficients: ArrayLike = vector_field("coefficients", "three, not negative")
 
     def __post_init__(self) -> None:
         array = np.array(self.coefficients, dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, frame_field, number_field, vector_field
 from rotor.classical.effects.torques import Frame, checked_frame, checked_vector, fixed_form, in_body
 from rotor.classical.torque_form import TorqueForm
 
@@ -23,12 +23,13 @@ class PeriodicDrive(Torque):
     [-2.0, -0.0, -0.0]
     """
 
+    name: ClassVar[str] = "periodic drive"
     depends_on_time: ClassVar[bool] = True
 
-    amplitude: ArrayLike
-    angular_frequency: float
-    phase: float = 0.0
-    frame: Frame = "body"
+    amplitude: ArrayLike = vector_field("amplitude", "the torque at its largest")
+    angular_frequency: float = number_field("angular_frequency", "rad per time")
+    phase: float = number_field("phase", "rad", 0.0)
+    frame: Frame = frame_field()
 
     def __post_init__(self) -> None:
         checked_frame(self.frame)

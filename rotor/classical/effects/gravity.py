@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, number_field, vector_field
 from rotor.classical.effects.torques import checked_vector, from_body, lever_torque
 from rotor.classical.torque_form import LEVER, TorqueForm, torque_form
 
@@ -26,11 +26,12 @@ class GravityAboutPivot(Torque):
     -10.0
     """
 
+    name: ClassVar[str] = "gravity about pivot"
     conserves_energy: ClassVar[bool] = True
 
-    mass: float
-    centre: ArrayLike
-    gravity: ArrayLike
+    mass: float = number_field("mass", "of the body")
+    centre: ArrayLike = vector_field("centre", "from pivot to centre of mass, in body axes")
+    gravity: ArrayLike = vector_field("gravity", "acceleration in space")
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass > 0.0):

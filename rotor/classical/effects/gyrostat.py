@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import InnerMomentum
+from rotor.classical.effect import InnerMomentum, vector_field
 from rotor.classical.effects.torques import checked_vector
 
 
@@ -26,10 +26,11 @@ class SpinningRotor(InnerMomentum):
     array([0. , 0. , 0.7])
     """
 
+    name: ClassVar[str] = "spinning rotor"
     conserves_energy: ClassVar[bool] = True
     conserves_momentum: ClassVar[bool] = True
 
-    momentum: ArrayLike
+    momentum: ArrayLike = vector_field("momentum", "of the rotor, in body axes")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "momentum", checked_vector(self.momentum, "the momentum of a rotor"))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, vector_field
 from rotor.classical.effects.torques import checked_vector, from_body
 from rotor.classical.torque_form import INDUCED, TorqueForm, torque_form
 from rotor.geometry.rotations import vector_product
@@ -32,10 +32,11 @@ class FluidImpulse(Torque):
     [0.0, 0.0, -0.5]
     """
 
+    name: ClassVar[str] = "fluid impulse"
     conserves_energy: ClassVar[bool] = True
 
-    impulse: ArrayLike
-    masses: ArrayLike
+    impulse: ArrayLike = vector_field("impulse", "in space")
+    masses: ArrayLike = vector_field("masses", "of the body with the fluid's, along its axes")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "impulse", checked_vector(self.impulse, "an impulse"))

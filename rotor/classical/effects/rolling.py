@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import AddedInertia, Torque
+from rotor.classical.effect import AddedInertia, Torque, number_field, vector_field
 from rotor.classical.effects.torques import checked_vector, from_body
 from rotor.classical.torque_form import ROLLING, TorqueForm, torque_form
 from rotor.geometry.rotations import IDENTITY, to_matrix, vector_product
@@ -38,14 +38,19 @@ class RollingEllipsoid(Torque, AddedInertia):
     [0.5, 0.5, 0.0]
     """
 
+    name: ClassVar[str] = "rolling ellipsoid"
     conserves_energy: ClassVar[bool] = True
     needs_velocity: ClassVar[bool] = True
 
-    mass: float
-    semiaxes: ArrayLike
-    gravity: ArrayLike
-    centre: ArrayLike = (0.0, 0.0, 0.0)
-    axes: ArrayLike = tuple(IDENTITY)
+    mass: float = number_field("mass", "of the body")
+    semiaxes: ArrayLike = vector_field("semiaxes", "of the ellipsoid")
+    gravity: ArrayLike = vector_field("gravity", "acceleration in space, towards the plane")
+    centre: ArrayLike = vector_field(
+        "centre", "of the ellipsoid, from the centre of mass, in body axes", (0.0, 0.0, 0.0)
+    )
+    axes: ArrayLike = vector_field(
+        "axes", "quaternion from the ellipsoid's axes to the body's", tuple(IDENTITY.tolist())
+    )
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass > 0.0):

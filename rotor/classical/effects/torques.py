@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import Torque
+from rotor.classical.effect import Torque, frame_field, vector_field
 from rotor.classical.torque_form import BODY_FIXED, SPACE_FIXED, TorqueForm, torque_form
 
 Frame = Literal["body", "space"]
@@ -67,8 +67,9 @@ class ConstantTorque(Torque):
     array([0. , 0. , 0.5])
     """
 
-    vector: ArrayLike
-    frame: Frame = "body"
+    name: ClassVar[str] = "constant torque"
+    vector: ArrayLike = vector_field("vector", "the torque")
+    frame: Frame = frame_field()
 
     def __post_init__(self) -> None:
         checked_frame(self.frame)

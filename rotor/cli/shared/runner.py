@@ -7,6 +7,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.cli.shared import process
 from rotor.cli.shared.command import refuse_overwriting
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
@@ -33,6 +34,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         outputs["json"] = ()
     if verb.check is not None:
         verb.check(request, outputs, shown)
+    if verb.short(request):
+        process.leave_compiler_out()
     head = {"command": str(context.obj), "input": subject.text}
     with working(verb, typed) as executor:
         with answering() if verb.sound else naming(verb):

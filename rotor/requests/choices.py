@@ -1,0 +1,126 @@
+"""Things of several kinds in a list, such as [[pulses]] with shape = "gaussian": each kind a dataclass of declared fields."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rotor.requests.field import REQUIRED, Field, all_fields, undeclared
+from rotor.requests.fill import Given, equal, read_instance, written_fields
+from rotor.requests.readers import InsideError, Reader
+
+
+@dataclass(frozen=True, eq=False)
+class Choices(Reader):
+    """A list of things of several kinds: tables of a scene, lines of text on the command line, or the objects themselves.
+
+    word: the key of a table that names the kind. load: gives the dataclasses by that name.
+    """
+
+    word: str
+    load: Callable[[], Mapping[str, type]]
+    metavar: str = "TEXT"
+    many = True
+
+    def read(self, given: Any) -> tuple[Any, ...]:
+        """What tables and lines say, objects as they are; an error of a table names its number and key."""
+        items = given if isinstance(given, list | tuple) else (given,)
+        return tuple(self._read(item, number) for number, item in enumerate(items))
+
+    def _read(self, item: Any, number: int) -> Any:
+        if isinstance(item, str):
+            return self._of_line(item)
+        if not isinstance(item, Mapping):
+            return item
+        try:
+            kind, values = self.load()[str(item[self.word])], {k: v for k, v in item.items() if k != self.word}
+            return read_instance(kind, Given(values, "key"))
+        except ValueError as error:
+            text = str(error)
+            inside = text.partition(":")[0] in item
+            raise InsideError(f"[{number}].{text}" if inside else f"[{number}]: {text}") from None
+
+    def _of_line(self, line: str) -> Any:
+        """What a line of text means: `linear drag coefficients=0.1,0.1,0.2`, numbers between commas, rows between semicolons."""
+        name, texts = _words(line)
+        kinds = self.load()
+        if name not in kinds:
+            raise ValueError(f"{line!r}: no {self.word} is named {name!r}; {_nearest(name, kinds)}")
+        fields = {one.last: one for one in all_fields(kinds[name]).values()}
+        for key in texts:
+            if key not in fields:
+                raise ValueError(f"{line!r}: {name} has no {key!r}; {_nearest(key, fields)}")
+        if missing := [key for key, one in fields.items() if one.default is REQUIRED and key not in texts]:
+            raise ValueError(f"{line!r}: {missing[0]} is missing; give {_usage(fields)}")
+        values = {}
+        for key, text in texts.items():
+            try:
+                values[fields[key].name] = fields[key].reader.read(text)
+            except ValueError as error:
+                rule = str(error).partition(": ")[2]
+                raise ValueError(f"{line!r}: {key}={text}: {rule}") from None
+        return kinds[name](**values)
+
+    def line(self, thing: Any) -> str:
+        """The line of text of a thing; the name of its class for one that no table holds."""
+        try:
+            table = self.write([thing])[0]
+        except ValueError:
+            return type(thing).__name__
+        parts = [f"{key}={_line_text(value)}" for key, value in table.items() if key != self.word]
+        return " ".join([table[self.word], *parts])
+
+    def write(self, value: Any) -> list[dict[str, Any]]:
+        """Tables that say the same again; ValueError for a thing that no table holds."""
+        names: dict[Any, str] = {kind: name for name, kind in self.load().items()}
+        if other := next((thing for thing in value if type(thing) not in names), None):
+            raise ValueError(f"a scene holds no {type(other).__name__}; there are {', '.join(names.values())}")
+        for thing in value:
+            kind: Any = type(thing)
+            if any(not equal(getattr(thing, one.name), one.default) for one in undeclared(kind)):
+                raise ValueError(f"a scene holds no {type(thing).__name__} of this form")
+        return [{self.word: names[type(thing)], **written_fields(thing)} for thing in value]
+
+
+def _line_text(value: Any) -> str:
+    """Numbers between commas, rows between semicolons; a diagonal matrix by its diagonal."""
+    if not isinstance(value, list):
+        return f"{value:g}" if isinstance(value, float) else str(value)
+    if not all(isinstance(row, list) for row in value):
+        return ",".join(f"{one:g}" for one in value)
+    if all(one == 0 for i, row in enumerate(value) for k, one in enumerate(row) if i != k) and len(value) == len(
+        value[0]
+    ):
+        return ",".join(f"{row[i]:g}" for i, row in enumerate(value))
+    return ";".join(map(_line_text, value))
+
+
+def _words(line: str) -> tuple[str, dict[str, str]]:
+    """The name in front of a line, and the text of each parameter."""
+    name: list[str] = []
+    texts: dict[str, str] = {}
+    key = ""
+    for word in line.split():
+        before, equals, after = word.partition("=")
+        if equals:
+            key = before
+            if not key or key in texts:
+                raise ValueError(f"{line!r}: expected each parameter once, as name=value")
+            texts[key] = after
+        elif texts:
+            texts[key] += word
+        else:
+            name.append(word)
+    return " ".join(name), texts
+
+
+def _usage(fields: Mapping[str, Field]) -> str:
+    """All parameters, with what each is."""
+    return ", ".join(f"{key} ({one.help})" for key, one in fields.items())
+
+
+def _nearest(word: str, known: Mapping[str, Any]) -> str:
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"the nearest is {near[0]!r}" if near else f"there are {', '.join(known)}"

@@ -1,0 +1,317 @@
+"""`tumble`: the rotation of a molecule or of any rigid body, free or under torques, drag, drives, fields."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
+from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
+from rotor.reports import top_facts
+from rotor.reports.screen import Table, plain, show_facts, show_table
+from rotor.reports.sources import source_facts
+from rotor.verbs.molecule import STATES
+from rotor.verbs.turning_body import MotionInput, TurningBody, build
+from rotor.verbs.verb import PICTURES, Output, Report, Verb
+
+if TYPE_CHECKING:
+    from rotor.arrays import Floats
+
+SHOWN = 11  # rows of the motion in the report
+SMALL = 1e-4  # of the components of a column
+FEW_TIMES = 10_000  # half a second of plain Python, as long as loading the compiler takes
+_PROVENANCE = (
+    "command", "scene", "accuracy", "input", "source", "units", "moments", "angular_momentum", "angular_momentum_source",
+    "effects", "method",
+)  # fmt: skip
+
+EXAMPLES = """\b
+Examples:
+  rotor tumble water --plot water.png --gif water.gif
+  rotor tumble water --times 0:20ps:401 --csv water.csv
+  rotor tumble book --plot book.png
+  rotor tumble --body wing-nut --omega "0.01,0,20 rad/s" --gif nut.gif
+  rotor tumble --moments "0.6,0.8,1.0 kg m2" --omega "0.1,60,0 rpm"
+  rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv
+  rotor tumble book --effect "linear drag coefficients=1e-4,1e-4,1e-4" --times 0:30:301 --csv slowed.csv"""
+
+
+def answer(request: TumbleRequest | DrivenRequest) -> TumbleAnswer | DrivenAnswer:
+    """The motion: exact where it is free, else stepped."""
+    return answer_tumble(request) if isinstance(request, TumbleRequest) else answer_driven(request)
+
+
+def is_short(request: TumbleRequest | DrivenRequest) -> bool:
+    """Whether plain Python computes the motion before the compiler of the kernels would be loaded."""
+    return isinstance(request, TumbleRequest) and (request.times is None or len(request.times) <= FEW_TIMES)
+
+
+def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Any) -> None:
+    """ValueError for a picture of a motion under effects, and for a film that cannot be."""
+    for name in ("plot", "gif"):
+        if name in outputs and not isinstance(request, TumbleRequest):
+            raise ValueError(f"--{name}: shows a free motion; leave it out with --effect (--csv writes the motion)")
+    if "gif" not in outputs:
+        return
+    from rotor.plots.animation import check_film
+
+    path, times = str(outputs["gif"][0]), request.times
+    try:
+        check_film(path)
+    except ValueError as error:
+        raise ValueError(f"--gif: {error}") from None
+    if times is not None and min(times) == max(times):
+        raise ValueError(f"--gif {path}: a film needs two different times, a first and a last; give more --times")
+
+
+def write_rows(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
+    """The motion as a file."""
+    from rotor.formats import write
+
+    write(answer.table, path, settings=_provenance(report))
+
+
+def _provenance(report: Report) -> dict[str, Any]:
+    content = {**report.content, **report.provenance}
+    return {key: plain(content[key]) for key in _PROVENANCE if key in content}
+
+
+def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
+    """The polhodes as a file."""
+    from rotor.plots.polhodes import plot_polhodes
+
+    if not isinstance(answer, TumbleAnswer):
+        raise ValueError("outputs.plot: there is a picture of a free motion alone; leave it out")
+    request, units = answer.request, answer.request.units
+    label = f"$t$ ({units.time})" if units.time else "$t$"
+    plot_polhodes(
+        answer.motion, answer.table.times / units.time_factor, path, axis_names=request.axes, time_label=label,
+        time_factor=units.time_factor, title=_picture_title(request), provenance=_provenance(report),
+    )  # fmt: skip
+
+
+def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
+    """The animation as a file."""
+    from rotor.plots.animation import animate
+
+    if not isinstance(answer, TumbleAnswer):
+        raise ValueError("outputs.gif: there is a film of a free motion alone; leave it out")
+    request, units = answer.request, answer.request.units
+    animate(
+        answer.motion, answer.table.times / units.time_factor, path, atoms=_atoms(request), axis_names=request.axes,
+        time_unit=units.time, time_factor=units.time_factor, provenance=_provenance(report),
+    )  # fmt: skip
+
+
+def _atoms(request: TumbleRequest) -> Any:
+    """The atoms in the principal frame, where there is a geometry."""
+    top = getattr(request, "top", None)
+    if top is None or top.molecule is None or top.frame is None:
+        return None
+    from rotor.plots.animation import Atoms
+
+    return Atoms((top.molecule.positions_angstrom - top.frame.centre) @ top.frame.axes.T, top.molecule.symbols)
+
+
+def _heading(request: TumbleRequest | DrivenRequest) -> str:
+    top = getattr(request, "top", None)
+    if top is not None:
+        return top_facts.heading(top)
+    still = TumbleRequest(request.moments, request.moments)
+    name = top_facts.KINDS[still.kind].replace("linear molecule", "linear body")
+    return f"{request.named.name if request.named else 'moments ' + _numbers(request.moments)}: {name}"
+
+
+def _picture_title(request: TumbleRequest) -> str:
+    from rotor.plots.picture import name_of_top
+
+    top = getattr(request, "top", None)
+    return _heading(request) if top is None else f"{name_of_top(top)}: {top_facts.KINDS[top.kind]}"
+
+
+def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> None:
+    """Print how the body turns, and rows of the motion."""
+    if isinstance(answer, DrivenAnswer):
+        _show_driven(answer, report.content)
+        return
+    content = report.content
+    print(f"{_heading(answer.request)}, turning freely")
+    show_facts(_facts(answer.request, content))
+    print()
+    show_table(_axes_table(answer.request, content))
+    print()
+    show_table(_motion_table(answer))
+    top = getattr(answer.request, "top", None)
+    sources = [] if top is None else source_facts(top, ("constants",), report.sources)
+    show_facts([*top_facts.error_facts(content), *sources])
+
+
+def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
+    units = answer.request.units
+    names = [type(effect).name or type(effect).__name__ for effect in answer.request.effects]
+    print(f"{_heading(answer.request)}, under {', '.join(names)}")
+    energy = f" {units.energy}" if units.energy else ""
+    drift = content["energy_drift"]
+    last = "not conserved" if drift is None else f"conserved to {drift:.1e} of the largest kinetic one"
+    facts = [
+        *((f"effect {number}", text) for number, text in enumerate(content["effects"], 1)),
+        ("method", f"{content['method']}, {content['steps']} steps"),
+        ("energy", f"{content['energy_first']:.10g} to {content['energy_last']:.10g}{energy}: {last}"),
+    ]
+    show_facts(facts)
+    print()
+    show_table(_driven_table(answer))
+
+
+def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    units, facts = request.units, []
+    top = getattr(request, "top", None)
+    if top is not None:
+        a, b, c = top.rotational_constants_mhz
+        rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
+        facts.append(("rigid top", f"{rigid} MHz, distortion neglected"))
+    if request.named is not None:
+        facts.append(("body", f"{request.named.text}; assumed sizes"))
+    size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
+    vector = f"({_numbers(content['angular_momentum'])})"
+    ratio, growth = content["separatrix_ratio"], content["growth_rate"]
+    facts += [
+        ("|L|", f"{size}, {vector} in the body: {request.source}"),
+        ("energy", f"{content['energy']:.10g}{_unit(units.energy)}"),
+        ("motion", _motion_text(request, content)),
+        ("about L", f"turns by {content['turning_rate']:.8g} rad{_per(units.time)} on average, as space sees it"),
+    ]
+    if ratio is not None:
+        low, _, high = sorted(zip(request.moments, request.axes, strict=True))
+        where = f"|ω{high[1]}/ω{low[1]}| = {ratio:.8g} where L crosses the plane of these two axes"
+        facts.append(("separatrix", where))
+        facts.append(("growth rate", f"{growth:.8g}{_per(units.time)} off the intermediate axis"))
+    facts += [
+        ("chaos", content["chaos"]),
+        ("times", content["times_source"]),
+        ("conserved", _drift_text(content["invariant_drift"])),
+    ]
+    return facts
+
+
+def _motion_text(request: TumbleRequest, content: Mapping[str, Any]) -> str:
+    kind, unit = content["motion_kind"], _unit(request.units.time)
+    if kind == "steady":
+        return "steady: L stands still in the body"
+    if kind == "separatrix":
+        return "on the separatrix: L runs into the intermediate axis and does not come back"
+    period = f"L goes round {kind.removeprefix('about ')} of the body in a period of {content['period']:.10g}{unit}"
+    if len(set(request.moments)) < 3:
+        return period
+    middle = sorted(zip(request.moments, request.axes, strict=True))[1][1]
+    return f"{period}; its component along axis {middle} changes sign every half of it"
+
+
+def _drift_text(drift: Mapping[str, float]) -> str:
+    return (
+        f"energy to {drift['energy']:.1e}, |L| to {drift['momentum']:.1e}, L in space to "
+        f"{drift['space_momentum']:.1e} of themselves: round-off, at every time asked for"
+    )
+
+
+def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
+    """What becomes of a spin about each axis."""
+    fates = {
+        "stable": "a push oscillates",
+        "unstable": "a push grows",
+        "neutral": "a push drifts",
+        "none": "no rotation about it",
+    }
+    rate, moment = (
+        f"rate (rad{_per(request.units.time)})",
+        "moment" + _bracket(request.units.moment),
+    )
+    rows = [
+        (a["axis"], f"{a['moment']:.8g}", a["kind"], f"{a['rate']:.8g}", fates[a["kind"]])
+        for a in content["fixed_axes"]
+    ]
+    title = "spin about each axis, at this |L|"
+    return Table(title, ("axis", moment, "kind", rate, ""), rows, frozenset({"axis", "kind", ""}))
+
+
+def _motion_table(answer: TumbleAnswer) -> Table:
+    units, table = answer.request.units, answer.table
+    names = {"t": "t" + _bracket(units.time)}
+    for number, axis in enumerate(answer.request.axes, 1):
+        names[f"m{number}"] = f"L{axis}{_bracket(units.angular_momentum)}"
+    names |= {name: name for name in ("qw", "qx", "qy", "qz")}
+    return _rows(table.columns, names, lambda value, column: _component(value, column))
+
+
+def _driven_table(answer: DrivenAnswer) -> Table:
+    units = answer.request.units
+    names = {"t": "t" + _bracket(units.time), "energy": "energy" + _bracket(units.energy)}
+    for number, axis in enumerate(answer.request.axes, 1):
+        names[f"w{number}"] = f"ω{axis}{_bracket('rad/' + units.time if units.time else '')}"
+    names |= {name: name for name in ("qw", "qx", "qy", "qz")}
+    return _rows(answer.table.columns, names, lambda value, column: f"{value:.6f}")
+
+
+def _rows(columns: Mapping[str, Floats], names: Mapping[str, str], text: Any) -> Table:
+    """Some rows of a motion, evenly chosen."""
+    count = len(columns["t"])
+    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
+    cells = [
+        [f"{columns[name][i]:.6g}" if name == "t" else text(columns[name][i], columns[name]) for name in names]
+        for i in rows
+    ]
+    title = "the motion" if len(cells) == count else f"the motion, {len(cells)} of {count} times"
+    return Table(title, list(names.values()), cells)
+
+
+def _numbers(values: Any) -> str:
+    return ", ".join(f"{x:.8g}" for x in values)
+
+
+def _unit(name: str) -> str:
+    return f" {name}" if name else ""
+
+
+def _per(name: str) -> str:
+    return f"/{name}" if name else " per time"
+
+
+def _bracket(name: str) -> str:
+    return f" ({name})" if name else ""
+
+
+def _component(value: float, column: Floats) -> str:
+    """Six decimals, or six digits where the whole column is so small that decimals would show nothing (SI units of molecules)."""
+    largest = float(max(abs(column.min()), abs(column.max())))
+    return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"
+
+
+VERB = Verb(
+    name="tumble",
+    about="Rotation of a molecule or a rigid body: the exact free motion, what it conserves, stable axes; a motion under effects.",
+    examples=EXAMPLES,
+    request=MotionInput,
+    answer=lambda request, work: answer(request),
+    table=lambda answer: answer.table,
+    rows="motion",
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the motion as CSV, in full precision", write_rows, "tumble.csv"),
+        Output("parquet", (".parquet",), "Write the motion as Parquet", write_rows, "tumble.parquet"),
+        Output("plot", PICTURES, "Draw the polhodes (.png, .pdf, .svg)", draw, "tumble.png"),
+        Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif"),
+    ),
+    subject=TurningBody(
+        ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins", *STATES,
+         "internal_rotation", "calculator", "hessian", "symmetry_tolerance"),
+    ),
+    drawn=None,
+    build=build,
+    check=check,
+    short=is_short,
+    accuracy="of the attitude",
+    accuracy_example="1e-6 rad",
+    start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},
+)  # fmt: skip

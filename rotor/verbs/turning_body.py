@@ -1,0 +1,478 @@
+"""What `tumble` computes of: a molecule, an ordinary body or bare moments, and how it starts."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.classical.driven import BODY_EFFECTS, DEFAULT_TOLERANCE
+from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
+from rotor.requests.fill import Given, read_instance, renaming, written_fields
+from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
+from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL, parse_grid
+from rotor.verbs.molecule import Reading, read_molecule, top_of
+from rotor.verbs.subjects import OneMolecule, optional_molecule, saved_molecule
+from rotor.verbs.verb import Place, Subject
+
+if TYPE_CHECKING:
+    from rotor.classical.bodies import NamedBody
+    from rotor.classical.driven import DrivenRequest
+    from rotor.classical.tumble import Three, TumbleRequest, Units
+    from rotor.verbs.verb import Verb
+
+_UNITS_OF_MOLECULES = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
+_UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
+TURN_RAD_PER_S = 2 * math.pi  # of a named body that is given no motion: one turn a second
+MOST_TIMES = 10_000_000
+
+
+def _body(name: Any) -> NamedBody:
+    from rotor.classical.bodies import named_body
+
+    return named_body(name)
+
+
+def _three(given: Any, unit: str = "") -> Three:
+    """Three finite numbers, in a unit of their own or in `unit`."""
+    if isinstance(given, str):
+        if given.count(",") != 2 or ":" in given:
+            raise ValueError(f"{given!r}: expected three numbers, such as 0.6,0.8,1.0")
+        given = parse_grid(given, unit)
+    values = [float(one) for one in given]
+    if len(values) != 3:
+        raise ValueError(f"{values}: expected three numbers")
+    x, y, z = values
+    return x, y, z
+
+
+def _four(given: Any) -> tuple[float, float, float, float]:
+    if isinstance(given, str) and (given.count(",") != 3 or ":" in given):
+        raise ValueError(f"{given!r}: expected four numbers, such as 1,0,0,0")
+    values = [float(one) for one in (parse_grid(given, "") if isinstance(given, str) else given)]
+    if len(values) != 4:
+        raise ValueError(f"{values}: expected four numbers, such as 1,0,0,0")
+    w, x, y, z = values
+    return w, x, y, z
+
+
+def _moments(given: Any) -> Three:
+    from rotor.classical.euler import checked_moments
+
+    moments = _three(given, "kg*m2" if in_si(given) else "")
+    try:
+        checked_moments(moments)
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(f"{given!r}: {text}" if isinstance(given, str) else text) from None
+    return moments
+
+
+def in_si(moments: Any) -> bool:
+    """Whether moments are given with a unit."""
+    return isinstance(moments, str) and bool(_UNIT_AT_END.search(moments))
+
+
+def _units(given: Any) -> str:
+    if given not in ("", "SI"):
+        raise ValueError(f'{given!r}: expected "SI", or "" for any coherent set')
+    return str(given)
+
+
+class Vector(Reader):
+    """Three numbers, whose unit is that of the body; a text is read where the body is known."""
+
+    scene_type: Any = list[float]
+
+    def __init__(self, metavar: str) -> None:
+        self.metavar = metavar
+
+    def write(self, value: Any) -> list[float]:
+        """The numbers as a list."""
+        return [float(one) for one in value]
+
+
+class Times(Grid):
+    """Times in the unit of the body; a text is read where the body is known."""
+
+    def read(self, given: Any) -> Any:
+        """What was given."""
+        return given
+
+    def write(self, value: Any) -> Any:
+        """A text as it is, numbers as a list."""
+        return value if isinstance(value, str) else super().write(value)
+
+
+@dataclass(frozen=True)
+class BodyInput:
+    """A rigid body instead of a molecule, in any coherent units."""
+
+    body: NamedBody | None = declared(
+        None, Custom(_body, lambda body: body.name, "NAME"), "Ordinary body instead of a molecule: book, phone, racket or wing-nut",
+        "body.name", option="--body", panel=MOLECULE, common=True, example="book",
+    )  # fmt: skip
+    moments: Three | None = declared(
+        None, Custom(_moments, list, "I1,I2,I3", list[float] | str),
+        'Principal moments instead of a molecule, in any order: "1,2,3 kg m2", or plain numbers of any coherent units', "body.moments",
+        panel=MOLECULE, common=True, example=[0.3, 0.35, 0.4],
+    )  # fmt: skip
+    units: str = declared("", Custom(_units), '"SI" (kg m², s, J), or "" for any coherent set', "body.units", option="")
+    angular_momentum: Three | None = declared(
+        None,
+        Vector("L1,L2,L3"),
+        "At time 0 in principal axes",
+        "body.angular_momentum",
+        option="",
+        example=[1.8, 0.4, -0.9],
+    )
+    angular_velocity: Three | None = declared(
+        None, Vector("W1,W2,W3"), "Angular velocity at time 0, in principal axes, instead of the angular momentum: 0.1,10,0 (rad/s; rad/ps "
+        "for a molecule; also rpm, deg/s)", "body.angular_velocity", option="--omega", common=True, example=[0.1, 15.0, 0.1],
+    )  # fmt: skip
+    attitude: tuple[float, float, float, float] | None = declared(
+        None, Custom(_four, list, "W,X,Y,Z", list[float]), "With effects: unit quaternion, body to space, at time 0", "body.attitude",
+        example=[1.0, 0.0, 0.0, 0.0],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MotionInput:
+    """How a body starts, what acts on it, and when it is looked at."""
+
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature of the thermal mean |L| of a molecule (K)",
+        "conditions.temperature", common=True,
+    )  # fmt: skip
+    angular_momentum: Three | None = declared(
+        None, Vector("L1,L2,L3"), "At time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
+        "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
+    )  # fmt: skip
+    times: Any = declared(
+        None, Times(), "Times (ps for a molecule, s with SI units); by default two periods", "conditions.times", common=True,
+        example="0:2:201",
+    )  # fmt: skip
+    effects: tuple[Any, ...] = declared(
+        (), BODY_EFFECTS, 'What acts on a body: a name and its parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
+        "effects", option="--effect", common=True,
+    )  # fmt: skip
+    tolerance: float = declared(
+        DEFAULT_TOLERANCE, Quantity(), "With effects: tolerance of a step, relative to |L| and one radian", "numerics.tolerance",
+        typed=DEFAULT_TOLERANCE,
+    )  # fmt: skip
+    step: float | None = declared(
+        None, Custom(lambda given: given, scene_type=float | str, metavar="T"),
+        "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
+        example=0.01,
+    )  # fmt: skip
+    order: int = declared(4, Whole(), "Order of the splitting: 2, 4, 6 or 8", "numerics.order")
+
+
+BODY = {one.name: one for one in all_fields(BodyInput).values()}
+MOTION = {one.name: one for one in all_fields(MotionInput).values()}
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that is no molecule. moments: principal ones, in coherent or SI units.
+
+    named: what an ordinary body consists of. start: its angular momentum where none is given, and how that was chosen.
+    """
+
+    text: str
+    moments: Three
+    units: Units
+    axes: tuple[str, str, str] = ("1", "2", "3")
+    named: NamedBody | None = None
+    start: tuple[Three, str] | None = None
+
+    @property
+    def rate_unit(self) -> str:
+        """Of angular velocities; empty: of any coherent set."""
+        return f"rad/{self.units.time}" if self.units.time else ""
+
+
+@dataclass(frozen=True)
+class TurningBody(OneMolecule):
+    """A molecule, an ordinary body or bare moments."""
+
+    fields = {**OneMolecule.fields, **all_fields(BodyInput)}  # noqa: RUF012
+
+    @property
+    def options(self) -> Any:
+        """The inputs of the molecule and of the body."""
+        return {**super().options, **all_fields(BodyInput)}
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """The key `molecule`, which a body replaces."""
+        return [optional_molecule("a name, a file, SMILES:..., or a table")]
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The top or the body that was given."""
+        molecule = read_molecule(given)
+        body = read_body(given)
+        if body is None:
+            top = top_of(Reading(molecule, given.style, place.folder, place.note))
+            return Subject({"top": top}, (molecule,), str(molecule.source or molecule.constants), place.note)
+        return Subject({"body": body}, (), body.text, place.note)
+
+    def saved(self, request: TumbleRequest | DrivenRequest, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The molecule or the body, and how it starts."""
+        times = None if request.times is None else [float(one) for one in request.times]
+        content = {} if times is None else {"conditions.times": times}
+        if subject.molecules:
+            kelvin = getattr(request, "temperature_k", None)
+            start = (
+                {"conditions.angular_momentum": list(request.angular_momentum or ())}
+                if kelvin is None
+                else written_fields(MotionInput(temperature_k=kelvin))
+            )
+            return saved_molecule(subject.molecules[0], folder) | content | start
+        units = "SI" if request.units.time else ""
+        effects = getattr(request, "effects", None)
+        spin = getattr(request, "angular_velocity", None)
+        attitude = getattr(request, "attitude", None)
+        body = BodyInput(
+            moments=request.moments, units=units, angular_momentum=request.angular_momentum, angular_velocity=spin,
+            attitude=None if attitude == (1.0, 0.0, 0.0, 0.0) else attitude,
+        )  # fmt: skip
+        content = written_fields(body) | content
+        if effects is None:
+            return content
+        driven: Any = request
+        motion = MotionInput(effects=effects, tolerance=driven.tolerance, step=driven.step, order=driven.order)
+        return content | written_fields(motion)
+
+
+def read_body(given: Given) -> Body | None:
+    """The body that was given by moments or name, or by a source that is the name of one; None for a molecule."""
+    asked = read_instance(BodyInput, given)
+    called = {
+        name: one.called(given.style)
+        for name, one in (BODY | {k: MOTION[k] for k in ("temperature_k", "effects")}).items()
+    }
+    momentum = MOTION["angular_momentum"].called(given.style)
+    if asked.angular_velocity is not None and _momentum(given, asked) is not None:
+        raise ValueError(f"{called['angular_velocity']} and {momentum}: each fixes the motion; give one of them")
+    if asked.body is not None and asked.moments is not None:
+        raise ValueError(f"{called['body']} and {called['moments']}: give one of them")
+    source, constants = given.values.get("molecule.source"), given.values.get("molecule.constants")
+    named = asked.body or _named_source(source)
+    if asked.moments is None and named is None:
+        if source is None and constants is None:
+            if given.style == "key":
+                raise ValueError("molecule, body: give one of them")
+            words = (
+                "a molecule, --constants, --moments or --body"
+                if given.style == "option"
+                else "a molecule, moments or body"
+            )
+            raise ValueError(f"expected {words}; try 'rotor tumble water'")
+        return None
+    if (source is not None and (named is None or asked.body is not None)) or constants is not None:
+        raise ValueError(
+            "molecule, body: give one of them"
+            if given.style == "key"
+            else f"a molecule and {called['moments' if named is None else 'body']}: give one of them"
+        )
+    if given.values.get("molecule.isotopes"):
+        raise ValueError(
+            "--isotope: bare moments have no atoms; give the moments of the isotopologue itself".replace(
+                "--isotope", "--isotope" if given.style == "option" else "isotopes"
+            )
+        )
+    if given.has(MOTION["temperature_k"]):
+        raise ValueError(
+            f"{called['temperature_k']}: bare moments have no units for a temperature; give {momentum} alone"
+        )
+    if given.style == "key" and given.has(MOTION["angular_momentum"]):
+        raise ValueError(f"{momentum}: is that of a molecule; of a body it stands in [body]")
+    return _of_moments(given, asked) if named is None else _ordinary_body(named)
+
+
+def _momentum(given: Given, asked: BodyInput) -> Any:
+    """The angular momentum as it was given, of a body or of a molecule."""
+    return asked.angular_momentum if asked.angular_momentum is not None else given.of(MOTION["angular_momentum"])
+
+
+def _named_source(source: Any) -> NamedBody | None:
+    """The ordinary body of which a source is the name, and no file."""
+    from rotor.classical.bodies import BODIES
+
+    return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
+
+
+def _of_moments(given: Given, asked: BodyInput) -> Body:
+    from rotor.classical.tumble import COHERENT, SI
+
+    assert asked.moments is not None
+    typed = given.of(BODY["moments"])
+    text = typed if isinstance(typed, str) else ",".join(f"{one:g}" for one in asked.moments)
+    return Body(text, asked.moments, SI if asked.units == "SI" or in_si(typed) else COHERENT)
+
+
+def _ordinary_body(body: NamedBody) -> Body:
+    """An ordinary body in SI units: unless it is spun, one turn a second about the axis that it cannot keep."""
+    import numpy as np
+
+    from rotor.classical.gas.thermal_momentum import off_intermediate_axis
+    from rotor.classical.tumble import SI
+    from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
+
+    moments = np.array(body.moments_kg_m2)
+    size = TURN_RAD_PER_S * float(np.sort(moments)[1])
+    momentum = _three(off_intermediate_axis(moments, size, math.radians(TILT_DEGREES)))
+    middle = body.axes[int(np.argsort(moments)[1])]
+    source = f"one turn a second, {TILT_DEGREES:g} degrees off the intermediate axis, {middle}"
+    return Body(body.name, _three(moments), SI, body.axes, body, (momentum, source))
+
+
+def build(verb: Verb, given: Given, subject: Subject) -> TumbleRequest | DrivenRequest:
+    """The request of a molecule or a body: free, or under effects."""
+    motion = read_instance(MotionInput, given)
+    start = read_instance(BodyInput, given)
+    if given.style == "key" and start.angular_momentum is not None:
+        motion = replace(motion, angular_momentum=start.angular_momentum)
+    momentum = (BODY if given.style == "key" and "body" in subject.values else MOTION)["angular_momentum"]
+    names = {name: BODY[name].called(given.style) for name in ("moments", "angular_velocity", "attitude")}
+    with renaming(names | {"angular_momentum": momentum.called(given.style)}):
+        if motion.effects:
+            return _driven(given, subject, start, motion)
+        _refuse_without_effect(given)
+        return (
+            _of_body(given, subject, start, motion)
+            if "body" in subject.values
+            else _of_top(given, subject, start, motion)
+        )
+
+
+def _refuse_without_effect(given: Given) -> None:
+    """ValueError for inputs of a stepped motion that were given to a free one; scenes may have settings that are not used."""
+    for one in (BODY["attitude"], *(MOTION[name] for name in ("tolerance", "step", "order") if given.style != "key")):
+        if given.has(one):
+            raise ValueError(
+                f"{one.called(given.style)}: belongs to a motion under effects; give {MOTION['effects'].called(given.style)}, or leave "
+                "it out: a free one is exact"
+            )
+
+
+def _times(given: Given, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
+    """The times in the unit of the body."""
+    return None if motion.times is None else replace(MOTION["times"], reader=Grid(unit)).read(motion.times, given.style)
+
+
+def _of_body(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+    import numpy as np
+
+    from rotor.classical.tumble import TumbleRequest
+
+    body: Body = subject.values["body"]
+    chosen = _chosen(given, start, motion, np.array(body.moments), body.rate_unit) or body.start
+    if chosen is None:
+        if given.style == "key":
+            raise ValueError("body: give either angular_momentum or angular_velocity")
+        names = [
+            one.called(given.style) for one in (MOTION["angular_momentum"], BODY["moments"], BODY["angular_velocity"])
+        ]
+        raise ValueError(
+            f"{names[0]}: expected with {names[1]}: three components in the axes of the moments; or {names[2]}"
+        )
+    times = _times(given, motion, body.units.time)
+    request = TumbleRequest(body.moments, chosen[0], times, body.units, body.axes, chosen[1], body.named)
+    for text in request.notes:
+        subject.note(text)
+    return request
+
+
+def _of_top(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+    import numpy as np
+
+    from rotor.thermodynamics.thermal_tumble import thermal_tumble
+
+    top, times = subject.top, _times(given, motion, "ps")
+    in_hbar = start.angular_velocity is not None
+    scale = _UNITS_OF_MOLECULES if in_hbar else 1.0  # ħ for 1 rad/ps
+    chosen = _chosen(given, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps")
+    if chosen is None:
+        return thermal_tumble(top, temperature_k=motion.temperature_k, times_ps=times)
+    if given.has(MOTION["temperature_k"]):
+        fixed = (BODY["angular_velocity"] if in_hbar else MOTION["angular_momentum"]).called(given.style)
+        raise ValueError(
+            f"{MOTION['temperature_k'].called(given.style)} and {fixed}: give one of them; the first chooses |L|, the second fixes it"
+        )
+    return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
+
+
+def _chosen(given: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str) -> tuple[Three, str] | None:
+    """The angular momentum that was given, itself or by an angular velocity, and how; None where neither was."""
+    if start.angular_velocity is not None:
+        name = BODY["angular_velocity"].called(given.style)
+        return _momentum_of(start.angular_velocity, moments, unit, moments), f"given as an angular velocity ({name})"
+    if motion.angular_momentum is None:
+        return None
+    name = MOTION["angular_momentum"].called(given.style)
+    return _momentum_of(motion.angular_momentum, moments, "", None), f"given ({name})"
+
+
+def _momentum_of(value: Any, moments: Any, unit: str, factors: Any) -> Three:
+    """An angular momentum other than 0: of an angular velocity, by factors, or as it is given."""
+    from rotor.classical.euler import checked_momentum
+
+    name = "angular_momentum" if factors is None else "angular_velocity"
+    text = value if isinstance(value, str) else list(value)
+    try:
+        vector = _three(value, unit)
+        momentum = checked_momentum(vector if factors is None else factors * vector, moments)
+    except ValueError as error:
+        message = str(error)
+        raise ValueError(
+            f"{name}: " + (message if message.startswith(f"{text!r}") else f"{text!r}: {message}")
+        ) from None
+    if not momentum.any():
+        raise ValueError(f"{name}: {text!r}: a body at rest does not tumble; give a component that is not 0")
+    return _three(momentum)
+
+
+def _driven(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
+    from rotor.classical.driven import DrivenRequest
+
+    effects, times = MOTION["effects"].called(given.style), MOTION["times"].called(given.style)
+    if "body" not in subject.values:
+        names = [BODY[name].called(given.style) for name in ("moments", "body")]
+        raise ValueError(f"{effects}: acts on a body; give {names[0]} or {names[1]} instead of a molecule")
+    body: Body = subject.values["body"]
+    if motion.times is None:
+        raise ValueError(f"{times}: expected with {effects}, the start first: such as 0:10:101")
+    step = None
+    if motion.step is not None:
+        step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, given.style)
+    if given.has(MOTION["order"]) and step is None and given.style != "key":
+        names = [MOTION[name].called(given.style) for name in ("order", "step")]
+        raise ValueError(f"{names[0]}: is that of a splitting; give {names[1]} too")
+    spin, momentum = _spin_or_momentum(given, body, start, motion)
+    return DrivenRequest(
+        body.moments, _times(given, motion, body.units.time) or (), motion.effects, spin, momentum,
+        start.attitude or (1.0, 0.0, 0.0, 0.0), motion.tolerance, step, motion.order, body.units, body.axes, body.named,
+    )  # fmt: skip
+
+
+def _spin_or_momentum(
+    given: Given, body: Body, start: BodyInput, motion: MotionInput
+) -> tuple[Three | None, Three | None]:
+    """ω or L at the first time; a named body turns as it does without effects."""
+    if start.angular_velocity is not None:
+        return replace(BODY["angular_velocity"], reader=Custom(lambda one: _three(one, body.rate_unit))).read(
+            start.angular_velocity, given.style
+        ), None
+    if motion.angular_momentum is not None:
+        return None, replace(MOTION["angular_momentum"], reader=Custom(_three)).read(
+            motion.angular_momentum, given.style
+        )
+    if body.start is None:
+        names = [
+            one.called(given.style) for one in (BODY["angular_velocity"], BODY["moments"], MOTION["angular_momentum"])
+        ]
+        raise ValueError(f"{names[0]}: expected with {names[1]}, the angular velocity at the first time; or {names[2]}")
+    return None, body.start[0]
