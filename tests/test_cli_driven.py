@@ -142,8 +142,20 @@ def test_an_effect_of_one_file_reaches_command_scene_and_schema(folder):
     import sys
 
     toy = str(Path(__file__).with_name("toy_body_effect.py"))
-    words = ["tumble", "--moments", "1,2,4", "--omega", "0,0,0", "--times", "0,1,2", "--effect", "rising torque rate=0.5"]
-    ran = subprocess.run([sys.executable, toy, *words, "--json", "a.json", "--save-scene", "s.toml"], capture_output=True, text=True)
+    words = [
+        "tumble",
+        "--moments",
+        "1,2,4",
+        "--omega",
+        "0,0,0",
+        "--times",
+        "0,1,2",
+        "--effect",
+        "rising torque rate=0.5",
+    ]
+    ran = subprocess.run(
+        [sys.executable, toy, *words, "--json", "a.json", "--save-scene", "s.toml"], capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     assert "under rising torque" in ran.stdout
     spins = [row["w3"] for row in json.loads(Path("a.json").read_text())["motion"]]
