@@ -65,7 +65,7 @@ _KINDS: dict[str, dict[str, float]] = {
     },
     "dipole": {"D": 1.0, "debye": 1.0, "e*angstrom": DEBYE_PER_E_ANGSTROM, "C*m": 1.0 / DEBYE_C_M},
     "polarizability": {"angstrom3": 1.0, "Å3": 1.0, "bohr3": BOHR_RADIUS_ANGSTROM**3},
-    "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
+    "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "ms": 1e9, "s": 1e12, "min": 60e12, "h": 3600e12},
     "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
     "intensity": {"W/cm2": 1.0, "GW/cm2": 1e9, "TW/cm2": 1e12, "W/m2": 1e-4},
     "fluence": {"J/cm2": 1.0, "mJ/cm2": 1e-3, "J/m2": 1e-4},
@@ -79,12 +79,14 @@ _KINDS: dict[str, dict[str, float]] = {
         "turns/s": 2 * math.pi,
         "rad/ps": 1e12,
     },
-    "number": {"": 1.0, "%": 0.01},
+    "number": {"": 1.0},
+    "fraction": {"fraction": 1.0, "%": 0.01},
     "density": {"g/cm3": 1.0, "kg/m3": 1e-3},
     "speed": {"km/s": 1.0, "m/s": 1e-3, "cm/s": 1e-5},
     "column density": {"1/cm2": 1.0, "1/m2": 1e-4},
+    "angular momentum": {"ħ": 1.0},
     "rate": {"1/ps": 1.0, "1/fs": 1e3, "1/ns": 1e-3, "1/s": 1e-12},
-    "angle": {"deg": 1.0, "rad": 180 / math.pi},
+    "angle": {"deg": 1.0, "rad": 180 / math.pi, "arcmin": 1 / 60, "arcsec": 1 / 3600, "mas": 1e-3 / 3600},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
 _ALIASES = {
@@ -96,7 +98,7 @@ _ALIASES = {
     "g/cm^3": "g/cm3", "g/cm³": "g/cm3", "kg/m^3": "kg/m3", "kg/m³": "kg/m3",
     "cm-2": "1/cm2", "cm^-2": "1/cm2", "cm⁻²": "1/cm2", "/cm2": "1/cm2", "/cm^2": "1/cm2", "/cm²": "1/cm2", "1/cm²": "1/cm2",
     "m-2": "1/m2", "m^-2": "1/m2", "m⁻²": "1/m2", "/m2": "1/m2", "/m^2": "1/m2", "/m²": "1/m2", "1/m²": "1/m2",
-    "/ps": "1/ps", "ps-1": "1/ps", "/fs": "1/fs", "/ns": "1/ns", "/s": "1/s", "°": "deg", "degrees": "deg", "degree": "deg",
+    "/ps": "1/ps", "ps-1": "1/ps", "/fs": "1/fs", "/ns": "1/ns", "/s": "1/s", "hbar": "ħ", "°": "deg", '"': "arcsec", "″": "arcsec", "degrees": "deg", "degree": "deg",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
 LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
@@ -111,7 +113,7 @@ def _kind_of(unit: str) -> str:
 def _factor(unit: str, expected: str, text: str) -> float:
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_kind_of(expected)]
-    if not expected and unit not in table:
+    if expected in ("", "fraction") and unit not in table:
         raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
     if unit not in table:
         known = any(unit in other for other in _KINDS.values())

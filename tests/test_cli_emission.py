@@ -170,7 +170,7 @@ def test_several_molecules_add_their_depths(call, tmp_path):
         (("none.cat", "--band", "ALMA3"), "none.cat: no such file"),
         (("CO", "--band", "ALMA3", "--column", "-1"), "--column"),
         (("CO", "--band", "ALMA3", "--width", "0"), "--width"),
-        (("CO", "--band", "ALMA3", "--filling", "2"), "--filling = 2.0"),
+        (("CO", "--band", "ALMA3", "--filling", "2"), "--filling: 2: expected a number above 0 and up to 1"),
         (("CO", "--band", "ALMA3", "--velocity", "1e9"), "--velocity"),
         (("CO", "HCN", "--band", "ALMA3", "--isotope", "C=13C"), "--isotope: expected with a single molecule"),
         (("CO", "--range", "1:2000000GHz"), "choose a narrower range"),

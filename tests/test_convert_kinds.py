@@ -16,6 +16,7 @@ import rotor
 from rotor.cli import run
 from rotor.cli.convert import _note_of_options, top_with_errors
 from rotor.formats.spcat.names.named_parameters import named_parameter_file
+from rotor.formats.spcat.predict import predict_file
 from rotor.formats.spcat.text.egy import format_egy, read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import format_par, read_par
@@ -61,7 +62,8 @@ def test_what_is_written_is_read_as_the_same_top(source, tmp_path, capsys):
     assert read_par(format_par(back)).options == back.options
 
 
-def test_a_state_without_weights_beside_one_with_them_is_refused(tmp_path, capsys):
+def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path, capsys):
+    """WTPL and WTMN beside a total spin are the weights of the other nuclei, also where they are as 1 to 3."""
     given = copied("weights_of_states_i_tot", tmp_path)
     lines = [line for line in given.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
     given.write_text("".join(lines))
@@ -70,9 +72,32 @@ def test_a_state_without_weights_beside_one_with_them_is_refused(tmp_path, capsy
     beside = given.with_suffix(".var")
     file = read_par(beside)
     beside.write_bytes(format_par(replace(file, parameters=tuple(p for p in file.parameters if p.value != 1e-6))))
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
-    assert "I1 and I2 in a total spin: the spin weights" in capsys.readouterr().err  # they count the pair a second time
-    assert not (tmp_path / "x.toml").exists()
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    assert 'weights = "other nuclei"' in (tmp_path / "x.toml").read_text()
+    weights = rotor.read(tmp_path / "x.toml").states.weights
+    assert weights[1].rule == "none"
+    assert weights[0].to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
+
+    shutil.copy(given, tmp_path / "y.int")
+    assert run(["convert", str(tmp_path / "x.toml"), str(tmp_path / "y.var")]) == 0
+    first, again = (predict_file(tmp_path / name, as_spcat=True).catalogue for name in (given.name, "y.int"))
+    assert len(first) == len(again) > 200
+    for name in ("frequency_mhz", "lgint", "energy_lower_cm"):
+        assert getattr(again, name) == pytest.approx(
+            getattr(first, name), abs=1e-6
+        )  # 1 Hz: round-off of the constants in print
+    assert np.array_equal(again.g_upper, first.g_upper)
+
+
+def test_weights_of_other_nuclei_are_stated_beside_a_total_spin_alone(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text(
+        'constants = { A = 9e3, B = 3e3, C = 2.5e3 }\n[spins]\nweights = "other nuclei"\n[spins.14N]\nchi_aa = -4\n'
+    )
+    assert run(["levels", str(tmp_path / "a.toml")]) == 2
+    assert "expected a total spin of nuclei beside them" in capsys.readouterr().err
+    (tmp_path / "b.toml").write_text((tmp_path / "a.toml").read_text().replace("other nuclei", "all"))
+    assert run(["levels", str(tmp_path / "b.toml")]) == 2
+    assert "[spins], weights = 'all': expected one of other nuclei" in capsys.readouterr().err
 
 
 def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(tmp_path, capsys):

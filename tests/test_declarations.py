@@ -119,7 +119,7 @@ def _place():
 
 READERS = [
     (Quantity("K", above=0), "300", 300.0),
-    (Quantity(), "50 %", 0.5),
+    (Quantity(least=0, most=1), "50 %", 0.5),
     (Quantity("g/cm3"), "997 kg/m3", 0.997),
     (Quantity("km/s"), "8000 m/s", 8.0),
     (Quantity("1/cm2"), "1e18 /m2", 1e14),

@@ -30,3 +30,21 @@ def test_a_partition_function_far_from_the_sum(call, q, noted):
     code, _, err = call("spectrum", "water", "--q", q, "--jmax", "2")
     assert code == 0
     assert ("is given where the sum over the levels is 178" in err) == noted
+
+
+def test_the_sum_beside_a_given_q_is_made_once(call, folder, monkeypatch):
+    """The note needs it; the report, the JSON and the files need nothing more of it."""
+    sums, summed = [], rotor.thermodynamics.partition_function
+
+    def counting(*arguments, **options):
+        sums.append(arguments)
+        return summed(*arguments, **options)
+
+    monkeypatch.setattr("rotor.thermodynamics.partition_function", counting)
+    monkeypatch.setattr("rotor.spectra.lines.partition_function", counting)
+    code, _, err = call(
+        "spectrum", "water", "--q", "5", "--jmax", "2", "--json", "a.json", "--csv", "a.csv", "--cat", "a.cat"
+    )
+    assert code == 0
+    assert "the sum over the levels is 178" in err
+    assert len(sums) == 1

@@ -88,7 +88,7 @@ BAD = [
     (EmissionScene(molecules=[EmittingMolecule(source="CO")]), "conditions.range: expected a range or a band"),
     (
         EmissionScene(molecules=[EmittingMolecule(source="CO")], conditions=EmissionConditions(band="ALMA3", filling=2.0)),
-        "conditions.filling = 2.0",
+        "conditions.filling: 2: expected a number above 0 and up to 1",
     ),
 ]  # fmt: skip
 

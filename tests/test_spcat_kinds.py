@@ -220,3 +220,16 @@ def test_files_without_a_level_that_has_a_weight_are_refused():
     file = read_par(b"a case\n 1 0 0 0\nl -2 1 0 0 0 1 0 1\n 100 6000.0 0\n")
     with pytest.raises(ValueError, match="no level"):
         predict(file, IntensityFile("", Request(fend=3), (Dipole(1, 1.0),)))
+
+
+@pytest.mark.parametrize("str0", [-9.0, -5.5, -5.0])
+def test_the_lines_are_those_of_the_catalogue(str0):
+    """l-doubled states: a line of two levels of ±K stands twice in the catalogue, the others once, at every cut."""
+    parameters, asked = (
+        read(KINDS / "l_doubled_quad" / f"l_doubled_quad{s}") for read, s in ((read_par, ".var"), (read_int, ".int"))
+    )
+    made = predict(parameters, replace(asked, request=replace(asked.request, str0=str0)))
+    components = made.lines.levels.components
+    times = np.maximum(components[made.lines.upper], components[made.lines.lower])
+    assert set(times.tolist()) == {1, 2}
+    assert times.sum() == len(made.catalogue) > 20

@@ -9,6 +9,14 @@ BOX = "fluid", "water", "--molecules", "8", "--steps", "0", "--cutoff", "2", "--
 PULSE = "align", "OCS", "--points", "2", "--until", "9 ps", "--pulse"
 
 
+FIT_WATER = "fit", "lines.csv", "--start", "water", "--free", "A,B", "--poor-rms", "1e99", "--prior"
+LINES = """frequency_mhz,error_mhz,j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower
+22235.08,0,6,1,6,5,2,3
+183310.09,0,3,1,3,2,2,0
+325152.9,0,5,1,5,4,2,2
+556935.99,0.05,1,1,0,1,0,1
+"""
+
 READ = [  # a command with a unit, the same with the number in the unit of the option, and another that differs
     ((*BOX, "--density"), "0.997 g/cm3", "0.997", "0.5"),
     ((*BOX, "--density"), "997 kg/m3", "0.997", "0.5"),
@@ -28,13 +36,27 @@ READ = [  # a command with a unit, the same with the number in the unit of the o
     ((*PULSE,), "10 TW/cm2, 1000 fs", "1e13, 1", "1e12, 1"),
     (("thermo", "CO", "--temperature"), "100000 mK,300K", "100,300", "100,200"),
     (("gas", "N2", "--molecules", "20", "--times"), "0:1000fs:3", "0:1:3", "0:2:3"),
+    (("raman", "N2", "--jmax", "3", "--min-relative"), "10 %", "0.1", "0.5"),
+    (("isotopologues", "water", "--min-abundance"), "0.1 %", "0.001", "0.1"),
+    (("tumble", "water", "--angular-momentum"), "0,1,10 ħ", "0,1,10", "0,2,10"),
+    (("tumble", "--body", "book", "--times"), "0:100 ms:3", "0:0.1:3", "0:1:3"),
+    (("info", "water", "--temperature"), "100 K,300000 mK", "100,300", "100,200"),
+    (("info", "water", "--dipole-abc"), "0,1.8546 debye,0", "0,1.8546,0", "0,2,0"),
+    (FIT_WATER, "A=100 kHz", "A=0.1", "A=10"),
+    (
+        ("fit", "lines.csv", "--start", "water", "--free", "B", "--poor-rms", "1e99", "--default-error"),
+        "50 kHz",
+        "0.05",
+        "1",
+    ),
 ]
 
 
 @pytest.mark.parametrize(
     ("command", "typed", "plain", "other"), READ, ids=[f"{c[0]} {c[-1]} {t}" for c, t, _, _ in READ]
 )
-def test_a_number_takes_its_unit(call, command, typed, plain, other):
+def test_a_number_takes_its_unit(call, folder, command, typed, plain, other):
+    (folder / "lines.csv").write_text(LINES)
     answers = []
     for text in (typed, plain, other):
         code, out, err = call(*command, text, "--json", "-")
@@ -74,6 +96,15 @@ REFUSED = [
     (("gas", "water", "--times", "0:5V"), "--times: '0:5V': unit 'V' is not a known unit"),
     (("tumble", "water", "--times", "0:10V"), "--times: '0:10V': unit 'V' is not a known unit"),
     (("thermo", "water", "--temperature", "100:300V"), "--temperature: '100:300V'"),
+    (("spectrum", "water", "--min-lgint", "50 %"), "--min-lgint: '50 %': expected plain numbers here, without the unit '%'"),
+    (("spectrum", "water", "--q", "50 %"), "--q: '50 %': expected plain numbers here, without the unit '%'"),
+    (("emission", "CO", *WINDOW, "--redshift", "50 %"), "--redshift: '50 %': expected plain numbers here"),
+    (("zeeman", "HC3N", "--field", "1T", "--g", "50 %"), "--g: '50 %': expected plain numbers here"),
+    (("isotopologues", "water", "--min-abundance", "1 K"), "--min-abundance: '1 K': expected plain numbers here"),
+    (("accuracy", "s.toml", "--seconds", "20 V"), "--seconds: '20 V': unit 'V' is not a known unit"),
+    (("tumble", "water", "--angular-momentum", "0,1,9 V"), "--angular-momentum: '0,1,9 V': unit 'V' is not a known unit"),
+    (("identify", "a.csv", "--catalogue", "a.cat", "--velocity", "8 MHz"), "--velocity: '8 MHz': unit 'MHz' does not"),
+    (("identify", "a.csv", "--catalogue", "a.cat", "--model-error", "8 K"), "--model-error: '8 K': expected plain numbers"),
     (("levels", "water", "--jmax", "2 K"), "--jmax: '2 K': expected a whole number"),
     (("cat", "a.cat", "--range", "0:100V"), "--range: '0:100V': unit 'V' is not a known unit"),
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, note, show_facts, show_table
@@ -31,8 +32,8 @@ class Options:
     """The scene, and what is written."""
 
     scene: str = argument(..., help="A scene file.")
-    seconds: float = option(
-        120.0, metavar="S", help="Of the processor, for all sweeps together; what is beyond is left out."
+    seconds: str = option(
+        "120", metavar="S", help="Of the processor, for all sweeps together; what is beyond is left out."
     )
     csv: str | None = file_option(".csv", help="All settings with error and time.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Error against time, one panel a knob.")
@@ -42,20 +43,19 @@ class Options:
 @grouped()
 def command(context: typer.Context, options: Options) -> None:
     """What accuracy costs in a scene: each numerical knob swept, error against a finer reference, processor time."""
-    from rotor.checks import require_positive
     from rotor.scenes.scene_file import read_scene
 
-    require_positive("--seconds", options.seconds, "s")
+    seconds = inputs.positive("--seconds", options.seconds, "s")
     files = Files.of(options)
     scene = read_scene(options.scene)
-    found = _swept(scene, options)
+    found = _swept(scene, options, seconds)
     if "--plot" in files.paths and not found.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(found.remarks)}")
     content = _content(found, options, files, context.obj)
     deliver(files, _writers(found, scene, content), lambda: json_text(content), lambda: _show(scene, found))
 
 
-def _swept(scene: Scene, options: Options) -> WorkPrecision:
+def _swept(scene: Scene, options: Options, seconds: float) -> WorkPrecision:
     """The whole table; what there is of it is printed before an interrupt ends the command."""
     from rotor.scenes.accuracy_sweep import work_precision
 
@@ -65,7 +65,7 @@ def _swept(scene: Scene, options: Options) -> WorkPrecision:
             return work_precision(
                 scene,
                 folder=Path(options.scene).parent,
-                limit_seconds=options.seconds,
+                limit_seconds=seconds,
                 progress=show,
                 on_knob=so_far.append,
             )

@@ -49,7 +49,7 @@ class Options:
     width: str | None = option(None, metavar="W", help="Full width of the lines (km/s); estimated without.")
     background: str = option("2.725", metavar="T", help="Temperature behind the source (K).")
     redshift: float = option(0.0, metavar="Z", help="Redshift of the source.")
-    model_error: float = option(0.1, metavar="X", help="Error of the model as a fraction of the brightness.")
+    model_error: str = option("0.1", metavar="X", help="Error of the model as a fraction of the brightness.")
     most: int = option(60, "--most", metavar="N", help="Species at most.")
 
 
@@ -79,17 +79,17 @@ def command(context: typer.Context, options: Options, spectrum: SpectrumOptions,
             "--catalogue: expected a local catalogue ('rotor catalogue add'), a folder of .cat files, or a .cat file"
         )
     files = Files.of(outputs)
+    choices = IdentifyChoices(
+        velocity_km_s=_speed("--velocity", options.velocity),
+        fwhm_km_s=_speed("--width", options.width),
+        model_error=inputs.quantity("--model-error", options.model_error, "fraction"),
+        most_species=options.most,
+        size_arcsec=size_of(spectrum),
+    )
     observed = read_observed(options.file, spectrum, _range(options))
     beam = observed.beam_arcsec or beam_of(spectrum)
     width = None if beam is None else (beam[0] * beam[1]) ** 0.5
     sight = Sight(inputs.quantity("--background", options.background, "K"), width, options.redshift)
-    choices = IdentifyChoices(
-        velocity_km_s=_number("--velocity", options.velocity),
-        fwhm_km_s=_number("--width", options.width),
-        model_error=options.model_error,
-        most_species=options.most,
-        size_arcsec=size_of(spectrum),
-    )
     candidates = _candidates(options.catalogue, padded(observed, options.redshift))
     progress = (lambda name: print(f"\r{name[:60]:60s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
     found = identify(observed, candidates, sight, choices, progress=progress)
@@ -114,8 +114,8 @@ def _range(options: Options) -> tuple[float, float] | None:
     )
 
 
-def _number(name: str, text: str | None) -> float | None:
-    return None if text is None else inputs.parsed(name, text, float)
+def _speed(name: str, text: str | None) -> float | None:
+    return None if text is None else inputs.quantity(name, text, "km/s")
 
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:

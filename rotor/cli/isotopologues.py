@@ -31,7 +31,7 @@ Examples:
 class Options:
     """Which isotopologues are listed."""
 
-    min_abundance: float | None = option(
+    min_abundance: str | None = option(
         None,
         metavar="X",
         help=f"Least abundance in nature of those listed; {MIN_ABUNDANCE:g} unless others are asked for.",
@@ -54,7 +54,9 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each, and constants of spins if known."""
     files = Files.of(options)
     parent = inputs.read_top(given)
-    family = _family(parent, options.min_abundance, options.each or [], options.site or [])
+    least = options.min_abundance
+    abundance = None if least is None else inputs.quantity("--min-abundance", least, "fraction")
+    family = _family(parent, abundance, options.each or [], options.site or [])
     _tell(parent, family)
 
     content = {

@@ -123,9 +123,15 @@ class Quantity(Reader):
         """The number in `unit`."""
         if isinstance(given, bool) or not isinstance(given, str | int | float):
             raise ValueError(f"{given!r}: expected a number{' with a unit' if self.unit else ''}")
-        value = parse_quantity(given, self.unit)
+        value = parse_quantity(given, "fraction" if self.is_fraction else self.unit)
         self.check(value, given)
         return value
+
+    @property
+    def is_fraction(self) -> bool:
+        """Whether this is a plain number between 0 and 1, which may be given in percent."""
+        low, high = self.least if self.above is None else self.above, self.most if self.below is None else self.below
+        return not self.unit and low is not None and high is not None and 0 <= low < high <= 1
 
     def check(self, value: float, given: Any = None) -> None:
         """ValueError for a number out of bounds; given: what was typed."""

@@ -63,7 +63,7 @@ class LayerInput:
         common=True,
     )  # fmt: skip
     filling: float = declared(
-        1.0, Quantity(metavar="F"), "Part of the beam that the source fills", "conditions.filling"
+        1.0, Quantity(above=0, most=1, metavar="F"), "Part of the beam that the source fills", "conditions.filling"
     )
     velocity_km_s: tuple[float, ...] = declared(
         (0.0,), Each("km/s", metavar="V"), "Velocity, one for all or one each; receding positive, radio convention (km/s)",

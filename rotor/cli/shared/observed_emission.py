@@ -46,7 +46,7 @@ class ObservedOptions:
     catalogue: str | None = option(None, metavar="FILE", help="Local catalogue that SOURCE names species of.")
     free: str | None = option(None, metavar="LIST", help="Fitted of column, excitation, velocity, width, size.")
     shared: str | None = option(None, metavar="LIST", help="Fitted alike for all species: velocity,width.")
-    calibration: float = option(0.0, metavar="X", help="Error of the intensity scale, a fraction.")
+    calibration: str | None = option(None, metavar="X", help="Error of the intensity scale, a fraction.")
     reject: float | None = option(
         None, metavar="X", help="Fit near lines only, without channels X standard deviations above the model."
     )
@@ -175,8 +175,9 @@ def _fitted(
 ) -> SourceFit:
     from rotor.observed.fit import FitChoices, fit_source
 
+    calibration = inputs.quantity("--calibration", given.calibration or "0", "fraction")
     free = _names("--free", given.free) or ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
-    choices = FitChoices(free=free, shared=_names("--shared", given.shared), calibration=given.calibration)
+    choices = FitChoices(free=free, shared=_names("--shared", given.shared), calibration=calibration)
     if given.reject is None:
         return fit_source(spectrum, components, sight, choices)
     from rotor.observed.channels import fit_rejecting

@@ -50,7 +50,7 @@ def read_observed(file: str, given: SpectrumOptions, range_mhz: tuple[float, flo
         unit=given.unit,
         rest_mhz=None if given.rest is None else inputs.quantity("--rest", given.rest, "MHz"),
         frame=given.frame,
-        noise=None if given.noise is None else inputs.parsed("--noise", given.noise, float),
+        noise=None if given.noise is None else inputs.quantity("--noise", given.noise, ""),
         beam_arcsec=beam,
         row=given.row,
         pixel=None if given.pixel is None else tuple(int(one) for one in numbers("--pixel", given.pixel, 2, 2)),  # type: ignore[arg-type]
@@ -63,15 +63,21 @@ def read_observed(file: str, given: SpectrumOptions, range_mhz: tuple[float, flo
 
 def beam_of(given: SpectrumOptions) -> tuple[float, float] | None:
     """Both widths of the beam."""
+    from rotor.units import parse_grid
+
     if given.beam is None:
         return None
-    values = numbers("--beam", given.beam, 1, 2)
+    values = inputs.parsed(
+        "--beam", given.beam, lambda text: parse_grid(text, "arcsec").tolist() if ":" not in text else []
+    )
+    if not 1 <= len(values) <= 2:
+        raise ValueError(f"--beam {given.beam}: expected 1 or 2 numbers")
     return values[0], values[-1]
 
 
 def size_of(given: SpectrumOptions) -> float | None:
     """Width of the source."""
-    return None if given.size is None else inputs.parsed("--size", given.size, float)
+    return None if given.size is None else inputs.quantity("--size", given.size, "arcsec")
 
 
 def species_of(

@@ -21,7 +21,12 @@
     total = "I"                         # and last to the rest; quantum numbers I and F in place of F1 and F. Of two each has its
     chi_aa = -40.0                      # constants, of three on a threefold axis the first alone, or the first and the second together
 
-The spins are coupled in the order in which they stand here.
+The spins are coupled in the order in which they stand here. Spin weights beside a total spin are those of the other nuclei; where
+they are as large as those of the pair itself would be, such as 1 and 3 beside two protons (four protons in two pairs), [spins] says
+that they are not:
+
+    [spins]
+    weights = "other nuclei"
 """
 
 from __future__ import annotations
@@ -35,7 +40,8 @@ from rotor.tops.spins.spin_constants import SpinConstants, is_isotope, parse_spi
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
-_OF_TABLE = ("unit", "source", "unverified")
+_OF_TABLE = ("unit", "source", "unverified", "weights")
+OTHER_NUCLEI = "other nuclei"
 _OF_SPIN = ("spin", "atom", "total", "source", "unverified")
 
 
@@ -62,8 +68,9 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
     sources = {name: part.text("source") for name, part in parts.items() if "source" in part.content}
     atoms = {name: number for name, part in parts.items() if (number := _atom(part, name, molecule)) is not None}
     totals = {name: part.text("total") for name, part in parts.items() if "total" in part.content}
+    weights_of_others = table.choice("weights", (OTHER_NUCLEI,)) is not None
     try:
-        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms, totals)
+        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms, totals, weights_of_others)
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
@@ -110,7 +117,8 @@ def spin_tables(
     if constants is None:
         return {}
     marked = {"source": constants.source or None, "unverified": True if "spins" in unverified else None}
-    tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
+    weights = OTHER_NUCLEI if constants.weights_of_others else None
+    tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz", "weights": weights}}
     for name, twice in constants.twice.items():
         tables[name] = {"spin": None if is_isotope(name, twice) else spin_text(twice)}
         tables[name] |= {

@@ -22,7 +22,6 @@ from rotor.formats.spcat.file_lines import (
     as_level_list,
     lines_of,
     transitions_of,
-    within,
 )
 from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of
@@ -116,9 +115,7 @@ def predicted(
     notes += notes_of_diagonal(groups, parameters.options[0].diag, _highest_n(parameters, request))
     if full_basis:
         notes += notes_of_full_basis(states_of(parameters), _highest_n(parameters, request))
-    if all((levels.components == 1).all() for _, levels in solved):
-        transitions = [own.found for own in listed]  # which are within the limits
-    lines = _lines(parameters, solved, transitions, form, request, q)
+    lines = _lines(parameters, solved, [own.found for own in listed], form, request, q)
     with_spread = [one for one in spreads if one is not None]
     if with_spread:
         lines = replace(lines, given_spread=np.concatenate(with_spread))
@@ -269,12 +266,12 @@ def _lines(
     request: Request,
     q: float,
 ) -> Lines:
-    """The lines as this package has them: one table of levels for all groups, one line for both components of ±K."""
+    """The lines of the catalogue as this package has them: one table of levels for all groups, one line for both components of ±K."""
     starts = np.cumsum([0, *(len(levels) for _, levels in solved[:-1])]).astype(np.int32)
     levels = _joined(solved, form)
     t = request.temperature_k
     above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
-    lines = Lines(
+    return Lines(
         top=_shown(parameters, solved[0][0]),
         levels=levels,
         frequency_mhz=end_to_end([each.frequency_mhz for each in transitions]),
@@ -285,11 +282,7 @@ def _lines(
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
         given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
-    )
-    if (levels.components == 1).all():
-        return lines.sorted()
-    chosen = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
-    return (lines if chosen.all() else lines.where(chosen)).sorted()
+    ).sorted()
 
 
 def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:

@@ -107,7 +107,8 @@ def _weights_of_states(top: Top) -> list[SpinWeights]:
 def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
     """ValueError where the spin weights beside a total spin of two nuclei count these two.
 
-    With a geometry that is known. Without one, weights that are those of the two nuclei alone are taken to be theirs.
+    With a geometry that is known. Without one, weights that are those of the two nuclei alone are taken to be theirs, unless they are
+    stated to be those of the others.
     """
     from rotor.tops.spins.spin_statistics import weights_of
 
@@ -116,11 +117,11 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
     all_nuclei = None if top.molecule is None else weights_of(top.molecule)
     if weights.with_pair(twice) == all_nuclei:
         return
-    if weights == all_nuclei or weights.is_of_pair(twice):
+    if weights == all_nuclei or (weights.is_of_pair(twice) and not top.spin_constants.weights_of_others):
         raise ValueError(
             f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
             f"{(twice + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, "
-            "0 to others"
+            '0 to others; where these are those of the others, say so in a file: weights = "other nuclei" in [spins]'
         )
 
 

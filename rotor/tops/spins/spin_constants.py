@@ -34,8 +34,9 @@ class SpinConstants:
 
     twice: twice every spin, by its name. uncertainties: in MHz, of the constants that have one. sources: of single spins.
     atoms: the numbers of the nuclei in the geometry, counted from 1, by spin. totals: the name of the total spin, such as "I", of two
-    or three equivalent nuclei that are coupled to it first, by spin. ValueError for a spin that is none, and for constants of a spin
-    that is not listed.
+    or three equivalent nuclei that are coupled to it first, by spin. weights_of_others: whether the spin weights of the top are
+    stated to be those of the nuclei beside the total spin. ValueError for a spin that is none, and for constants of a spin that is
+    not listed.
     """
 
     values: Mapping[str, float]
@@ -45,6 +46,7 @@ class SpinConstants:
     sources: Mapping[str, str] = field(default_factory=dict)
     atoms: Mapping[str, int] = field(default_factory=dict)
     totals: Mapping[str, str] = field(default_factory=dict)
+    weights_of_others: bool = False
 
     def __post_init__(self) -> None:
         values, errors = plain_elements(self.values, self.uncertainties)
@@ -63,6 +65,8 @@ class SpinConstants:
                     "another name"
                 )
         _refuse_totals(self.totals, self.twice)
+        if self.weights_of_others and not self.totals:
+            raise ValueError("spin weights of the other nuclei: expected a total spin of nuclei beside them")
         for name in self.values:
             for spin in spins_of(name):
                 if spin not in self.twice:
@@ -82,7 +86,7 @@ class SpinConstants:
 
     def __reduce__(self) -> tuple[type[SpinConstants], tuple[Any, ...]]:
         plain = (dict(self.uncertainties), dict(self.sources), dict(self.atoms), dict(self.totals))
-        return type(self), (dict(self.values), dict(self.twice), self.source, *plain)
+        return type(self), (dict(self.values), dict(self.twice), self.source, *plain, self.weights_of_others)
 
     def of(self, spin: str) -> dict[str, float]:
         """The constants of one spin alone in every state, by name without the spin.

@@ -332,8 +332,12 @@ def _spins(
                 spreads[symbol + rest] = error
     if not sizes:
         return None
-    totals = dict.fromkeys(called[len(called) - equivalent :], "I")
-    return SpinConstants(values, dict(zip(called, sizes, strict=True)), uncertainties=spreads, totals=totals)
+    totals = dict.fromkeys(called[len(called) - equivalent :], "I") if equivalent else {}
+    twice, of_others = (
+        dict(zip(called, sizes, strict=True)),
+        equivalent == 2,
+    )  # whose functions WTPL and WTMN never count
+    return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=of_others)
 
 
 def _of_one(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
