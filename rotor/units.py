@@ -98,7 +98,8 @@ _ALIASES = {
     "g/cm^3": "g/cm3", "g/cm³": "g/cm3", "kg/m^3": "kg/m3", "kg/m³": "kg/m3",
     "cm-2": "1/cm2", "cm^-2": "1/cm2", "cm⁻²": "1/cm2", "/cm2": "1/cm2", "/cm^2": "1/cm2", "/cm²": "1/cm2", "1/cm²": "1/cm2",
     "m-2": "1/m2", "m^-2": "1/m2", "m⁻²": "1/m2", "/m2": "1/m2", "/m^2": "1/m2", "/m²": "1/m2", "1/m²": "1/m2",
-    "/ps": "1/ps", "ps-1": "1/ps", "/fs": "1/fs", "/ns": "1/ns", "/s": "1/s", "hbar": "ħ", "°": "deg", '"': "arcsec", "″": "arcsec", "degrees": "deg", "degree": "deg",
+    "/ps": "1/ps", "ps-1": "1/ps", "/fs": "1/fs", "/ns": "1/ns", "/s": "1/s", "°": "deg", "degrees": "deg", "degree": "deg",
+    "hbar": "ħ", "″": "arcsec",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
 LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules

@@ -19,22 +19,36 @@ NO_OMEGA = (np.nan, np.nan, np.nan)  # torques that look at it are refused befor
 
 
 @njit(cache=True, nogil=True)
-def kicked(form: Any, inverse: Floats, axes: Any, fractions: Floats, times: Floats, counts: Any, path: Floats) -> None:
-    """Fill path (t, n, 7) from its first rows, with counts (t - 1,) steps of equal length between neighbouring times.
+def kicked(
+    form: Any,
+    inverse: Floats,
+    axes: Any,
+    fractions: Floats,
+    times: Floats,
+    counts: Any,
+    path: Floats,
+    state: Any,
+    place: Any,
+) -> None:
+    """Steps of equal length, counts (t - 1,) between neighbouring times, into path (t, n, 7): those of one place.
 
     form: codes, parameters, inner momentum. inverse, axes (n, 3): inverse moments; (outer, inner, sphere) of `strang.py`.
+    state: rows (n, 7), what rounding has left out of them (n, 7), torques (n, 3); changed in place, so that another call goes on from
+    it. place: intervals from the first to before the last, steps of each from the first to before the last, at most those it has.
     """
     codes, parameters, inner = form
+    rows, carry, torques = state
     turning = inner[0] != 0.0 or inner[1] != 0.0 or inner[2] != 0.0
-    row, lost, one = np.empty(7), np.zeros(7), np.ones(1)
-    for body in range(path.shape[1]):
-        for i in range(7):  # component by component: assigning slices takes seconds to compile
-            row[i], lost[i] = path[0, body, i], 0.0
+    one = np.ones(1)
+    for body in range(rows.shape[0]):
+        row, lost = rows[body], carry[body]
         i0, i1, i2 = inverse[body, 0], inverse[body, 1], inverse[body, 2]
-        for k in range(counts.shape[0]):
+        torque = (torques[body, 0], torques[body, 1], torques[body, 2])
+        for k in range(place[0], place[1]):
             step = (times[k + 1] - times[k]) / counts[k]
-            torque = torque_at(codes, parameters, times[k], (row[3], row[4], row[5], row[6]), NO_OMEGA)
-            for s in range(counts[k]):
+            if place[2] == 0:
+                torque = torque_at(codes, parameters, times[k], (row[3], row[4], row[5], row[6]), NO_OMEGA)
+            for s in range(place[2], min(place[3], counts[k])):
                 time = times[k] + s * step
                 for fraction in fractions:
                     h = fraction * step
@@ -48,5 +62,6 @@ def kicked(form: Any, inverse: Floats, axes: Any, fractions: Floats, times: Floa
                     time += h
                     torque = torque_at(codes, parameters, time, (row[3], row[4], row[5], row[6]), NO_OMEGA)
                     kick_body(row, lost, torque, half)
-            for i in range(7):
+            for i in range(7):  # component by component: assigning slices takes seconds to compile
                 path[k + 1, body, i] = row[i]
+        torques[body, 0], torques[body, 1], torques[body, 2] = torque

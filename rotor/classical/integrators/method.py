@@ -15,7 +15,7 @@ Each has its page (module) with cost and source. What accuracy costs with each o
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -28,6 +28,20 @@ from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.compositions import fractions
 from rotor.classical.system import System, system_of
 from rotor.geometry.rotations import IDENTITY, normalised
+
+STEPS_OF_A_CALL = 1_000_000  # of order 2 of one body: some tenths of a second, in which a compiled call obeys no signal
+
+
+def steps_of_a_call(work: int) -> int:
+    """How many steps a compiled call takes, each of which is `work` steps of order 2 of one body."""
+    return max(1, STEPS_OF_A_CALL // max(work, 1))
+
+
+def pieces(steps: int, work: int) -> Iterator[int]:
+    """Numbers of steps of the compiled calls that make up `steps`; the calls between which a signal is obeyed."""
+    most = steps_of_a_call(work)
+    for first in range(0, steps, most):
+        yield min(most, steps - first)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from rotor.arrays import Floats
 from rotor.classical.euler import kinetic_energy
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.integrators.compositions import fractions
-from rotor.classical.integrators.method import KickDrift
+from rotor.classical.integrators.method import KickDrift, pieces
 from rotor.classical.system import acting_inverse
 from rotor.geometry.rotations import conjugate, multiply
 
@@ -92,7 +92,10 @@ class MoserVeselov(KickDrift):
             modified = exact_modified_moments(acting, momentum, step)
         else:
             modified = modified_moments(acting, momentum, step, self.order or 8)
-        failed = moser_veselov(state, carry, _on_grid(modified / (0.5 * step)), steps)
+        scaled = _on_grid(modified / (0.5 * step))
+        failed = next(
+            (bad for part in pieces(steps, len(state)) if (bad := moser_veselov(state, carry, scaled, part)) >= 0), -1
+        )
         if failed >= 0:
             raise ValueError(
                 f"the Moser-Veselov step {step:g} has no solution near the motion for moments "

@@ -12,13 +12,14 @@ NO_SQUISH of T. F. Miller et al., J. Chem. Phys. 116, 8649 (2002).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.classical.integrators.method import Composed
+from rotor.classical.integrators.method import Composed, pieces, steps_of_a_call
 from rotor.classical.system import System, acting_inverse
 from rotor.classical.torque_form import kernels_are_compiled
 
@@ -62,7 +63,9 @@ class RotationSplitting(Composed):
 
         if np.any(moments == 0.0):
             raise ValueError("RotationSplitting cannot step a linear rotor; SymmetricTopSplitting does, exactly")
-        rotations(state, carry, acting_inverse(moments), step, self.kick_fractions if whole else _BASE, steps)
+        inverse, gammas = acting_inverse(moments), self.kick_fractions if whole else _BASE
+        for part in pieces(steps, len(state) * len(gammas)):
+            rotations(state, carry, inverse, step, gammas, part)
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,10 @@ class SymmetricTopSplitting(Composed):
         from rotor.classical.integrators._driven_kernels import kicked
 
         inverse = system.start_acting
-        kicked(system.compiled, inverse, turned_axes(inverse), self.kick_fractions, times, counts, path)
+        forms = system.compiled, inverse, turned_axes(inverse), self.kick_fractions
+        state = path[0].copy(), np.zeros_like(path[0]), np.zeros((path.shape[1], 3))
+        for place in _places(counts, steps_of_a_call(path.shape[1] * len(self.kick_fractions))):
+            kicked(*forms, times, counts, path, state, place)
         return True
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
@@ -127,7 +133,19 @@ class SymmetricTopSplitting(Composed):
 
         inverse = acting_inverse(moments)
         gammas = self.kick_fractions if whole else _BASE
-        symmetric(state, carry, inverse, turned_axes(inverse), step, gammas, steps)
+        for part in pieces(steps, len(state) * len(gammas)):
+            symmetric(state, carry, inverse, turned_axes(inverse), step, gammas, part)
+
+
+def _places(counts: NDArray[np.int64], most: int) -> Iterator[tuple[int, int, int, int]]:
+    """Intervals from the first to before the last, and steps of each likewise, of calls of at most about `most` steps."""
+    if not counts.size:
+        return
+    several = max(1, most // int(counts.max()))  # intervals of a call
+    for k in range(0, len(counts), several):
+        longest = int(counts[k : k + several].max())
+        for first in range(0, longest, most):
+            yield k, min(k + several, len(counts)), first, first + most
 
 
 def turned_axes(inverse: Floats) -> NDArray[np.int64]:
