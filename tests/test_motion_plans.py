@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rotor.classical.driven import answer_driven
@@ -77,3 +80,27 @@ def test_steps_of_a_body_that_is_spun_up_are_expected_to_grow(monkeypatch):
     monkeypatch.setattr(motion_steps, "MORE_COMPILED", 0)
     monkeypatch.setattr(motion_steps, "ENOUGH_STEPS", 10)
     assert 0.5 < motion_steps.expected_steps(request) / answer_driven(request).motion.steps < 2.0
+
+
+@pytest.mark.parametrize("moments", ["6e-13, 0.6, 1.0", "1e-8, 1.0, 1.0"])
+def test_a_body_that_drag_stops_at_once_is_planned_by_its_first_moments(call, folder, moments, recwarn):
+    """The first part of a plan was a twentieth of the time, in which drag on a thin axis takes 1e9 steps: it hung."""
+    (folder / "thin.toml").write_text(
+        f'schema = 1\nkind = "tumble"\n[body]\nmoments = [{moments}]\nangular_velocity = [1.0, 1.0, 1.0]\n'
+        '[conditions]\ntimes = "0:10:101"\n[[effects]]\neffect = "linear drag"\ncoefficients = [0.01, 0.02, 0.01]\n'
+    )
+    start = time.process_time()
+    code, out, err = call("plan", "thin.toml")
+    assert (code, err) == (0, "")
+    assert time.process_time() - start < 20.0  # s; kernels may have to be compiled
+    steps = int(re.search(r"(\d{5,}) steps each", " ".join(out.split()))[1])
+    assert steps > 1e6
+    assert len(recwarn) == 0
+
+
+def test_an_undefined_error_estimate_shortens_the_step():
+    """NaN counted as an error of 0, and the step was taken."""
+    from rotor.classical.integrators.lie_runge_kutta import _error
+
+    slopes = np.full((12, 1, 6), np.nan)
+    assert np.isnan(_error(slopes, 0.1, np.ones(12), np.ones(12)))

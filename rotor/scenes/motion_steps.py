@@ -10,6 +10,10 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from rotor.classical.system import system_of
+
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
 
@@ -35,8 +39,6 @@ def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenReque
 
 def is_compiled(request: DrivenRequest) -> bool:
     """Whether the steps of a motion run compiled: all of its effects state a compiled form."""
-    from rotor.classical.system import system_of
-
     return system_of(request.moments, request.effects).compiled is not None
 
 
@@ -56,15 +58,28 @@ def steps_of(request: DrivenRequest, share: float) -> int:
 def first_share(request: DrivenRequest) -> float:
     """The share of the time of a motion by which the rest is judged: a twentieth, or less where that takes many steps already.
 
-    A body that is thin about the axis about which it turns takes 1e13 steps in a time in which others take ten: parts grow from about a
-    radian until one takes enough steps.
+    A body that is thin about the axis about which it turns takes 1e13 steps in a time in which others take ten, under drag about it
+    too: parts grow from about a radian, or the time in which a component of L changes by its size, until one takes enough steps.
     """
-    span, enough = abs(request.times[-1] - request.times[0]), 5 * ENOUGH_STEPS
-    fastest = max(abs(component / moment) for component, moment in zip(request.momentum, request.moments, strict=True))
+    span, enough, fastest = abs(request.times[-1] - request.times[0]), 5 * ENOUGH_STEPS, _fastest_rate(request)
     share = min(1 / BEGINNINGS, 1.0 / (fastest * span) if fastest > 0.0 else SHORTEST_SHARE)
     while share < 1 / BEGINNINGS and steps_of(request, share) < enough:
         share = min(4.0 * share, 1 / BEGINNINGS)
     return share
+
+
+def _fastest_rate(request: DrivenRequest) -> float:
+    """The largest angular velocity about an axis at the start, or rate at which a torque changes a component of L there."""
+    system = system_of(np.array([request.moments]), request.effects)
+    momentum, attitude, time = np.array([request.momentum]), np.array([request.attitude]), request.times[0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        omega = system.omega(time, momentum, attitude)
+        rates = np.abs(omega)
+        if system.torques:
+            torque = np.broadcast_to(system.torque(time, attitude, omega), momentum.shape)
+            change = np.divide(torque, momentum, out=np.zeros_like(momentum), where=momentum != 0.0)
+            rates = np.maximum(rates, np.abs(change))
+    return float(np.nan_to_num(rates, posinf=np.finfo(float).max).max())
 
 
 def expected_steps(request: DrivenRequest) -> int:

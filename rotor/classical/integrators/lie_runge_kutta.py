@@ -181,7 +181,7 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats) -> float:
     e5 = np.sum(np.tensordot(fifth, slopes, axes=1) ** 2, axis=-1)
     e3 = np.sum(np.tensordot(third, slopes, axes=1) ** 2, axis=-1)
     both = np.sqrt(e5 + 0.01 * e3)
-    return float(np.max(abs(h) * np.divide(e5, both, out=np.zeros_like(both), where=both > 0.0)))
+    return float(np.max(abs(h) * np.divide(e5, both, out=np.zeros_like(both), where=both != 0.0)))  # NaN stays NaN
 
 
 def _factor(error: float) -> float:

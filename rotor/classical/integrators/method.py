@@ -135,7 +135,8 @@ def integrate(
     system = system_of(np.broadcast_to(moments, (*shape, 3)), effects)
     m0 = np.broadcast_to(momentum0, (*shape, 3)).reshape(-1, 3)
     q0 = np.broadcast_to(attitude0, (*shape, 4)).reshape(-1, 4)
-    momentum, attitude, steps = method.states(system, m0, q0, times)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+        momentum, attitude, steps = method.states(system, m0, q0, times)
     _check_finite(momentum, times, method)
     omega, energy = _omega_and_energy(system, times, momentum, attitude)
     momentum, attitude, omega, energy = (_bodies_first(a, shape) for a in (momentum, attitude, omega, energy))
