@@ -394,7 +394,7 @@ def _of_top(given: Given, subject: Subject, start: BodyInput, motion: MotionInpu
     top, times = subject.top, _times(given, motion, "ps")
     in_hbar = start.angular_velocity is not None
     scale = _UNITS_OF_MOLECULES if in_hbar else 1.0  # ħ for 1 rad/ps
-    chosen = _chosen(given, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps")
+    chosen = _chosen(given, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps", "ħ")
     if chosen is None:
         return thermal_tumble(top, temperature_k=motion.temperature_k, times_ps=times)
     if given.has(MOTION["temperature_k"]):
@@ -405,7 +405,9 @@ def _of_top(given: Given, subject: Subject, start: BodyInput, motion: MotionInpu
     return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
 
 
-def _chosen(given: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str) -> tuple[Three, str] | None:
+def _chosen(
+    given: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
+) -> tuple[Three, str] | None:
     """The angular momentum that was given, itself or by an angular velocity, and how; None where neither was."""
     if start.angular_velocity is not None:
         name = BODY["angular_velocity"].called(given.style)
@@ -413,7 +415,7 @@ def _chosen(given: Given, start: BodyInput, motion: MotionInput, moments: Any, u
     if motion.angular_momentum is None:
         return None
     name = MOTION["angular_momentum"].called(given.style)
-    return _momentum_of(motion.angular_momentum, moments, "", None), f"given ({name})"
+    return _momentum_of(motion.angular_momentum, moments, momentum_unit, None), f"given ({name})"
 
 
 def _momentum_of(value: Any, moments: Any, unit: str, factors: Any) -> Three:
