@@ -135,6 +135,23 @@ class SolvedBlocks:
             slopes[chosen] = (linear.values[:, entries] @ density).real.T
         return slopes
 
+    def slopes_of(self, elements: Elements, levels: Ints) -> Floats:
+        """⟨ψ|O|ψ⟩ (levels, operators) of the levels at these rows, of Hermitian operators between the functions of these blocks."""
+        linear = self.linear
+        slopes = np.zeros((len(levels), len(elements.values)))
+        blocks, entry_blocks = linear.block[levels], linear.block[elements.rows]
+        order = np.argsort(entry_blocks, kind="stable")
+        for block in np.unique(blocks).tolist():
+            chosen = np.flatnonzero(blocks == block)
+            _, vectors = self.vectors(block)
+            vectors = vectors[:, linear.rank[levels[chosen]]]
+            first, last = np.searchsorted(entry_blocks[order], [block, block + 1])
+            entries = order[first:last]
+            rows, columns = linear.rank[elements.rows[entries]], linear.rank[elements.columns[entries]]
+            density = vectors[rows].conj() * vectors[columns]
+            slopes[chosen] = (elements.values[:, entries] @ density).real.T
+        return slopes
+
     @cached_property
     def _places(self) -> dict[int, tuple[int, int]]:
         block = self.linear.block

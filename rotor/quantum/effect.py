@@ -113,10 +113,13 @@ class QuantumEffect(ABC):
         """Moments that make lines besides plain dipoles, such as those of a spin."""
         return ()
 
-    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Any:
+    def solve(
+        self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool, below_mhz: float
+    ) -> Any:
         """Levels of all effects together where this one needs functions of its own; None where the functions of the rotation serve.
 
-        Without vectors the levels serve sums over states: all that the functions have, whose names may be those of others.
+        Without vectors the levels serve sums over states: all that the functions have, whose names may be those of others; those above
+        `below_mhz` may be left out.
         """
         return None
 

@@ -82,7 +82,7 @@ def solve_levels(
                 f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.api.stark_map`"
             )
     for effect in effects:
-        levels: Levels | None = effect.solve(top, effects, jmin, jmax, vectors)
+        levels: Levels | None = effect.solve(top, effects, jmin, jmax, vectors, below_mhz)
         if levels is not None:
             return levels
     if any(effect.spins(top) for effect in effects):

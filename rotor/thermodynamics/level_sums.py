@@ -49,6 +49,7 @@ MOST_J_DISTORTED = {
 HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
 AT_WORST = 0.1  # estimated relative error above which a sum is refused
+HIGHEST_KT_OF_TORSION = 30.0  # the same with internal rotation: e⁻³⁰ of 10⁷ states is 1e-6 of one
 LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels that do not exist may lie below the lowest that does; e³⁰⁰ is enough
 ENDLESS = 1e150  # stands for a tail that is not known because the terms still grow
 NOT_SUMMED = -1  # stands for J max where the classical limit was taken
@@ -237,9 +238,10 @@ class _Ladder:
 
     def reach(self, hottest_k: float) -> None:
         """Levels that do not count at this temperature, and J that are not solved yet, are left out from here on."""
-        if self._rigid:
+        if self._rigid or self.top.internal_rotation is not None:
             ground = max(energy for energy, _ in self.ground)
-            self._below_mhz = (ground + HIGHEST_KT * hottest_k) * units.MHZ_PER_K
+            highest = HIGHEST_KT if self._rigid else HIGHEST_KT_OF_TORSION
+            self._below_mhz = (ground + highest * hottest_k) * units.MHZ_PER_K
 
     def at(self, j: int) -> Shell:
         """The levels of one J."""

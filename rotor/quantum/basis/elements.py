@@ -29,6 +29,11 @@ class Elements:
         matrix[self.rows, self.columns] = self.values[operator]
         return matrix
 
+    def between(self, functions: NDArray[np.bool_]) -> Elements:
+        """The elements between chosen functions (count,)."""
+        here = functions[self.rows] & functions[self.columns]
+        return Elements(self.count, self.rows[here], self.columns[here], self.values[:, here])
+
 
 def merged(count: int, rows: Ints, columns: Ints, values: NDArray[Any]) -> Elements:
     """Elements with repeated places added, and places that are zero to round-off in every operator left out."""

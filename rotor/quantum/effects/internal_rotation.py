@@ -9,6 +9,7 @@ n_v functions are the basis of the rotation (`rotor.quantum.internal_rotation.co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Self
@@ -47,7 +48,9 @@ class InternalRotation(QuantumEffect):
 
         return species_splitting(top, self.constants, j)
 
-    def solve(self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool) -> Levels:
+    def solve(
+        self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool, below_mhz: float = math.inf
+    ) -> Levels:
         """Levels of both species with v_t up to the highest of the constants; without vectors those of all n_v torsional functions.
 
         Raises ValueError for effects that have no elements between torsional functions.
@@ -64,5 +67,6 @@ class InternalRotation(QuantumEffect):
             return hyperfine_levels(top, self.constants, tuple(effects), jmin, jmax)
         from rotor.quantum.internal_rotation.levels import energies_alone, torsion_rotation_levels
 
-        solve = torsion_rotation_levels if vectors else energies_alone
-        return solve(top, self.constants, tuple(effects), jmin, jmax)
+        if vectors:
+            return torsion_rotation_levels(top, self.constants, tuple(effects), jmin, jmax)
+        return energies_alone(top, self.constants, tuple(effects), jmin, jmax, below_mhz)

@@ -169,11 +169,11 @@ class _Tables:
 
     def __init__(self, torsion: ContractedTorsion) -> None:
         self._torsion = torsion
-        self._known: dict[tuple[int, int], Floats] = {}
+        self._known: dict[tuple[Operator | None, int], Floats] = {}
 
     def of(self, operator: Operator | None, step: int) -> Floats:
         """⟨K + step, t'|o|K t⟩ as (K, t', t)."""
-        key = id(operator), step
+        key = operator, step
         if key not in self._known:
             unit = operator is None and step == 0
             size = self._torsion.count

@@ -91,7 +91,7 @@ class HyperfineBlock(MomentBlock):
         """∂E/∂c (n, names) of the torsion-rotation levels that name the states; constants of spins count for nothing."""
         known = list(self.species.model.values)
         rows = self.species.quanta[self.sector]["row"][self.states]
-        slopes = self.species.levels.solved.slopes(rows) @ self.species.model.jacobian
+        slopes = self.species.levels.slopes(rows) @ self.species.model.jacobian
         return np.column_stack([slopes[:, known.index(n)] if n in known else np.zeros(len(rows)) for n in names])
 
 
@@ -232,7 +232,7 @@ def _species(
 ) -> SpeciesHyperfine:  # fmt: skip
     """All states of one species with N in a range."""
     blocks = model.blocks(sigma, n_range[1], jmin=n_range[0], count=constants.functions)
-    levels = blocks.solve(model.coefficients, constants.vt_max, constants.names == "energy")
+    levels = blocks.solve_once(model.coefficients, constants.vt_max, constants.names == "energy")
     space = _rotation_space(levels, nuclei, model.has_plane)
     quanta = _rotation_quanta(levels, space)
     for i, (nucleus, name) in enumerate(zip(nuclei, names, strict=True)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -53,7 +54,7 @@ class SpeciesMoments:
     def slopes(self, rows: Ints, names: Sequence[str]) -> Floats:
         """∂E/∂c (rows, names) of levels at rows of the solved blocks."""
         known = list(self.model.values)
-        slopes = self.levels.solved.slopes(rows) @ self.model.jacobian
+        slopes = self.levels.slopes(rows) @ self.model.jacobian
         return np.asarray(slopes[:, [known.index(name) for name in names]])
 
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
@@ -159,7 +160,7 @@ def torsion_rotation_levels(
     quanta: dict[str, list[NDArray[Any]]] = {}
     start = 0
     for name, sigma in SPECIES.items():
-        species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve(
+        species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         made = _blocks(species, model, start, 1 if sigma == 0 else 2)
@@ -177,21 +178,29 @@ def torsion_rotation_levels(
 
 
 def energies_alone(
-    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
+    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int,
+    below_mhz: float = math.inf,
 ) -> Levels:
-    """The energies of all n_v torsional functions, for sums over states: J is right, v_t, Ka and Kc are those of a function."""
+    """The energies of all n_v torsional functions, for sums over states: J is right, v_t, Ka and Kc are those of a function.
+
+    Functions that lie above `below_mhz` with all that they couple to are left out.
+    """  # fmt: skip
     _refuse_axes(top)
     model, pieces, energies = ram_model(top, constants), [], []
     for name, sigma in SPECIES.items():
-        linear = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).linear
-        energies.append(linear.energies(model.coefficients))
-        k = linear.labels["K"]
+        blocks = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions)
+        highest = float(blocks.functions.torsion.energies[jmax].max())  # of K = 0: low levels lean on all torsional functions
+        linear = blocks.summed(model.coefficients, max(below_mhz, highest))
+        solved = linear.block >= 0
+        energies.append(linear.energies([1.0])[solved])
+        labels = {key: column[solved] for key, column in linear.labels.items()}
+        k = labels["K"]
         ka = np.abs(k)
-        kc = linear.labels["J"] - ka + np.where((k > 0) & (linear.labels["s"] >= 0), 1, 0)
+        kc = labels["J"] - ka + np.where((k > 0) & (labels["s"] >= 0), 1, 0)
         columns = {
             "species": np.full(len(k), name),
-            "vt": linear.labels["t"],
-            "j": linear.labels["J"],
+            "vt": labels["t"],
+            "j": labels["J"],
             "ka": ka,
             "kc": kc,
         }

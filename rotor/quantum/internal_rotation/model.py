@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Terms, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.functions import TorsionRotation
-from rotor.quantum.internal_rotation.species import SpeciesBlocks, species_blocks
+from rotor.quantum.internal_rotation.species import SpeciesBlocks
 from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
@@ -117,4 +117,4 @@ class RamModel:
         torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
         chosen: NDArray[np.bool_] | None = None if needed is None else np.isin(functions.labels["J"], needed)
-        return species_blocks(functions, self.terms(sigma), chosen)
+        return SpeciesBlocks(functions, self.terms(sigma), chosen)

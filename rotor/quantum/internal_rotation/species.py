@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.blocks import LinearBlocks, SolvedBlocks, blocks_of_elements
-from rotor.quantum.internal_rotation.contracted import Terms
+from rotor.quantum.basis.elements import Elements
+from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
     counted_ka_kc,
@@ -20,38 +22,76 @@ from rotor.quantum.internal_rotation.labels import (
     named_by_overlap,
     torsional_numbers,
 )
+from rotor.quantum.operators.algebra import Operator
 
 
 @dataclass(frozen=True, eq=False)
 class SpeciesBlocks:
-    """H_b(c) = Σ c_i O_i,b of one species over torsion-rotation functions."""
+    """H_b(c) = Σ c_i O_i,b of one species over torsion-rotation functions.
+
+    needed: functions whose blocks are made; None for all. Elements of each term are made when first used: a fit solves them at
+    many values, while `solve_once` makes those of their sum alone.
+    """
 
     functions: TorsionRotation
-    linear: LinearBlocks
+    terms: Terms
+    needed: NDArray[np.bool_] | None = None
+
+    @cached_property
+    def elements(self) -> Elements:
+        """Elements of each term."""
+        return self.functions.elements(list(self.terms.values()))
+
+    @cached_property
+    def linear(self) -> LinearBlocks:
+        """The connected blocks of all terms."""
+        return blocks_of_elements(tuple(self.terms), self.functions.labels, self.elements, self.needed)
 
     def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
         """Levels with v_t up to `vt_max`; with `by_energy` Ka and Kc are counted by energy inside v_t."""
+        return self._solved(self.linear, coefficients, vt_max, by_energy)
+
+    def solve_once(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
+        """The same, faster where the blocks are not needed at other values."""
+        return self._solved(self.summed(coefficients), [1.0], vt_max, by_energy)
+
+    def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> LinearBlocks:
+        """The blocks of one term, H at these coefficients, among functions whose Gershgorin discs reach below `below_mhz`."""
+        elements = self.functions.elements([_merged(self.terms, np.asarray(coefficients, dtype=float))])
+        needed = self.needed
+        if below_mhz < math.inf:
+            value = np.where(elements.rows == elements.columns, elements.values[0].real, -np.abs(elements.values[0]))
+            low = np.bincount(elements.rows, value, elements.count) <= below_mhz
+            elements = elements.between(low)
+            needed = low if needed is None else low & needed
+        return blocks_of_elements(("H",), self.functions.labels, elements, needed)
+
+    def _solved(self, linear: LinearBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
         values = np.asarray(coefficients, dtype=float)
-        return SpeciesLevels(self.functions, self.linear.solve(values), self._zeroth_order(values), vt_max, by_energy)
-
-    def _zeroth_order(self, coefficients: Floats) -> Floats:
-        """⟨J K t|H|J K t⟩ of the functions: of combined ones the mean of s = ±1, without what couples K and -K."""
-        linear = self.linear
-        diagonal = np.zeros(len(linear.block))
-        here = np.flatnonzero(linear.rows == linear.columns)
-        diagonal[linear.rows[here]] = (coefficients @ linear.values[:, here]).real
-        labels = linear.labels
-        minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
-        plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
-        if len(minus) == len(plus) > 0:  # in one order of J, K, t
-            diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
-        return diagonal
+        return SpeciesLevels(self, linear.solve(values), _zeroth_order(linear, values), vt_max, by_energy)
 
 
-def species_blocks(functions: TorsionRotation, terms: Terms, needed: NDArray[np.bool_] | None = None) -> SpeciesBlocks:
-    """The blocks of one species, of named sums of products."""
-    elements = functions.elements(list(terms.values()))
-    return SpeciesBlocks(functions, blocks_of_elements(tuple(terms), functions.labels, elements, needed))
+def _merged(terms: Terms, coefficients: Floats) -> list[Product]:
+    """Σ c_i O_i as products, one for each operator of the torsion."""
+    rotations: dict[Operator | None, Operator] = {}
+    for products, coefficient in zip(terms.values(), coefficients.tolist(), strict=True):
+        for product in products if coefficient else ():
+            known = rotations.get(product.torsion, Operator())
+            rotations[product.torsion] = known + coefficient * product.rotation
+    return [Product(rotation, torsion) for torsion, rotation in rotations.items()]
+
+
+def _zeroth_order(linear: LinearBlocks, coefficients: Floats) -> Floats:
+    """⟨J K t|H|J K t⟩ of the functions: of combined ones the mean of s = ±1, without what couples K and -K."""
+    diagonal = np.zeros(len(linear.block))
+    here = np.flatnonzero(linear.rows == linear.columns)
+    diagonal[linear.rows[here]] = (coefficients @ linear.values[:, here]).real
+    labels = linear.labels
+    minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
+    plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
+    if len(minus) == len(plus) > 0:  # in one order of J, K, t
+        diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
+    return diagonal
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +101,16 @@ class SpeciesLevels:
     rows: where each level stands in the arrays of `solved`: the function of its block with its rank. By block, rising in energy.
     """
 
-    functions: TorsionRotation
+    source: SpeciesBlocks
     solved: SolvedBlocks
     zeroth_order: Floats
     vt_max: int
     by_energy: bool = False
+
+    @property
+    def functions(self) -> TorsionRotation:
+        """The functions |J K⟩|K t⟩."""
+        return self.source.functions
 
     @cached_property
     def _named(self) -> tuple[Ints, Ints, Ints]:
@@ -115,6 +160,6 @@ class SpeciesLevels:
             kc = kc_of_pairs({"J": j, "vt": v}, k, self.energies)
         return {"j": j, "vt": v, "k": k, "ka": np.abs(k), "kc": kc}
 
-    def slopes(self) -> Floats:
-        """∂E/∂c (levels, terms)."""
-        return self.solved.slopes(self.rows)
+    def slopes(self, rows: Ints | None = None) -> Floats:
+        """∂E/∂c (levels, terms) of the levels at these rows of `solved`; by default of all."""
+        return self.solved.slopes_of(self.source.elements, self.rows if rows is None else rows)

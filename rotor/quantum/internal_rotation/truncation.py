@@ -26,7 +26,7 @@ def truncation_mhz(model: RamModel, jmax: int, vt_max: int, count: int, waves: i
         energies = []
         for functions in (count, more):
             blocks = model.blocks(sigma, jmax, jmin=jmax, count=functions, waves=waves)
-            levels = blocks.solve(model.coefficients, vt_max)
+            levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])
             energies.append(levels.energies[order])
             scale = max(scale, float(np.nanmax(levels.solved.energies)))

@@ -20,7 +20,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.functions import TorsionRotation
-from rotor.quantum.internal_rotation.species import SpeciesBlocks, species_blocks
+from rotor.quantum.internal_rotation.species import SpeciesBlocks
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
@@ -131,7 +131,7 @@ class TwoTops:
         retained = np.column_stack(np.unravel_index(np.argsort(middle, axis=None, kind="stable")[:count], middle.shape))
         product: Any = ProductTorsion(torsions[0], torsions[1], retained)
         folded = species == (0, 0) and self.has_plane
-        return species_blocks(TorsionRotation(product, 0, jmax, folded), self.terms(species))
+        return SpeciesBlocks(TorsionRotation(product, 0, jmax, folded), self.terms(species))
 
     def terms(self, species: tuple[int, int]) -> Mapping[str, tuple[Product, ...]]:
         """Sums of products by coefficient, in the order of `coefficients`."""
