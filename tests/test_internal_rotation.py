@@ -1,6 +1,8 @@
 """Internal rotation of one top: levels of BELGI, full matrices written out here, limits, lines."""
 
+import math
 import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -260,6 +262,26 @@ def test_partition_function_counts_torsional_states():
     assert cold.q == pytest.approx(
         2 * rigid.q, rel=0.06
     )  # A and E weigh alike, E lies 2 GHz above A, the axes are others
+
+
+@pytest.mark.parametrize("temperature_k", [9.375, 100.0])
+def test_functions_far_above_kt_do_not_count_for_the_partition_function(temperature_k, monkeypatch):
+    top = acetaldehyde()
+    quick = rotor.api.partition_function(top, temperature_k).q
+    monkeypatch.setattr(import_module("rotor.thermodynamics.level_sums"), "HIGHEST_KT_OF_TORSION", math.inf)
+    assert quick == pytest.approx(rotor.api.partition_function(top, temperature_k).q, rel=1e-8)  # asked for is 1e-6
+
+
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_terms_that_are_summed_first_give_the_same_levels_and_slopes(sigma):
+    ram = model({name: ACETALDEHYDE[name] for name in ACETALDEHYDE}, rho=0.328632673, V3J=17.0, FK=-29.0)
+    blocks = ram.blocks(sigma, 6)
+    apart, once = blocks.solve(ram.coefficients, 1), blocks.solve_once(ram.coefficients, 1)
+    order = [np.lexsort([found.quanta[name] for name in ("kc", "ka", "vt", "j")]) for found in (apart, once)]
+    assert np.abs(apart.energies[order[0]] - once.energies[order[1]]).max() < 1e-6  # MHz; rounding of 4e7
+    slopes = apart.slopes()[order[0]], once.slopes()[order[1]]
+    assert np.allclose(*slopes, rtol=1e-9, atol=1e-9 * np.abs(slopes[0]).max())
+    assert np.allclose(slopes[0], apart.solved.slopes(apart.rows)[order[0]], rtol=1e-12)
 
 
 def test_wrong_constants_are_refused():

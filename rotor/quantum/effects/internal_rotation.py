@@ -49,7 +49,13 @@ class InternalRotation(QuantumEffect):
         return species_splitting(top, self.constants, j)
 
     def solve(
-        self, top: Top, effects: Sequence[QuantumEffect], jmin: int, jmax: int, vectors: bool, below_mhz: float = math.inf
+        self,
+        top: Top,
+        effects: Sequence[QuantumEffect],
+        jmin: int,
+        jmax: int,
+        vectors: bool,
+        below_mhz: float = math.inf,
     ) -> Levels:
         """Levels of both species with v_t up to the highest of the constants; without vectors those of all n_v torsional functions.
 

@@ -178,7 +178,11 @@ def torsion_rotation_levels(
 
 
 def energies_alone(
-    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int,
+    top: Top,
+    constants: InternalRotationConstants,
+    effects: tuple[QuantumEffect, ...],
+    jmin: int,
+    jmax: int,
     below_mhz: float = math.inf,
 ) -> Levels:
     """The energies of all n_v torsional functions, for sums over states: J is right, v_t, Ka and Kc are those of a function.
@@ -189,7 +193,9 @@ def energies_alone(
     model, pieces, energies = ram_model(top, constants), [], []
     for name, sigma in SPECIES.items():
         blocks = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions)
-        highest = float(blocks.functions.torsion.energies[jmax].max())  # of K = 0: low levels lean on all torsional functions
+        highest = float(
+            blocks.functions.torsion.energies[jmax].max()
+        )  # of K = 0: low levels lean on all torsional functions
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
         solved = linear.block >= 0
         energies.append(linear.energies([1.0])[solved])

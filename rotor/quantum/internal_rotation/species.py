@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.blocks import LinearBlocks, SolvedBlocks, blocks_of_elements
 from rotor.quantum.basis.elements import Elements
+from rotor.quantum.blocks import LinearBlocks, SolvedBlocks, blocks_of_elements
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
