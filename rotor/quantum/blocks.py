@@ -140,6 +140,9 @@ class SolvedBlocks:
         linear = self.linear
         slopes = np.zeros((len(levels), len(elements.values)))
         blocks, entry_blocks = linear.block[levels], linear.block[elements.rows]
+        entry_blocks = np.where(
+            linear.block[elements.columns] == entry_blocks, entry_blocks, -1
+        )  # blocks of H may be finer
         order = np.argsort(entry_blocks, kind="stable")
         for block in np.unique(blocks).tolist():
             chosen = np.flatnonzero(blocks == block)
