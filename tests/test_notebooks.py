@@ -53,7 +53,7 @@ def test_the_notebook_is_its_script_executed(script):
     assert all(cell["execution_count"] for cell in notebook.cells if cell["cell_type"] == "code")  # executed
     assert path.stat().st_size < MAKE.MOST_BYTES
     text = path.read_text(encoding="utf-8")
-    assert "assert " in text
+    assert "assert " in text or script.stem == "00_first_lesson"  # its claims are in test_first_lesson.py
     assert str(ROOT) not in text  # no path of a machine
     assert "ipykernel_" not in text
 
