@@ -307,9 +307,11 @@ def test_the_steps_of_a_fluid_are_counted_about_the_mean():
     total = np.array([1.0, 1.3, 1.1, 1.4])
     flat = np.full(4, 300.0)
     record = FluidRecord(np.arange(4.0), total, total, total, total, flat, flat, flat, flat)
-    budget = temperature_budget(record, Settings(), 6.0, 1, [Mean("temperature", "K", 300.0, 5.0, 4.0)])
+    budget = temperature_budget(record, Settings(every=1), 6.0, 1, [Mean("temperature", "K", 300.0, 5.0, 4.0)])
     assert budget.truncation.value == pytest.approx(2 * 0.2 / (6 * units.EV_PER_K))
     assert "about its mean" in budget.truncation.source
+    sparse = temperature_budget(record, Settings(), 6.0, 1, [Mean("temperature", "K", 300.0, 5.0, 4.0)])
+    assert sparse.truncation.value > budget.truncation.value  # steps between the rows
     assert budget.statistics.value == 5.0
     few = Mean("temperature", "K", 300.0, math.nan, math.nan)
     assert temperature_budget(record, Settings(), 6.0, 1, [few]).statistics.value is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 
 import mpmath
 import numpy as np
@@ -456,3 +457,21 @@ def test_a_series_that_turns_over_is_refused_before_thousands_of_levels_are_solv
     with pytest.raises(ValueError, match="beyond the reach of the distortion constants"):
         level_sums(top, [top.spin_weights], [1e6], progress=lambda j, last: seen.append(j))
     assert 50 < max(seen) < 100
+
+
+@pytest.mark.parametrize(
+    "ratios", [(1.03, 4.5), (1.2, 1.43), (2.2, 2.6), (3.1, 1.44), (4.3, 7.3), (7.4, 1.09), (14.3, 1.5), (14.6, 5.7)]
+)
+def test_the_next_quantum_correction_is_bounded(ratios, monkeypatch):
+    """ln Q of the corrected classical limit against the sum over the levels, at 12 times the temperature of A."""
+    from rotor.thermodynamics.classical_limit import classical_limit
+
+    level_sums = import_module("rotor.thermodynamics.level_sums")  # the package has a function of that name
+    monkeypatch.setattr(level_sums, "LONG_SUM", 10**9)  # the sum, not the limit itself
+    b = 1e4
+    top = Top.from_constants(f"A={b * ratios[0]} B={b} C={b / ratios[1]} MHz")
+    kelvin = 12 * b * ratios[0] / units.MHZ_PER_K
+    exact = level_sums.level_sums(top, [top.spin_weights], [kelvin], 1e-13)[0]
+    limit = classical_limit(top)
+    actual = abs(math.log(exact.q[0] / limit.corrected([kelvin])[0][0]) - exact.ground_k / kelvin)
+    assert actual <= limit.errors([kelvin])[0, 0] <= 60 * actual  # 2.2 to 5.5, 46 of the nearly symmetric top

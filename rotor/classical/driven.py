@@ -5,7 +5,7 @@ The free body has an exact motion of its own (`rotor.classical.tumble`); here th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,9 +18,11 @@ from rotor.classical.effect import ClassicalEffect, named_effects
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
+from rotor.classical.step_errors import driven_budget, truncation_of_steps
 from rotor.classical.system import momentum_of, system_of
 from rotor.classical.tumble import COHERENT, Three, Units
 from rotor.geometry.rotations import continuous
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.table import Table
 
@@ -124,6 +126,20 @@ class DrivenAnswer:
         """The motion by columns."""
         return DrivenTable(self.motion)
 
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """How far the attitude can be trusted, in rad, at the worst of the times; a finer motion is made for it where that is short."""
+        request = self.request
+        compiled = system_of(request.moments, request.effects).compiled is not None
+        tolerance = None if request.step is not None else request.tolerance
+        return driven_budget(self.motion, truncation_of_steps(self.motion, compiled, tolerance, self._finer))
+
+    def _finer(self, setting: float) -> Motion:
+        """The motion to another tolerance; of fixed steps, with its step divided by a number."""
+        step = self.request.step
+        changed = {"tolerance": setting} if step is None else {"step": step / setting}
+        return motion_of(replace(self.request, **changed))
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table.
 
@@ -144,6 +160,7 @@ class DrivenAnswer:
             "energy_last": float(energy[-1]),
             "energy_drift": float(np.ptp(energy)) / size if conserved and size else None,
             "last_time": float(self.motion.times[-1]),
+            "errors": self.errors.as_json(),
         }
 
 
@@ -157,6 +174,10 @@ def answer_driven(request: DrivenRequest) -> DrivenAnswer:
     >>> round(float(answer_driven(asked).table.columns["w3"][-1]), 9)  # exp(-1)
     0.367879441
     """
+    return DrivenAnswer(request, motion_of(request))
+
+
+def motion_of(request: DrivenRequest) -> Motion:
+    """The motion alone."""
     method, start = request.method, request.momentum
-    motion = integrate(method, request.moments, start, request.times, request.attitude, request.effects)
-    return DrivenAnswer(request, motion)
+    return integrate(method, request.moments, start, request.times, request.attitude, request.effects)

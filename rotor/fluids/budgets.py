@@ -1,8 +1,9 @@
 """Error budget of the temperature of a fluid (`rotor.requests.budget`).
 
-Truncation: the departure of the conserved energy from its mean over the run, the largest of the rows, as a temperature 2 ΔE/(f k) of the f
-degrees of freedom. It is counted about the mean, not from the start: the energy of the first row has the departure of that row itself,
-which a box with velocities just drawn has more of.
+Truncation: the departure of the conserved energy from its mean over the run, as a temperature 2 ΔE/(f k) of the f degrees of freedom: the
+largest of the rows, and where n steps lie between the rows what the largest of n normal deviates is below, 1 + √(2 ln 2n) standard
+deviations of the rows. It is counted about the mean, not from the start: the energy of the first row has the departure of that row
+itself, which a box with velocities just drawn has more of.
 """
 
 from __future__ import annotations
@@ -62,6 +63,9 @@ def _of_steps(record: FluidRecord, settings: Settings, degrees: float) -> ErrorT
     if len(record) < 2 or not np.isfinite(record.total_ev).all():
         return ErrorTerm(None, "a run of fewer than two rows has no departure of its conserved energy")
     away = float(np.abs(record.total_ev - record.total_ev.mean()).max())
+    if settings.every > 1:
+        spread = float(record.total_ev.std()) * (1.0 + math.sqrt(2.0 / len(record)))  # its own error twice with it
+        away = max(away, spread * (1.0 + math.sqrt(2.0 * math.log(2.0 * settings.steps))))
     source = f"conserved energy about its mean, with a step of {settings.step_fs:g} fs"
     return ErrorTerm(2.0 * away / (units.EV_PER_K * degrees), source, "a shorter step")
 

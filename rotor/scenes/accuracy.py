@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.requests.budget import ROUNDING, ErrorBudget
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy
 from rotor.scenes.kind import quantity
 from rotor.scenes.scene import Scene
@@ -140,8 +140,15 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
             + f" cannot be given: the error here is {error:.2g} ({choice.how}); ask for less"
         )
     if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):
-        refuse_total(answer.errors, asked, unit)
+        refuse_total(_with_error(answer.errors, choice), asked, unit)
     return Reached(asked, error, unit, choice.how)
+
+
+def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:
+    """The budget with the error that was found while the settings were chosen, where the answer alone does not say it."""
+    if not choice.error or budget.truncation.value is not None:
+        return budget
+    return replace(budget, truncation=ErrorTerm(choice.error, choice.how))
 
 
 def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:

@@ -1,7 +1,7 @@
 """Accuracy of a driven motion: the loosest tolerance of its steps whose attitudes are within what was asked for.
 
 The error of a tolerance t is the largest difference of an attitude, at all times asked for, from motions of t/100, t/10⁴, ..., see
-`rotor.scenes.plan_steps.error_by_finer`.
+`rotor.classical.step_errors.error_by_finer`.
 
 The search makes some five motions. Of a long motion, the first part alone is searched, to the accuracy divided by how much the error will
 still grow: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The
@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.classical.step_errors import error_by_finer
 from rotor.scenes.choice import Choice
 from rotor.scenes.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
-from rotor.scenes.plan_steps import error_by_finer
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest

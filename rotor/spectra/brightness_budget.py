@@ -47,6 +47,7 @@ def brightness_budget(answer: Any) -> ErrorBudget:
     brightness, depth = (0.0, 0.0) if peak is None else (abs(peak.brightness_k), peak.optical_depth)
     per_mhz = opaque * steepness(depth) / (float(observed) * source.fwhm_km_s / KM_PER_S)
     rounding_mhz = 2 * ROUNDING * units.MHZ_PER_K * float(lines.energy_upper_k.max(initial=0.0))
+    left_out = math.fsum(one.left_out_depth for one in answer.emitted)
     limits: Sequence[Limit] = ()
     if not isinstance(molecule, CatalogueLines):
         limits = every_limit(molecule, populated_j(molecule, source.excitation_k), lines.effects)
@@ -57,8 +58,8 @@ def brightness_budget(answer: Any) -> ErrorBudget:
             per_mhz * rounding_mhz + 16 * sys.float_info.epsilon * brightness, "frequencies in double precision"
         ),
         truncation=ErrorTerm(
-            opaque * request.least_depth + brightness * lines.q_error,
-            f"each line left out, of an optical depth below {request.least_depth:g}, and Q",
+            opaque * left_out + brightness * lines.q_error,
+            f"lines of an optical depth below {request.least_depth:g}, together {left_out:.1g} at the most, and Q",
             "a smaller least depth",
         ),
         model=_model(limits, per_mhz, brightness, isinstance(molecule, CatalogueLines)),

@@ -2,7 +2,8 @@
 
     I(T) = (8π³/3hc) ν g_I S μ² [exp(-E″/kT) - exp(-E′/kT)] / Q(T)          integrated absorption (`rotor.spectra.intensity`)
 
-A top is solved at the temperature; a catalogue has the lines, and Q(T) beside them.
+A top is solved at the temperature; a catalogue has the lines, and Q(T) beside them. Lines that are left out are computed down to a
+thousandth of the least optical depth, so that what they add up to is known.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ from rotor.spectra.profiles import gaussian
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+BELOW = 1e-3  # of the least optical depth: lines of less are not computed
+BETWEEN = 1.25  # the sum of Gaussians between their centres over that at a centre: 1.07 of two lines, 1.22 of many
 
 
 class Partition(Protocol):
@@ -93,7 +97,8 @@ class EmittedLines:
 
     energy_upper_k: E′/k. q: partition function, with its source. quanta: names of the quantum numbers in upper and lower; empty for a
     catalogue, whose numbers are as printed. effects, hyperfine: of the Hamiltonian of a top; hyperfine is None without spins.
-    q_error: relative bound of the sum Q; 0 for a catalogue, whose Q is taken as it is.
+    q_error: relative bound of the sum Q; 0 for a catalogue, whose Q is taken as it is. left_out_depth: bound of the optical depth that
+    the lines left out add up to anywhere.
     """
 
     temperature_k: float
@@ -111,6 +116,7 @@ class EmittedLines:
     hyperfine: dict[str, Any] | None = None
     notes: tuple[str, ...] = ()
     q_error: float = 0.0
+    left_out_depth: float = 0.0
 
     def where(self, rows: Ints) -> EmittedLines:
         """The lines of these rows."""
@@ -164,19 +170,28 @@ def _of_top(
     depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
     least = math.log10(least_depth / depth_per_area)
     lines = line_list(
-        top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=rest_mhz, effects=effects or SEMI_RIGID
+        top,
+        temperature_k=source.excitation_k,
+        min_lgint=least + math.log10(BELOW),
+        range_mhz=rest_mhz,
+        effects=effects or SEMI_RIGID,
     )
+    strong = lines.intensity_nm2_mhz >= 10.0**least
+    rows = np.flatnonzero(strong)
     labels = [
-        tuple(" ".join(text.split()) for text in lines.levels.labels(states)) for states in (lines.upper, lines.lower)
+        tuple(" ".join(text.split()) for text in lines.levels.labels(states[rows]))
+        for states in (lines.upper, lines.lower)
     ]
-    upper_cm = lines.energy_lower_cm + lines.frequency_mhz / units.MHZ_PER_CM
+    frequency = lines.frequency_mhz[rows]
+    upper_cm = lines.energy_lower_cm[rows] + frequency / units.MHZ_PER_CM
+    weak = lines.frequency_mhz[~strong], lines.intensity_nm2_mhz[~strong] * depth_per_area
     return EmittedLines(
         temperature_k=source.excitation_k,
-        frequency_mhz=lines.frequency_mhz,
-        intensity_nm2_mhz=lines.intensity_nm2_mhz,
+        frequency_mhz=frequency,
+        intensity_nm2_mhz=lines.intensity_nm2_mhz[rows],
         energy_upper_k=upper_cm * units.MHZ_PER_CM / units.MHZ_PER_K,
-        g_upper=np.asarray(lines.g_upper),
-        einstein_a_per_s=lines.einstein_a_per_s,
+        g_upper=np.asarray(lines.g_upper)[rows],
+        einstein_a_per_s=lines.einstein_a_per_s[rows],
         upper=labels[0],
         lower=labels[1],
         q=float(lines.q),
@@ -186,7 +201,29 @@ def _of_top(
         hyperfine=hyperfine_facts(top, lines.levels),
         notes=tuple(lines.warnings),
         q_error=lines.partition.relative_error,
+        left_out_depth=BELOW * least_depth + depth_of_blends(*weak, source),
     )
+
+
+def depth_of_blends(frequency_mhz: Floats, depth: Floats, source: Source) -> float:
+    """Bound of the largest optical depth that Gaussian lines (n,) of these depths at their centres add up to.
+
+    >>> narrow = Source(1e14, 10.0, 1.0)
+    >>> round(depth_of_blends(np.array([1e5, 1e5, 2e5]), np.array([1e-7, 1e-7, 1e-7]), narrow) / 1e-7, 3)
+    2.5
+    """
+    if not len(depth):
+        return 0.0
+    order = np.argsort(frequency_mhz)
+    places, depths = frequency_mhz[order], depth[order]
+    width = places * source.fwhm_km_s / KM_PER_S
+    first, last = np.searchsorted(places, places - 3 * width), np.searchsorted(places, places + 3 * width)
+    near = [slice(*pair) for pair in zip(first.tolist(), last.tolist(), strict=True)]
+    sums = [
+        float(depths[group] @ np.exp(-4 * math.log(2) * ((places[group] - place) / own) ** 2))
+        for group, place, own in zip(near, places.tolist(), width.tolist(), strict=True)
+    ]
+    return BETWEEN * max(sums)
 
 
 def _of_catalogue(
@@ -205,4 +242,7 @@ def _of_catalogue(
         q=catalogue.partition.at(temperature),
         q_source=catalogue.partition.source,
     )
-    return every.where(np.flatnonzero(peak_depth(every, source) >= least_depth))
+    depth = peak_depth(every, source)
+    weak = depth < least_depth
+    left_out = depth_of_blends(every.frequency_mhz[weak], depth[weak], source)
+    return replace(every.where(np.flatnonzero(~weak)), left_out_depth=left_out)
