@@ -405,3 +405,40 @@ def test_the_electron_spin_of_oxygen_has_a_size():
     widest = np.ptp(levels.energy_mhz[levels.rotational == 1])
     assert widest / 3 <= sizes["electron spin"] <= 3 * widest
     assert answer.errors.model.value > 5e4
+
+
+DRIVEN = (
+    'schema = 1\nkind = "tumble"\n[body]\nmoments = [1.0, 2.0, 2.5]\nangular_velocity = [1.0, 2.0, 3.0]\n[[effects]]\n'
+    'effect = "linear drag"\ncoefficients = [0.1, 0.1, 0.1]\n[conditions]\ntimes = "0:5:6"\n'
+)
+
+
+def test_a_driven_motion_has_a_budget(call, folder):
+    """Its total is refused, since its model and data are not estimated, in the words of `run`, by `plan` as well."""
+    (folder / "s.toml").write_text(DRIVEN)
+    code, out, _ = call("run", "s.toml")
+    assert code == 0
+    assert "errors" in out
+    (folder / "t.toml").write_text(
+        DRIVEN.replace('kind = "tumble"\n', 'kind = "tumble"\naccuracy = { total = "1e-6 rad" }\n')
+    )
+    code, _, err = call("run", "t.toml")
+    assert code == 2
+    assert (
+        "accuracy.total: 1e-06 rad cannot be given: left out not estimated: a rigid body under the effects"
+        in " ".join(err.split())
+    )
+
+
+def test_steps_that_are_not_made_a_second_time_are_not_estimated(monkeypatch):
+    from rotor.classical import step_errors
+    from rotor.classical.driven import DrivenRequest, answer_driven
+    from rotor.classical.effects.drag import LinearDrag
+
+    monkeypatch.setattr(step_errors, "MOST_STEPS", 3)
+    request = DrivenRequest(
+        (1.0, 2.0, 2.5), (0.0, 5.0), (LinearDrag([0.1, 0.1, 0.1]),), angular_velocity=(1.0, 2.0, 3.0)
+    )
+    term = answer_driven(request).errors.truncation
+    assert term.value is None
+    assert "not made a second time" in term.source

@@ -160,7 +160,7 @@ def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
         ("method", f"{content['method']}, {content['steps']} steps"),
         ("energy", f"{content['energy_first']:.10g} to {content['energy_last']:.10g}{energy}: {last}"),
     ]
-    show_facts(facts)
+    show_facts([*facts, *top_facts.error_facts(content)])
     print()
     show_table(_driven_table(answer))
 
