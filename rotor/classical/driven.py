@@ -137,8 +137,9 @@ class DrivenAnswer:
     def _finer(self, setting: float) -> Motion:
         """The motion to another tolerance; of fixed steps, with its step divided by a number."""
         step = self.request.step
-        changed = {"tolerance": setting} if step is None else {"step": step / setting}
-        return motion_of(replace(self.request, **changed))
+        if step is None:
+            return motion_of(replace(self.request, tolerance=setting))
+        return motion_of(replace(self.request, step=step / setting))
 
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table.

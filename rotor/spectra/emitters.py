@@ -190,7 +190,7 @@ def _of_top(
         frequency_mhz=frequency,
         intensity_nm2_mhz=lines.intensity_nm2_mhz[rows],
         energy_upper_k=upper_cm * units.MHZ_PER_CM / units.MHZ_PER_K,
-        g_upper=np.asarray(lines.g_upper)[rows],
+        g_upper=np.asarray(lines.g_upper, dtype=np.float64)[rows],
         einstein_a_per_s=lines.einstein_a_per_s[rows],
         upper=labels[0],
         lower=labels[1],
