@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Any
 
@@ -186,12 +187,29 @@ def function_of(name: str) -> Callable[..., Result]:
     function.__name__ = function.__qualname__ = name
     function.__module__ = "rotor"
     function.__doc__ = documentation(verb)
+    function.__signature__ = _signature(verb, first)  # type: ignore[attr-defined]
     return function
+
+
+def _signature(verb: Verb, first: str) -> Signature:
+    """The arguments by name, so that editors complete them and `help` shows them."""
+    fields = [field for field in _arguments(verb) if field.name != first]
+    source = [Parameter(first, Parameter.POSITIONAL_OR_KEYWORD, default=None)] if first else []
+    named = [Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default) for field in fields]
+    return Signature([*source, *named, Parameter("executor", Parameter.KEYWORD_ONLY, default=None)])
+
+
+def _arguments(verb: Verb) -> list[Field]:
+    """The fields that are arguments in Python, each name once."""
+    fields = {field.name: field for field in reversed(verb.fields.values()) if field.name}
+    return [
+        field for field in verb.fields.values() if fields.get(field.name) is field and not _is_printing(verb, field)
+    ]
 
 
 def documentation(verb: Verb) -> str:
     """The docstring of the function of a verb: its arguments with units, from the declaration."""
-    rows = "\n".join(_argument(field) for field in verb.fields.values() if field.name and not _is_printing(verb, field))
+    rows = "\n".join(_argument(field) for field in _arguments(verb))
     expression, value = EXAMPLES.get(verb.name, ("", ""))
     example = f"\n\nExamples\n--------\n>>> import rotor\n>>> {expression}\n{value}" if value else ""
     return (

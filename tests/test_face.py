@@ -2,7 +2,9 @@
 
 import ast
 import doctest
+import inspect
 import json
+import re
 import warnings
 
 import numpy as np
@@ -37,6 +39,16 @@ def test_every_field_is_an_argument():
         for field in verb_of(verb).fields.values():
             if field.key and field.name:
                 assert f"\n{field.name} : optional" in getattr(rotor, verb).__doc__
+
+
+@pytest.mark.parametrize("verb", rotor.VERBS)
+def test_editors_see_the_arguments(verb):
+    """The signature has every documented argument once."""
+    function = getattr(rotor, verb)
+    names = list(inspect.signature(function).parameters)
+    documented = re.findall(r"^(\w+) : ", function.__doc__.split("Returns")[0], re.MULTILINE)
+    assert sorted(names) == sorted(set(documented))
+    assert len(documented) == len(names)
 
 
 def test_python_gives_the_numbers_of_the_command(call):
