@@ -20,10 +20,11 @@ KINDS = Path(__file__).parent / "oracles" / "kinds"
 SPAN = 6  # F above FBGN
 
 
-def _files(name: str):
-    par, asked = read_par(KINDS / name / f"{name}.var"), read_int(KINDS / name / f"{name}.int")
+def _files(name: str, span: int = SPAN):
+    folder = KINDS / name if (KINDS / name).is_dir() else KINDS.parent / name
+    par, asked = read_par(folder / f"{name}.var"), read_int(folder / f"{name}.int")
     first = asked.request.fbgn
-    return par, replace(asked, request=replace(asked.request, fend=min(asked.request.fend, first + SPAN)))
+    return par, replace(asked, request=replace(asked.request, fend=min(asked.request.fend, first + span)))
 
 
 def _calls(par, asked) -> int:
@@ -34,18 +35,42 @@ def _calls(par, asked) -> int:
     return int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize(("name", "most"), [("fso3", 3.5), ("oc33s", 2.2), ("h2coh", 5.0)])
-def test_errors_cost_few_more_calls_than_the_prediction_does(name: str, most: float):
-    """Calls with errors over those without. Each parameter had its own coefficients of coupling in every block before: 7.6, 2.5, 28."""
+@pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad"])
+def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
+    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block."""
     par, asked = _files(name)
     held = replace(par, parameters=tuple(replace(p, error=1e-37) for p in par.parameters), rest="")
+    par = replace(par, parameters=tuple(replace(p, error=max(p.error, abs(p.value) * 1e-4)) for p in par.parameters))
     for file in (held, par):  # what is made once for a process is there
         predict(file, asked)
-    assert _calls(par, asked) < most * _calls(held, asked)
+    assert _calls(par, asked) < 2.0 * _calls(held, asked)
+
+
+def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
+    """CH3CN with ¹⁴N to F = 30, in calls of functions a level; 146 where every block was solved by itself."""
+    par, asked = _files("ch3cn_quad", span=30)
+    group = groups_of(par, asked)[0]
+    group.levels((0, 60))
+    profile = cProfile.Profile()
+    profile.enable()
+    levels = group.levels((0, 60))
+    profile.disable()
+    assert pstats.Stats(profile).total_calls < 75 * len(levels)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
-    "name", ["fso3", "o2", "oc33s", "eighteen_states", "methyl_i_tot", "l_doubled_quad", "phase_with_spins"]
+    "name",
+    [
+        "fso3",
+        "o2",
+        "oc33s",
+        "eighteen_states",
+        "methyl_i_tot",
+        "l_doubled_quad",
+        "phase_with_spins",
+        "ch3cn_quad",
+        "h2coh",
+    ],
 )
 def test_derivatives_are_differences(name: str):
     """∂E/∂c of every parameter beside central differences of solved levels, for each way that a file is solved."""

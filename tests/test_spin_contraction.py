@@ -48,7 +48,7 @@ def test_operators_are_those_of_pairs(name, effects):
     """Every pair of blocks up to ΔN = 2, one by one; of blocks with one Wang function too."""
     blocks, representation = _blocks(effects)
     for piece in PIECES[name]:
-        found = by_numbers(operators_of_stacks(stacks_of(blocks), 2, [piece], representation))
+        found = by_numbers(operators_of_stacks(stacks_of(blocks), 2, [[piece]], representation)[0])
         expected = {}
         for i, up in enumerate(blocks):
             for k, low in enumerate(blocks[: i + 1]):

@@ -10,21 +10,21 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER, BlockWithSpins, Used
+from rotor.quantum.spins.axial import Exist, are_axial, axial_stacks, existing_functions, operators_of_axial_stacks
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
-from rotor.quantum.spins.families import families_of, links_of_pairs, links_of_stacks
+from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
@@ -47,19 +47,19 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
-Exist = Callable[[Ints], NDArray[np.bool_]]
 Operators = dict[tuple[int, int], dict[Channel, Floats]]
 InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 
 @dataclass(frozen=True)
 class Shared:
-    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks where their
-    functions are those of Wang blocks, and elements that were computed once."""
+    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks, as their functions
+    are those of Wang blocks or |N K⟩, and elements that were computed once."""
 
     scheme: Scheme
     representation: str
     stacks: list[Stack] | None = field(default=None, repr=False, compare=False)
+    axial: list[Stack] | None = field(default=None, repr=False, compare=False)
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     used: Used | None = None
 
@@ -109,7 +109,7 @@ class Plan:
     """Solved rotation, operators of every channel, and which blocks they connect.
 
     families: members (block, class), see `families`. contracted: the operators in stacks, each with the channels that share it, where
-    they were made so. given: the operators by pairs of blocks (i ≥ k), where they were not, or where some are left out.
+    they were made so. given: the operators by pairs of blocks (i ≥ k), where they are others.
     """
 
     shared: Shared
@@ -137,18 +137,23 @@ class Plan:
         """Each matrix between two blocks once, with the channels that share it."""
         return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
-    def with_method(self, used: Used, operators: Operators | InStacks | None = None) -> Plan:
-        """The same rotation with some of the operators, by pairs or in stacks, all by default, and what that is called."""
-        shared, classes = replace(self.shared, used=used), max(self.shared.scheme.equivalent, 1)
+    def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
+        """The same rotation with some of the operators, all by default, and what that is called."""
+        shared = replace(self.shared, used=used)
         if operators is None:
             return replace(self, shared=shared)
-        if isinstance(operators, dict):
-            families = families_of(len(self.blocks), links_of_pairs(operators), classes)
-            return Plan(shared, self.blocks, families, given=operators)
-        return Plan(shared, self.blocks, families_of(len(self.blocks), links_of_stacks(operators), classes), operators)
+        families = families_of(len(self.blocks), links_of_stacks(operators), max(shared.scheme.equivalent, 1))
+        return Plan(shared, self.blocks, families, operators)
 
 
-def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
+def plan_of(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    nmin: int,
+    nmax: int,
+    executor: Executor | None,
+    exist: Exist | None = None,
+) -> Plan:
     """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it.
 
     Parameters
@@ -160,6 +165,8 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
         Lowest and highest N.
     executor : Executor or None
         N are spread over it.
+    exist : callable, optional
+        See `levels.levels_of_f`; functions |N K⟩ that do not exist are left out.
 
     Returns
     -------
@@ -168,35 +175,23 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     without_internal_rotation(top, "levels with spins in a field")
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
+    if exist is not None and are_axial(blocks):
+        blocks = existing_functions(blocks, exist, len(scheme.twice))
     channels = channels_of(terms, scheme)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
-    stacks = None if _are_axial(blocks) else stacks_of(blocks)
-    count, classes = len(blocks), max(scheme.equivalent, 1)
-    shared = Shared(scheme, representation, stacks)
-    if stacks is None:
-        between = {
-            (i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)
-        }
-        operators = {
-            pair: {channel: own[first] for channel, first in firsts.items() if first in own}
-            for pair, own in between.items()
-            if own
-        }
-        return Plan(shared, blocks, families_of(count, links_of_pairs(operators), classes), given=operators)
-    contracted = [
-        (
-            operators_of_stacks(stacks, min(reach, channel.rank), pieces, representation),
-            [other for other, first in firsts.items() if first == channel],
-        )
-        for channel, pieces in distinct.items()
-    ]
-    return Plan(shared, blocks, families_of(count, links_of_stacks(contracted), classes), contracted)
-
-
-def _are_axial(blocks: list[RotorBlock]) -> bool:
-    return isinstance(blocks[0].parts[0].basis, AxialState)
+    axial = axial_stacks(blocks) if are_axial(blocks) else None
+    stacks = None if axial else stacks_of(blocks)
+    contract = operators_of_axial_stacks if axial else operators_of_stacks
+    found: dict[Channel, list[Contracted]] = {}
+    for rank in {channel.rank for channel in distinct}:
+        own = [channel for channel in distinct if channel.rank == rank]
+        pieces = [distinct[channel] for channel in own]
+        found |= zip(own, contract(axial or stacks or [], min(reach, rank), pieces, representation), strict=True)
+    contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
+    families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
+    return Plan(Shared(scheme, representation, stacks, axial), blocks, families, contracted)
 
 
 def _by_pairs(contracted: InStacks) -> Operators:
@@ -215,23 +210,6 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
         alike = (other for other in firsts.values() if other.rank == channel.rank and channels[other] == pieces)
         firsts[channel] = next(alike, channel)
     return firsts
-
-
-def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
-    """Pairs (i, k), i ≥ k, whose N differ by `reach` at most, of an axial top those of one K."""
-    by_n: dict[tuple[int, int], list[int]] = {}
-    axial = [_axial_k(block) for block in blocks]
-    for i, block in enumerate(blocks):
-        by_n.setdefault((block.n, axial[i]), []).append(i)
-    for i, block in enumerate(blocks):
-        for n in range(block.n - reach, block.n + 1):
-            yield from ((i, k) for k in by_n.get((n, axial[i]), ()) if k <= i)
-
-
-def _axial_k(block: RotorBlock) -> int:
-    """K of a block of an axial top, which every operator conserves; 0 for other tops."""
-    basis = block.parts[0].basis
-    return basis.axial_k if isinstance(basis, AxialState) else 0
 
 
 def operators_between(

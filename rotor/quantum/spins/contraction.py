@@ -8,29 +8,18 @@ N, and are contracted by one product of matrices. Pair by pair the same is `roto
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, factors_with_n, tensor_of
-from rotor.quantum.spins.rotor import Piece, RotorBlock, RotorPart, acts
-from rotor.quantum.symmetric_top_elements import closed_coupling
-from rotor.quantum.tensors import BodyTensor, Tensors, overlap, rank_of, tensor_between
+from rotor.quantum.spins.operators import Rotor
+from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
+from rotor.quantum.spins.stack_elements import Pairs, Section, power_matrices, rotor_elements, tensor_elements_of_pairs
+from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
 _SMALL = 16  # functions up to which blocks of all sizes share a stack; of larger ones the largest has half as many again at most
-MOST_RANK = 2  # up to which there are closed forms for many N at once
-
-
-class Section(NamedTuple):
-    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, the parts of all N."""
-
-    v: int
-    basis: WangBlock
-    rows: slice
-    every: tuple[RotorPart, ...]
 
 
 class Stack(NamedTuple):
@@ -46,24 +35,6 @@ class Stack(NamedTuple):
     own: list[Floats]
     energies_mhz: list[Floats]
     single: list[bool]
-
-
-class Pairs(NamedTuple):
-    """Blocks of two stacks, the N' and N of each pair: places in the stacks and N as columns."""
-
-    up: Ints
-    low: Ints
-    m: Ints
-    n: Ints
-
-    @property
-    def rise(self) -> int:
-        """N' - N, the same of all."""
-        return int(self.m[0, 0] - self.n[0, 0])
-
-    def turned(self) -> Pairs:
-        """The other way round."""
-        return Pairs(self.low, self.up, self.n, self.m)
 
 
 Element = tuple[Section, Section, Floats]
@@ -131,9 +102,9 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
 
 
 def operators_of_stacks(
-    stacks: Sequence[Stack], reach: int, pieces: Sequence[Piece], representation: str
-) -> list[Contracted]:
-    """Σ value ⟨r'‖X‖r⟩ between blocks whose N differ by `reach` at most, each pair once, the one of the higher number first.
+    stacks: Sequence[Stack], reach: int, operators: Sequence[Sequence[Piece]], representation: str
+) -> list[list[Contracted]]:
+    """Σ value ⟨r'‖X‖r⟩ of each operator between blocks whose N differ by `reach` at most, each pair once, that of the higher number first.
 
     Parameters
     ----------
@@ -141,29 +112,42 @@ def operators_of_stacks(
         All blocks.
     reach : int
         Largest difference of N.
-    pieces : sequence of Piece
-        Operators with their values in MHz, conjugates of those between different states not among them.
+    operators : sequence of sequence of Piece
+        Sums of pieces with their values in MHz, conjugates of those between different states not among them.
     representation : str
         Which principal axes are x, y, z.
 
     Returns
     -------
-    list of Contracted
-        In MHz, as `rotor.in_both_orders` gives them.
+    list of list of Contracted
+        Of each operator, in MHz, as `rotor.in_both_orders` gives them.
     """
-
-    between = [piece for piece in pieces if piece.bra != piece.ket]
-    out = []
+    between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
+    out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
-        found = _contracted(up, low, pairs, _of_pieces(pieces, up, low, pairs, representation))
-        if between:
-            turned = pairs.turned()
-            back = _contracted(low, up, turned, _of_pieces(between, low, up, turned, representation))
-            if back is not None:
-                back = back.turned((-1.0) ** pairs.rise)
-                found = back if found is None else found._replace(matrices=found.matrices + back.matrices)
-        if found is not None:
-            out.append(found)
+        there, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
+        for contracted, pieces, others in zip(out, operators, between, strict=True):
+            found = there.contracted(pieces)
+            turned = back.contracted(others) if others else None
+            if turned is not None:
+                turned = turned.turned((-1.0) ** pairs.rise)
+                found = turned if found is None else found._replace(matrices=found.matrices + turned.matrices)
+            if found is not None:
+                contracted.append(found)
+    return out
+
+
+def powers_of_stacks(stacks: Sequence[Stack], units: Sequence[tuple[int, int, int]]) -> list[tuple[Stack, Floats]]:
+    """½[Nz^2q, N₊^2n + N₋^2n]₊ within the state v of each unit (v, q, n), over eigenstates: (blocks, units, states, states)."""
+    out = []
+    for stack in stacks:
+        found = np.zeros((len(stack.numbers), len(units), stack.vectors.shape[2], stack.vectors.shape[2]))
+        for section in stack.sections:
+            own = [place for place, (v, _, _) in enumerate(units) if v == section.v]
+            vectors = stack.vectors[:, None, section.rows]
+            matrices = power_matrices(section, [units[place][1:] for place in own])
+            found[:, own] += np.matmul(vectors.transpose(0, 1, 3, 2), np.matmul(matrices, vectors))
+        out.append((stack, found))
     return out
 
 
@@ -226,7 +210,7 @@ def _of_tensors(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> list[E
         for left in up.sections
         for right in low.sections
         if (tensor := tensor_between(tensors, left.v, right.v)) is not None
-        and (element := _of_tensor(tensor, left.basis, right.basis, pairs)) is not None
+        and (element := tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)) is not None
     ]
 
 
@@ -283,141 +267,35 @@ def _one_contracted(up: Stack, low: Stack, place: tuple[int, int], elements: Seq
     return total
 
 
-def _of_pieces(pieces: Sequence[Piece], up: Stack, low: Stack, pairs: Pairs, representation: str) -> list[Element]:
-    """Elements of every piece between all sections that it connects."""
-    return [
-        (left, right, element)
-        for piece in pieces
-        for left in up.sections
-        for right in low.sections
-        if acts(piece, left.v, right.v)
-        and (element := _of_piece(piece, left, right, pairs, representation)) is not None
-    ]
+class _Pieces:
+    """Elements of pieces between two stacks; those of one operator of N are made once for all pieces that have it."""
 
+    def __init__(self, up: Stack, low: Stack, pairs: Pairs, representation: str) -> None:
+        self._up, self._low, self._pairs, self._representation = up, low, pairs, representation
+        self._known: dict[tuple[Rotor, int, int], Floats | None] = {}
 
-def _of_piece(piece: Piece, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
-    """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q, times the element of the operator."""
-    found = _of_rotor(piece.rotor, left, right, pairs, representation)
-    if found is None:
-        return None
-    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
-    factor = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
-    if piece.nz2:
-        bra, ket = (section.basis.k.astype(float) ** (2 * piece.nz2) for section in (left, right))
-        factor = factor * ((bra[:, None] + ket) / 2)
-    return np.asarray(factor * found)
+    def contracted(self, pieces: Sequence[Piece]) -> Contracted | None:
+        """The sum of some pieces between the states of each pair of blocks, None where there is none."""
+        elements = [
+            (left, right, element)
+            for piece in pieces
+            for left in self._up.sections
+            for right in self._low.sections
+            if acts(piece, left.v, right.v) and (element := self._element(piece, left, right)) is not None
+        ]
+        return _contracted(self._up, self._low, self._pairs, elements)
 
-
-def _of_rotor(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
-    if isinstance(rotor, Cosines):
-        tensor = tensor_of(rotor.components, rotor.rank, representation)
-        found = None if tensor is None else _of_tensor(tensor, left.basis, right.basis, pairs)
-        return -found if found is not None and rotor.rank == 1 else found
-    if isinstance(rotor, CosinesWithN):
-        return _of_cosines_with_n(rotor, left, right, pairs, representation)
-    return _one_by_one(rotor, left, right, pairs, representation)
-
-
-def _of_cosines_with_n(
-    rotor: CosinesWithN, left: Section, right: Section, pairs: Pairs, representation: str
-) -> Floats | None:
-    """See `CosinesWithN.elements`."""
-    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
-    rise = pairs.rise
-    if abs(rise) > 1:
-        return None
-    up, low = left.basis, right.basis
-    stretch, change, length = factors_with_n(m, n)
-    parts = [
-        (stretch, tensor_of(rotor.components, 2, representation)),
-        (change, axis_tensor(rotor.components, representation)),
-    ]
-    found = [(factor, _of_tensor(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
-    acting = [factor * matrix for factor, matrix in found if matrix is not None]
-    scalar = float(np.trace(np.array(rotor.components))) / 3
-    if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
-        acting.append(scalar * length * np.eye(up.size, low.size))
-    return np.asarray(sum(acting)) if acting else None
-
-
-def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
-    """Any operator, pair by pair."""
-    total: Floats | None = None
-    for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
-        found = rotor.elements(left.every[a].basis, right.every[b].basis, representation)
-        if found is not None:
-            if total is None:
-                total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
-            total[place, : found.shape[0], : found.shape[1]] = found
-    return total
-
-
-def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
-    """`tensors.block_elements` of all pairs: (pairs, up.size, low.size)."""
-    rank, rise = tensor.rank, pairs.rise
-    if rank > MOST_RANK:
-        raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
-    if abs(rise) > rank or not (steps := tensor.signed_parts(up._replace(j=rise), low._replace(j=0))[0]):
-        return None
-    closes = (pairs.m + pairs.n >= rank)[:, 0]
-    if not closes.any():
-        return None
-    m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
-    by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
-    parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
-    found, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
-    for step in steps:
-        source, target = overlap(up, low, step)
-        if source.start < source.stop:
-            rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
-            first, count = low.first_k + 2 * source.start, source.stop - source.start
-            found[:, rows, columns] = _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
-    if rank > 1:
-        _add_folded(found, parts, up, low, (every_n, rise))
-    if closes.all():
-        return found
-    out = np.zeros((len(closes), up.size, low.size))
-    out[closes] = found
-    return out
-
-
-@lru_cache(maxsize=512)  # of N up to 100 some 20 MB
-def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
-    """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
-
-    Parameters
-    ----------
-    every_n : tuple of int
-        N of the lower blocks.
-    rise, rank, step : int
-        By how much N changes, rank of the tensor, by how much K changes.
-    first_k, count : int
-        The lowest K and their number.
-
-    Returns
-    -------
-    (N, K) array
-        0 where there is no such K; shared and read-only.
-    """
-    n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
-    m = n + rise
-    exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
-    inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
-    values = closed_coupling(n.astype(float), rise, rank, step, inside)
-    if step:
-        values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
-    out = np.where(exists, values, 0.0)
-    out.flags.writeable = False
-    return out
-
-
-def _add_folded(
-    found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[tuple[int, ...], int]
-) -> None:
-    """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (every_n, rise) = parts.shape[1] // 2, of_pairs
-    for column, k in enumerate(low.k[:rank].tolist()):
-        for row, k_up in enumerate(up.k[:rank].tolist()):
-            if k and k_up and k + k_up <= rank:
-                turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
-                found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
+    def _element(self, piece: Piece, left: Section, right: Section) -> Floats | None:
+        """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q, times the element of the operator."""
+        key = (piece.rotor, left.rows.start, right.rows.start)
+        if key not in self._known:
+            self._known[key] = rotor_elements(piece.rotor, left, right, self._pairs, self._representation)
+        found = self._known[key]
+        if found is None:
+            return None
+        m, n = self._pairs.m[:, :, None].astype(float), self._pairs.n[:, :, None].astype(float)
+        factor = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
+        if piece.nz2:
+            bra, ket = (section.basis.k.astype(float) ** (2 * piece.nz2) for section in (left, right))
+            factor = factor * ((bra[:, None] + ket) / 2)
+        return np.asarray(factor * found)

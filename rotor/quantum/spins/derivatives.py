@@ -4,164 +4,227 @@
 
     ∂E_i/∂c = Σ_r'r X_c(r', r) D_i(r', r),     D_i(r', r) = Σ_p'p V_p'r' c(p', p) V_pr,
 
-so that the density D of a channel is made once for all constants, and all of them are one contraction. Coefficients are made for all F,
-elements for all blocks of the rotation at once.
+so that the density D of a channel is made once for all constants, and all of them are one contraction. Blocks whose functions differ in F
+alone stand side by side (`many_f`), elements of the rotation in tables by N. Axial tops: `axial_levels`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct
+from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
+from rotor.quantum.spins.axial_levels import axial_derivatives
 from rotor.quantum.spins.blocks import Shared, SpinBlock
-from rotor.quantum.spins.contraction import by_numbers, operators_of_stacks
+from rotor.quantum.spins.contraction import operators_of_stacks, powers_of_stacks
 from rotor.quantum.spins.lines import ALONE, ParameterOperator, parameter_operators
-from rotor.quantum.spins.operators import AxialState, Scalar
-from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.many_f import Frame, Group, RotationColumns, Tables, frame_of, groups_of, tables_of
+from rotor.quantum.spins.many_f_lines import States, groups_of_blocks, states_of_group
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Channel, Piece, RotorBlock
-from rotor.quantum.spins.scheme import Scheme
-from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-Pair = tuple[int, int]  # numbers of two blocks of the rotation, the higher first
-Elements = dict[Pair, list[tuple[int, Floats]]]  # by pairs: columns of parameters and their elements
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
+_AT_ONCE = 1 << 19  # numbers of the largest density that is made at a time: 4 MB, about the cache of a core
+_PADDED = 1 << 21  # numbers of the vectors that stand side by side: 16 MB
+_LIKE = 1.5  # sizes of blocks whose vectors stand side by side
+
+
+class UnitTables(NamedTuple):
+    """Unit elements (N, units, states', states) between two kinds of blocks of the rotation; what parameters, by their columns, have of
+    each at every N: mix (N, parameters, units)."""
+
+    elements: Floats
+    columns: Ints
+    mix: Floats
+
+
+Kinds = tuple[int, int, int]  # kinds of both blocks and N' - N
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
     """∂E/∂c (rows, names) of levels with spins, MHz per MHz; ValueError for levels without vectors."""
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
-    shared, out = levels.blocks[0].shared, np.zeros((len(levels), len(names)))
+    shared: Shared = levels.blocks[0].shared
     operators = parameter_operators(top, levels.effects, names, shared)
-    every_f = distinct(np.array([block.twice_f for block in levels.blocks]))
-    for channel, elements in _elements(operators, levels.blocks, shared):
-        coefficients = _coefficients(shared.scheme, channel, int(every_f[0]), int(every_f[-1]))
-        stacked = {pair: _stacked(found) for pair, found in elements.items()}
-        for block in levels.blocks:
-            states = slice(block.start, block.start + len(block.energies_mhz))
-            _add(out[states], block, coefficients[block.twice_f], stacked)
-    return np.asarray(out[rows])
+    if shared.axial is not None:
+        return np.asarray(axial_derivatives(operators, levels.blocks, len(levels))[rows])
+    frame, groups = _frame_and_groups(levels.blocks, shared)
+    out = np.zeros((len(levels) + 1, len(names)))  # the last row is that of padding
+    tables = [
+        (couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1]), elements)
+        for channel, elements in _unit_tables(operators, levels.blocks, shared, frame)
+    ]
+    for group, blocks in groups:
+        for alike in _of_like_size(blocks):
+            states = states_of_group(group, alike, len(levels))
+            total = np.zeros((len(alike), len(names), states.rows.shape[1]))
+            for coefficients, elements in tables:
+                _add(total, states, elements, coefficients, frame)
+            out[states.rows] = total.transpose(0, 2, 1)
+    return np.asarray(out[:-1][rows])
 
 
-def _coefficients(scheme: Scheme, channel: Channel, first: int, last: int) -> dict[int, Floats]:
-    """c(p', p) of a channel by the doubled F, which levels of many F have made already."""
-    table, found = pattern_table(scheme, first, last), couplings_by_f(scheme, channel, first, last)
-    return {f: found[(f - min(table.patterns)) // 2][np.ix_(places, places)] for f, places in table.places.items()}
+def _frame_and_groups(blocks: Sequence[SpinBlock], shared: Shared) -> tuple[Frame, list[tuple[Group, list[SpinBlock]]]]:
+    """Groups of blocks that differ in F alone: those in which they were solved, or made for blocks that were solved one by one."""
+    if all(block.group is not None for block in blocks):
+        frame: Frame = shared.cache["frame"]
+        return frame, groups_of_blocks(blocks)
+    twice_f = [block.twice_f for block in blocks]
+    table = pattern_table(shared.scheme, min(twice_f), max(twice_f))
+    frame = frame_of(shared.stacks or [], table.places, table.every)
+    made = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
+    return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in made]
 
 
-def _stacked(found: Sequence[tuple[int, Floats]]) -> tuple[list[int], Floats]:
-    """The columns of parameters and their elements, (parameters, r' r)."""
-    return [column for column, _ in found], np.stack([element.reshape(-1) for _, element in found])
+def _of_like_size(blocks: Sequence[SpinBlock]) -> Iterator[list[SpinBlock]]:
+    """Blocks whose vectors stand side by side, in the order of F: of like size and bounded memory."""
+    some: list[SpinBlock] = []
+    for block in blocks:
+        sizes = [len(one.vectors) for one in (*some, block)]
+        if some and (max(sizes) > _LIKE * min(sizes) or len(sizes) * max(sizes) ** 2 > _PADDED):
+            yield some
+            some = []
+        some.append(block)
+    yield some
 
 
-def _add(
-    out: Floats, block: SpinBlock, coefficients: Floats, elements: Mapping[Pair, tuple[list[int], Floats]]
-) -> None:
-    """Adds the derivatives (states, names) of one block by one channel."""
-    vectors = [block.vectors[part.place].reshape(part.repeats, -1, len(block.energies_mhz)) for part in block.parts]
-    for a, up in enumerate(block.parts):
-        for b, low in enumerate(block.parts[: a + 1]):
-            found = elements.get((up.number, low.number))
-            if found is None:
-                continue
-            between = coefficients[up.patterns, low.patterns]
-            if not between.any():
-                continue
-            columns, matrices = found
-            moved = np.tensordot(between, vectors[b], 1)
-            # (states, r', p') (states, p', r) -> (states, r' r)
-            density = vectors[a].transpose(2, 1, 0) @ moved.transpose(2, 0, 1)
-            out[:, columns] += (1.0 if a == b else 2.0) * (density.reshape(len(density), -1) @ matrices.T)
-
-
-def _elements(
-    operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock], shared: Shared
-) -> Iterator[tuple[Channel, Elements]]:
-    """The elements of all parameters by channel, one channel at a time."""
-    if shared.stacks is None:
-        yield from _pair_by_pair(operators, blocks)
-        return
+def _unit_tables(
+    operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock], shared: Shared, frame: Frame
+) -> Iterator[tuple[Channel, dict[Kinds, UnitTables]]]:
+    """The elements of all parameters by channel: powers of N, operators of spins, other operators of N."""
+    yield ALONE, _of_powers(operators, shared, frame)
+    channels = dict.fromkeys(channel for operator in operators for channel in operator.channels)
+    for rank in {channel.rank for channel in channels}:
+        own = [channel for channel in channels if channel.rank == rank]
+        yield from zip(own, _of_spins(operators, own, shared, frame), strict=True)
     rotors = {part.number: part.rotor for block in blocks for part in block.parts}
-    for channel in dict.fromkeys([ALONE, *(channel for operator in operators for channel in operator.channels)]):
-        elements: Elements = {}
-        for column, operator in enumerate(operators):
-            found = _of_stacks(shared, channel, operator)
-            if channel == ALONE and operator.powers is None:
-                _add_rotation(found, operator, rotors)
-            for pair, element in found.items():
-                elements.setdefault(pair, []).append((column, element))
-        if elements:
-            yield channel, elements
+    for column, operator in enumerate(operators):
+        if operator.powers is None:
+            one = np.ones((frame.count_of_n, 1, 1))
+            found = _of_rotation(operator, rotors, frame).items()
+            yield ALONE, {key: UnitTables(table[:, None], np.array([column]), one) for key, table in found}
 
 
-def _of_stacks(shared: Shared, channel: Channel, operator: ParameterOperator) -> dict[Pair, Floats]:
-    """The elements of one parameter in one channel between all blocks of the rotation."""
-    assert shared.stacks is not None
-    pieces = list(operator.channels.get(channel, ()))
-    if channel == ALONE:
-        pieces += [Piece(1.0, Scalar(tuple(powers.items())), v, v, 0, 0) for v, powers in operator.powers or ()]
-    if not pieces:
-        return {}
-    return by_numbers(operators_of_stacks(shared.stacks, min(_REACH, channel.rank), pieces, shared.representation))
+def _of_spins(
+    operators: Sequence[ParameterOperator], channels: Sequence[Channel], shared: Shared, frame: Frame
+) -> Iterator[dict[Kinds, UnitTables]]:
+    """Operators of spins in some channels of one rank: a unit for each operator of N, which a parameter has ½(N'^2p + N^2p) times."""
+    units = [_units([operator.channels.get(channel, []) for operator in operators]) for channel in channels]
+    reach = min(_REACH, channels[0].rank)
+    every = [[unit] for own in units for unit in own]
+    contracted = iter(operators_of_stacks(shared.stacks or [], reach, every, shared.representation))
+    for channel, own in zip(channels, units, strict=True):
+        terms = [
+            (own.index(_unit(piece)), piece, column)
+            for column, operator in enumerate(operators)
+            for piece in operator.channels.get(channel, ())
+        ]
+        columns = sorted({column for _, _, column in terms})
+        tables = [tables_of(next(contracted), frame) for _ in own]
+        found = {}
+        for key, elements in _side_by_side(tables).items():
+            mix = np.zeros((frame.count_of_n, len(columns), len(own)))
+            n = frame.lowest + np.arange(frame.count_of_n)
+            m = n + key[2]
+            for unit, piece, column in terms:
+                powers = ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
+                mix[:, columns.index(column), unit] += piece.value * powers
+            found[key] = UnitTables(elements, np.array(columns), mix)
+        yield found
 
 
-def _add_rotation(found: dict[Pair, Floats], operator: ParameterOperator, rotors: Mapping[int, RotorBlock]) -> None:
-    """Adds the elements of operators of N that no powers describe."""
+def _unit(piece: Piece) -> Piece:
+    return replace(piece, value=1.0, n2=0)
+
+
+def _units(pieces: Sequence[Sequence[Piece]]) -> list[Piece]:
+    """The operators of N in sums of pieces, without values and powers of N, each once."""
+    return list(dict.fromkeys(_unit(piece) for own in pieces for piece in own))
+
+
+def _side_by_side(tables: Sequence[Tables]) -> dict[Kinds, Floats]:
+    """Tables (N, states', states) of several units as (N, units, states', states)."""
+    found: dict[Kinds, Floats] = {}
+    for unit, own in enumerate(tables):
+        for key, table in own.items():
+            found.setdefault(key, np.zeros((len(table), len(tables), *table.shape[1:])))[:, unit] = table
+    return found
+
+
+def _of_rotation(operator: ParameterOperator, rotors: dict[int, RotorBlock], frame: Frame) -> Tables:
+    """The elements of operators of N that no powers describe."""
+    found: Tables = {}
     for number, rotor in rotors.items():
         own = operator.rotation(rotor)
         if own is not None:
-            pair = (number, number)
-            found[pair] = found[pair] + own if pair in found else own
+            kind, size = frame.kinds[number], len(own)
+            of_kind = frame.energies_mhz[kind]
+            table = found.setdefault((kind, kind, 0), np.zeros((*of_kind.shape, of_kind.shape[1])))
+            table[rotor.n - frame.lowest, :size, :size] = own
+    return found
 
 
-def _pair_by_pair(
-    operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock]
-) -> Iterator[tuple[Channel, Elements]]:
-    """The same of an axial top, whose blocks are not stacked."""
-    parts: dict[Pair, tuple[SpinPart, SpinPart]] = {}
-    for block in blocks:
-        for a, up in enumerate(block.parts):
-            parts |= {(up.number, low.number): (up, low) for low in block.parts[: a + 1]}
-    by_channel: dict[Channel, Elements] = {}
-    diagonal = [pair for pair in parts if pair[0] == pair[1]]
-    for column, operator in enumerate(operators):
-        if not operator.channels and operator.powers is not None:
-            values = _of_powers(operator.powers, [parts[pair][0].rotor for pair in diagonal])
-            if values is not None:
-                alone = by_channel.setdefault(ALONE, {})
-                for pair, value in zip(diagonal, values, strict=True):
-                    alone.setdefault(pair, []).append((column, value))
-                continue
-        for pair, (up, low) in parts.items():
-            if operator.connects(up, low):
-                for channel, element in operator.elements(up, low).items():
-                    by_channel.setdefault(channel, {}).setdefault(pair, []).append((column, element))
-    yield from by_channel.items()
+def _of_powers(operators: Sequence[ParameterOperator], shared: Shared, frame: Frame) -> dict[Kinds, UnitTables]:
+    """Powers of N, N^2p ½[Nz^2q, N₊^2n + N₋^2n]₊: a unit for each (v, q, n), which a parameter has N^2p times at each N."""
+    terms = [
+        ((v, q, n), p, column, factor)
+        for column, operator in enumerate(operators)
+        for v, by_powers in operator.powers or ()
+        for (p, q, n), factor in by_powers.items()
+    ]
+    units = list(dict.fromkeys(unit for unit, *_ in terms))
+    columns = sorted({column for _, _, column, _ in terms})
+    n = frame.lowest + np.arange(frame.count_of_n)
+    mix = np.zeros((len(n), len(columns), len(units)))
+    for unit, p, column, factor in terms:
+        mix[:, columns.index(column), units.index(unit)] += factor * (n * (n + 1.0)) ** p
+    found: dict[Kinds, Floats] = {}
+    for stack, matrices in powers_of_stacks(shared.stacks or [], units) if units else ():
+        count, states = frame.energies_mhz[stack.kind].shape
+        table = found.setdefault((stack.kind, stack.kind, 0), np.zeros((count, len(units), states, states)))
+        table[stack.n - frame.lowest, :, : matrices.shape[2], : matrices.shape[3]] = matrices
+    return {key: UnitTables(elements, np.array(columns), mix) for key, elements in found.items()}
 
 
-def _of_powers(powers: Sequence[tuple[int, Operators]], rotors: Sequence[RotorBlock]) -> Floats | None:
-    """Powers of N over blocks of one axial function each, (blocks, 1, 1); None where a block has others.
+def _add(total: Floats, states: States, tables: dict[Kinds, UnitTables], coefficients: Floats, frame: Frame) -> None:
+    """Adds the derivatives (blocks, parameters, states) by one channel for blocks of a group that stand side by side."""
+    group, twice_f = states.group, list(states.places)
+    own = coefficients[frame.of_f(twice_f)]
+    for left in group.rotations:
+        for right in group.rotations:
+            key = (left.kind, right.kind, (left.rise - right.rise) // 2)
+            if key in tables:
+                slopes = _between(states, left, right, tables[key], own, frame.of_n(twice_f, right))
+                twice = (
+                    1.0 if left.kind == right.kind and left.rise == right.rise else 2.0
+                )  # the other order has no table
+                total[:, tables[key].columns] += twice * slopes
 
-    N^2p Nz^2q is (N (N + 1))^p K^2q; those that change K do not act.
-    """
-    if any(len(rotor.parts) != 1 or not isinstance(rotor.parts[0].basis, AxialState) for rotor in rotors):
-        return None
-    parts = [rotor.parts[0] for rotor in rotors]
-    v, n, k = (
-        np.array([float(value) for value in column])
-        for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True)
-    )
-    total = np.zeros(len(parts))
-    for state, operators in powers:
-        for (p, q, order), factor in operators.items():
-            if order == 0:
-                total += np.where(v == state, factor * (n * (n + 1)) ** p * k ** (2 * q), 0.0)
-    return total[:, None, None]
+
+def _between(
+    states: States, left: RotationColumns, right: RotationColumns, table: UnitTables, coefficients: Floats,
+    places: slice | list[int],
+) -> Floats:  # fmt: skip
+    """Σ_p'r' V_p'r' Σ_pr c(p', p) X_c(r', r) V_pr between two kinds of blocks: (blocks, parameters, states)."""
+    elements = table.elements[places]  # (blocks, units, r', r)
+    blocks, units, rows, columns = elements.shape
+    rows, columns = min(rows, states.vectors.shape[2]), min(columns, states.vectors.shape[2])
+    elements = elements[:, :, :rows, :columns].reshape(blocks, 1, units * rows, columns)
+    bra, ket = states.vectors[:, left.columns, :rows], states.vectors[:, right.columns, :columns]
+    between = coefficients[:, left.patterns, right.patterns]
+    if between.shape[1:] == (1, 1):
+        moved = between[:, :, :, None] * ket
+    else:
+        moved = np.matmul(between, ket.reshape(blocks, ket.shape[1], -1)).reshape(blocks, -1, columns, ket.shape[3])
+    found = np.matmul(elements, moved).reshape(blocks, -1, units, rows, moved.shape[3])
+    found *= bra[:, :, None]
+    slopes = found.sum(axis=(1, 3))
+    return np.asarray(np.matmul(table.mix[places], slopes))

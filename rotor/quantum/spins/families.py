@@ -6,21 +6,13 @@ both. An operator that changes sign with the exchange joins one class to the oth
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from rotor.arrays import Floats
 from rotor.quantum.spins.contraction import Contracted, acting_numbers
 from rotor.quantum.spins.rotor import Channel
 
 Link = tuple[int, int, int]
 """Two blocks that an operator connects, and 1 where that changes sign with the exchange."""
-
-
-def links_of_pairs(operators: Mapping[tuple[int, int], Mapping[Channel, Floats]]) -> Iterator[Link]:
-    """The links of operators by pairs of blocks."""
-    for (i, k), found in operators.items():
-        for changed in {int(channel.exchange < 0) for channel in found}:
-            yield i, k, changed
 
 
 def links_of_stacks(contracted: Iterable[tuple[Sequence[Contracted], Sequence[Channel]]]) -> Iterator[Link]:

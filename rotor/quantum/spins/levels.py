@@ -11,7 +11,9 @@ import numpy as np
 from rotor.arrays import Ints, hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
-from rotor.quantum.spins.blocks import Exist, Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
+from rotor.quantum.spins.axial import Exist
+from rotor.quantum.spins.axial_levels import solve_axial
+from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
 from rotor.quantum.spins.many_f_levels import solve_many_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
@@ -75,7 +77,7 @@ def levels_of_f(
         The rotation is spread over it by N.
     exist : callable, optional
         Which of levels (n, columns as `SpinBlock.labels`) there are, (n,) of bool; blocks with none of them are not
-        solved.
+        solved. In an axial top v and K decide.
 
     Returns
     -------
@@ -84,13 +86,13 @@ def levels_of_f(
     """
     hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, every_f)
-    plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
+    plan = simplified(plan_of(top, effects, lowest, highest, executor, exist), effects, every_f)
     solve = solve_f
     if plan.shared.scheme.equivalent == 3:
         from rotor.quantum.spins.three_equivalent import in_wang_functions, solve_three
 
         plan, solve = in_wang_functions(plan), solve_three
-    solved = solve_many_f(plan, every_f, exist)
+    solved = solve_axial(plan, every_f, exist) if plan.shared.axial else solve_many_f(plan, every_f, exist)
     if solved is None:
         prepare(plan, every_f)
         solved = [block for f in every_f for block in solve(plan, f, exist)]

@@ -17,12 +17,13 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.blocks import Shared, SpinBlock, operators_between, product
-from rotor.quantum.spins.contraction import MOST_RANK, by_numbers, tensors_of_stacks
+from rotor.quantum.spins.contraction import by_numbers, tensors_of_stacks
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
 from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.stack_elements import MOST_RANK
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
@@ -272,6 +273,7 @@ class ParameterOperator:
         terms = [term for term in declared.spin_terms if term.name == name]
         self.channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
         self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
+        self._by_n: dict[int, list[tuple[int, int, JOperator]]] = {}
         self._own = [(v, operators) for v, terms in declared.states if (operators := terms.get(name))]
         self._couplings = [one for one in declared.couplings if one.name == name]
 
@@ -317,7 +319,12 @@ class ParameterOperator:
             _add_between(total, block, bra, ket, operator)
         return block.vectors.T @ total @ block.vectors if total.any() else None
 
-    def _operators_of_j(self, n: int) -> Iterator[tuple[int, int, JOperator]]:
+    def _operators_of_j(self, n: int) -> list[tuple[int, int, JOperator]]:
+        if n not in self._by_n:
+            self._by_n[n] = list(self._made_of_j(n))
+        return self._by_n[n]
+
+    def _made_of_j(self, n: int) -> Iterator[tuple[int, int, JOperator]]:
         representation = self._shared.representation
         for effect in self._effects:
             if self._name in effect.parameters(self._top):

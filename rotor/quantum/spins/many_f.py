@@ -72,6 +72,11 @@ class Frame:
     patterns: dict[int, list[int]]
     n_patterns: list[NPattern]
 
+    @property
+    def count_of_n(self) -> int:
+        """N in the tables by N."""
+        return len(next(iter(self.energies_mhz.values())))
+
     def of_f(self, twice_f: Sequence[int]) -> slice | list[int]:
         """The places of some rising F in tables by F."""
         return _places((twice_f[0] - self.twice_f[0]) // 2, twice_f, len(self.twice_f))

@@ -12,7 +12,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.hyperfine_method import FIRST_ORDER
-from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
+from rotor.quantum.spins.axial import Exist
+from rotor.quantum.spins.blocks import Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
 from rotor.quantum.spins.parts import SpinPart, labels_of_alike, names_of_tables
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
@@ -60,7 +61,7 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     alone = shared.used is not None and shared.used.method == FIRST_ORDER
     if alone and any(part.repeats > 1 for _, parts in members for part in parts):
         return None  # state by state the matrices are smaller
-    members, names, sizes = _existing(members, table.patterns, exist)
+    members, names, sizes = existing_blocks(members, table.patterns, exist)
     frame = frame_of(shared.stacks, table.places, table.every)
     shared.cache.update(frame=frame, patterns=table.patterns)
     acting = []
@@ -75,7 +76,7 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     return out
 
 
-def _existing(
+def existing_blocks(
     members: list[Member], patterns: dict[int, Ints], exist: Exist | None
 ) -> tuple[list[Member], list[Ints], list[Ints]]:
     """The blocks in which a level exists, the names of their levels, and how many each sub-block names."""

@@ -9,9 +9,10 @@ import numpy as np
 
 from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
+from rotor.quantum.spins.contraction import tensors_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
+from rotor.quantum.spins.stack_elements import MOST_RANK
 from rotor.quantum.tensors import Tensors, rank_of
 
 _ELEMENT, _PRODUCT = 1.5e-4, 2e-6  # what an element costs, and one step of its products, over what a call costs
@@ -66,7 +67,7 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     shared, rank = blocks[0].shared, rank_of(tensors)
     frame: Frame = shared.cache["frame"]
     tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
-    every = [_states(group, own, levels) for group, own in _by_group(blocks)]
+    every = [states_of_group(group, own, levels) for group, own in groups_of_blocks(blocks)]
     space = Workspace()
     for step in range(0, 2 * rank + 1, 2):
         coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
@@ -75,7 +76,8 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
                 yield from _between(up, low, step, rank, tables, coefficients, frame, space)
 
 
-def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]]:
+def groups_of_blocks(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]]:
+    """The groups in which blocks were solved, F rising."""
     found: dict[int, tuple[Group, list[SpinBlock]]] = {}
     for block in blocks:
         assert block.group is not None
@@ -83,7 +85,8 @@ def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]
     return [(group, sorted(own, key=lambda block: block.twice_f)) for group, own in found.values()]
 
 
-def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
+def states_of_group(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
+    """Blocks of a group, F rising, side by side; levels: the row of what is beyond a block."""
     sizes = [len(block.energies_mhz) for block in blocks]
     vectors = np.zeros((len(blocks), group.columns * group.states, max(sizes)))
     starts, counts = np.array([block.start for block in blocks], dtype=np.int32), np.array(sizes)

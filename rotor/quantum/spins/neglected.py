@@ -73,12 +73,8 @@ def largest_shifts(plan: Plan) -> tuple[float, float]:
 
 def _matrices(plan: Plan) -> Iterator[_Matrices]:
     """Every pair of blocks once, those of two stacks together."""
-    if plan.contracted is None:
-        for (i, k), found in plan.grouped.items():
-            yield _Matrices(np.array([i]), np.array([k]), [(matrix[None], channels) for matrix, channels in found])
-        return
     of_stacks: dict[tuple[int, int, int], _Matrices] = {}
-    for every, channels in plan.contracted:
+    for every, channels in plan.contracted or ():
         for up, low, pairs, matrices in every:
             numbers = up.numbers[pairs.up], low.numbers[pairs.low]
             key = (int(up.numbers[0]), int(low.numbers[0]), pairs.rise)

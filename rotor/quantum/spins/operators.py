@@ -114,7 +114,7 @@ class Cosines:
     @property
     def rank(self) -> int:
         """1 of a vector, 2 of a matrix."""
-        return np.ndim(self.components)
+        return 2 if isinstance(self.components[0], tuple) else 1
 
     @property
     def odd(self) -> bool:
@@ -257,6 +257,7 @@ def tensor_of(components: Vector | Matrix, rank: int, representation: str) -> Bo
     return body_tensor(parts, rank, representation) if parts.any() else None
 
 
+@lru_cache(maxsize=256)
 def axis_tensor(components: Matrix, representation: str) -> BodyTensor | None:
     """The vector of the antisymmetric part."""
     c = np.array(components, dtype=float)

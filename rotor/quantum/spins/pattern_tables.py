@@ -36,7 +36,9 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
     highest = patterns[max(patterns)]
     moving = np.ones(highest.shape[1], dtype=np.int64)
     if scheme.equivalent:
-        moving[-2] = 0  # a total of equivalent spins does not rise with F
+        moving[-scheme.equivalent : -1] = (
+            0  # a total of equivalent spins does not rise with F, nor its symmetry of three
+        )
     # by distances from F: of the highest F first, then those that equivalent spins have at lower F alone
     classes: dict[tuple[int, ...], int] = {}
     for f in sorted(patterns, reverse=True):

@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
-from rotor.quantum.spins.blocks import Operators, Plan
+from rotor.quantum.spins.blocks import Plan
 from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.neglected import largest_shifts
 
@@ -39,18 +39,7 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
     if chosen == EXACT:
         return plan.with_method(used)
-    if plan.contracted is None:
-        return plan.with_method(used, _remaining(plan, chosen))
-    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted])
-
-
-def _remaining(plan: Plan, method: str) -> Operators:
-    """The operators that a method has."""
-    blocks = plan.blocks
-    if method == N_DIAGONAL:
-        return {pair: found for pair, found in plan.operators.items() if blocks[pair[0]].n == blocks[pair[1]].n}
-    alone = {pair: found for pair, found in plan.operators.items() if pair[0] == pair[1]}
-    return {pair: {c: np.diag(np.diag(x)) for c, x in found.items()} for pair, found in alone.items()}
+    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted or ()])
 
 
 def _of_one_n(every: Sequence[Contracted], method: str) -> list[Contracted]:

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, coefficients_of
+from rotor.quantum.spins.axial import Exist
+from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_of
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart, assigned
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart

@@ -1,0 +1,141 @@
+"""Levels of axial tops with spins, and their derivatives: all blocks of one size in one array, see `axial`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.axial import Exist, operators_of_axial_stacks
+from rotor.quantum.spins.blocks import Plan, SpinBlock, parts_of_f
+from rotor.quantum.spins.contraction import Contracted
+from rotor.quantum.spins.many_f_levels import Member, existing_blocks
+from rotor.quantum.spins.parts import SpinPart, labels_of_alike
+from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
+from rotor.quantum.spins.rotor import Channel, RotorPart
+from rotor.quantum.spins.scheme import Scheme
+
+if TYPE_CHECKING:
+    from rotor.quantum.spins.lines import ParameterOperator
+
+_REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
+_MOST = 100  # patterns of an F: tables of coefficients grow with the square
+
+
+class Functions(NamedTuple):
+    """The functions of blocks of one size: the place of each block's F, and numbers of solved blocks and patterns, (blocks, size)."""
+
+    f: Ints
+    numbers: Ints
+    patterns: Ints
+
+
+def by_size(
+    members: Sequence[tuple[int, Sequence[SpinPart]]], places: dict[int, Ints]
+) -> Iterator[tuple[list[int], Functions]]:
+    """Blocks, given by their doubled F and parts, of one number of functions: which, and their functions."""
+    first = min(places)
+    alike: dict[int, list[tuple[int, int, list[int], list[int]]]] = {}
+    for place, (f, parts) in enumerate(members):
+        own = places[f].tolist()
+        numbers = [part.number for part in parts for _ in range(part.repeats)]
+        patterns = [pattern for part in parts for pattern in own[part.patterns]]
+        alike.setdefault(len(numbers), []).append((place, (f - first) // 2, numbers, patterns))
+    for rows in alike.values():
+        of_f, of_numbers, of_patterns = (np.array([row[i] for row in rows]) for i in (1, 2, 3))
+        yield [row[0] for row in rows], Functions(of_f, of_numbers, of_patterns)
+
+
+class AxialTables:
+    """Elements of sums of channels over the functions of blocks: closed forms by pairs of solved blocks, coefficients by F."""
+
+    def __init__(self, functions: Sequence[RotorPart], scheme: Scheme, twice_f: tuple[int, int]) -> None:
+        self._n = np.array([part.basis.j for part in functions])
+        self._v = np.array([part.v for part in functions])
+        self._scheme, self._range = scheme, twice_f
+
+    def matrices(self, found: Sequence[Contracted], channels: Sequence[Channel], functions: Functions) -> Floats:
+        """Σ_channels c(p', p) X(r', r), the lower triangles (blocks, size, size)."""
+        table = np.zeros((int(self._v.max()) + 1, _REACH + 1, len(self._n)))
+        for up, low, pairs, values in found:
+            table[up.sections[0].v, pairs.rise, low.numbers[pairs.low]] = values[:, 0, 0]
+        bra, ket = functions.numbers[:, :, None], functions.numbers[:, None, :]
+        rise = self._n[bra] - self._n[ket]
+        elements = np.where((rise >= 0) & (rise <= _REACH), table[self._v[bra], np.clip(rise, 0, _REACH), ket], 0.0)
+        coefficients = sum(couplings_by_f(self._scheme, channel, *self._range) for channel in channels)
+        of_functions = np.asarray(coefficients)[
+            functions.f[:, None, None], functions.patterns[:, :, None], functions.patterns[:, None, :]
+        ]
+        return np.tril(of_functions * elements)
+
+
+def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock] | None:
+    """The blocks of all F as `blocks.solve_f` gives them one by one; None where that is the way to solve them.
+
+    every_f: doubled, rising by 2. exist: see `levels.levels_of_f`.
+    """
+    shared = plan.shared
+    if shared.axial is None or plan.contracted is None:
+        return None
+    table = pattern_table(shared.scheme, every_f[0], every_f[-1])
+    members: list[Member] = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
+    if not members or len(table.every) > _MOST:
+        return None
+    members, names, sizes = existing_blocks(members, table.patterns, exist)
+    shared.cache["patterns"] = table.patterns
+    tables = AxialTables([block.parts[0] for block in plan.blocks], shared.scheme, (every_f[0], every_f[-1]))
+    rotation = np.array([block.energies_mhz[0] for block in plan.blocks])
+    out: list[SpinBlock] = [None] * len(members)  # type: ignore[list-item]
+    for which, functions in by_size(members, table.places):
+        diagonal = rotation[functions.numbers]
+        zeros = diagonal[:, :1].copy()  # taken out of the matrices for the sake of digits
+        matrices = (diagonal - zeros)[:, :, None] * np.eye(diagonal.shape[1])
+        for found, channels in plan.contracted:
+            matrices += tables.matrices(found, channels, functions)
+        if not np.isfinite(matrices).all():
+            raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+        energies, vectors = np.linalg.eigh(matrices)  # reads the lower triangles
+        of_names, of_sizes = (np.stack([own[i] for i in which]) for own in (names, sizes))
+        labels, mixing = labels_of_alike([members[i][1] for i in which], of_names, of_sizes, vectors)
+        results = zip(energies + zeros, vectors, labels, mixing, strict=True)
+        for i, result in zip(which, results, strict=True):
+            f, parts = members[i]
+            out[i] = SpinBlock(f, table.patterns[f], parts, *result, shared)
+    return out
+
+
+def axial_derivatives(operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock], count: int) -> Floats:
+    """∂E/∂c (count, parameters) of the states of spin blocks, by the rows of their levels."""
+    shared, out = blocks[0].shared, np.zeros((count, len(operators)))
+    twice_f = [block.twice_f for block in blocks]
+    places = pattern_table(shared.scheme, min(twice_f), max(twice_f)).places
+    stacks = shared.axial or []
+    rotors = {number: stack.sections[0].every[i] for stack in stacks for i, number in enumerate(stack.numbers.tolist())}
+    along = _of_powers(operators, [rotors[number] for number in range(len(rotors))])
+    tables = AxialTables([part for _, part in sorted(rotors.items())], shared.scheme, (min(places), max(places)))
+    acting = [(column, channel) for column, operator in enumerate(operators) for channel in operator.channels]
+    pieces = [operators[column].channels[channel] for column, channel in acting]
+    spins = operators_of_axial_stacks(stacks, _REACH, pieces, shared.representation)
+    for which, functions in by_size([(block.twice_f, block.parts) for block in blocks], places):
+        vectors = np.stack([blocks[i].vectors for i in which])
+        slopes = np.matmul((vectors**2).transpose(0, 2, 1), along[functions.numbers])
+        for (column, channel), found in zip(acting, spins, strict=True):
+            lower = tables.matrices(found, [channel], functions)
+            whole = lower + np.tril(lower, -1).transpose(0, 2, 1)
+            slopes[:, :, column] += (np.matmul(whole, vectors) * vectors).sum(axis=1)
+        rows = np.array([blocks[i].start for i in which])[:, None] + np.arange(vectors.shape[2])
+        out[rows] = slopes
+    return out
+
+
+def _of_powers(operators: Sequence[ParameterOperator], functions: Sequence[RotorPart]) -> Floats:
+    """N^2p Nz^2q, (N (N + 1))^p K^2q, of every function and parameter; those that change K do not act."""
+    v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in functions), strict=True))
+    x, out = n * (n + 1.0), np.zeros((len(functions), len(operators)))
+    for column, operator in enumerate(operators):
+        for state, powers in operator.powers or ():
+            total = sum(factor * x**p * k ** (2.0 * q) for (p, q, order), factor in powers.items() if not order)
+            out[:, column] += np.where(v == state, total, 0.0)
+    return out

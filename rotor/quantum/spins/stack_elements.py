@@ -1,0 +1,193 @@
+"""Elements of operators and tensors between Wang functions of many N at once, by the formulas of `tensors` and `operators`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.label_blocks import unit_diagonals
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, Scalar, axis_tensor, factors_with_n, tensor_of
+from rotor.quantum.spins.rotor import RotorPart
+from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.tensors import BodyTensor, overlap
+from rotor.quantum.wang.basis import WangBlock
+
+MOST_RANK = 2  # up to which there are closed forms for many N at once
+
+
+class Section(NamedTuple):
+    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, the parts of all N."""
+
+    v: int
+    basis: WangBlock
+    rows: slice
+    every: tuple[RotorPart, ...]
+
+
+class Pairs(NamedTuple):
+    """Blocks of two stacks, the N' and N of each pair: places in the stacks and N as columns."""
+
+    up: Ints
+    low: Ints
+    m: Ints
+    n: Ints
+
+    @property
+    def rise(self) -> int:
+        """N' - N, the same of all."""
+        return int(self.m[0, 0] - self.n[0, 0])
+
+    def turned(self) -> Pairs:
+        """The other way round."""
+        return Pairs(self.low, self.up, self.n, self.m)
+
+
+def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats:
+    """½[Nz^2q, N₊^2n + N₋^2n]₊ over the functions of a section: (blocks, units, functions, functions)."""
+    bases = [part.basis for part in section.every if isinstance(part.basis, WangBlock)]
+    matrices = np.zeros((len(bases), len(units), section.basis.size, section.basis.size))
+    for d, diagonal in enumerate(unit_diagonals(bases, [basis.size for basis in bases], units) if units else ()):
+        places = np.arange(max(diagonal.shape[1] - d, 0))
+        values = diagonal[:, places].transpose(0, 2, 1)
+        matrices[:, :, places + d, places] = matrices[:, :, places, places + d] = values
+    return matrices
+
+
+def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    if isinstance(rotor, Cosines):
+        tensor = tensor_of(rotor.components, rotor.rank, representation)
+        found = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
+        return -found if found is not None and rotor.rank == 1 else found
+    if isinstance(rotor, CosinesWithN):
+        return _of_cosines_with_n(rotor, left, right, pairs, representation)
+    if isinstance(rotor, Scalar):
+        return _of_scalar(rotor, left, right, pairs)
+    return _one_by_one(rotor, left, right, pairs, representation)
+
+
+def _of_cosines_with_n(
+    rotor: CosinesWithN, left: Section, right: Section, pairs: Pairs, representation: str
+) -> Floats | None:
+    """See `CosinesWithN.elements`."""
+    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
+    rise = pairs.rise
+    if abs(rise) > 1:
+        return None
+    up, low = left.basis, right.basis
+    stretch, change, length = factors_with_n(m, n)
+    parts = [
+        (stretch, tensor_of(rotor.components, 2, representation)),
+        (change, axis_tensor(rotor.components, representation)),
+    ]
+    found = [
+        (factor, tensor_elements_of_pairs(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None
+    ]
+    acting = [factor * matrix for factor, matrix in found if matrix is not None]
+    scalar = float(np.trace(np.array(rotor.components))) / 3
+    if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
+        acting.append(scalar * length * np.eye(up.size, low.size))
+    return np.asarray(sum(acting)) if acting else None
+
+
+def _of_scalar(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Floats | None:
+    """Powers of N, which act between equal Wang functions."""
+    bases = zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
+    alike = np.array([left.every[a].basis == right.every[b].basis for a, b in bases])
+    if not alike.any():
+        return None
+    units = sorted({(q, n) for (_, q, n), _ in rotor.operators})
+    x, factors = pairs.n[:, 0] * (pairs.n[:, 0] + 1.0), np.zeros((len(alike), len(units)))
+    for (p, q, n), factor in rotor.operators:
+        factors[:, units.index((q, n))] += np.where(alike, factor * x**p, 0.0)
+    matrices = power_matrices(left, units)[pairs.up]
+    found = np.zeros((len(alike), left.basis.size, right.basis.size))
+    size = min(found.shape[1:])
+    found[:, :size, :size] = np.einsum("bu,buij->bij", factors, matrices[:, :, :size, :size])
+    return found
+
+
+def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    """Any operator, pair by pair."""
+    total: Floats | None = None
+    for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
+        found = rotor.elements(left.every[a].basis, right.every[b].basis, representation)
+        if found is not None:
+            if total is None:
+                total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
+            total[place, : found.shape[0], : found.shape[1]] = found
+    return total
+
+
+def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
+    """`tensors.block_elements` of all pairs: (pairs, up.size, low.size)."""
+    rank, rise = tensor.rank, pairs.rise
+    if rank > MOST_RANK:
+        raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
+    if abs(rise) > rank or not (steps := tensor.signed_parts(up._replace(j=rise), low._replace(j=0))[0]):
+        return None
+    closes = (pairs.m + pairs.n >= rank)[:, 0]
+    if not closes.any():
+        return None
+    m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
+    by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
+    parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
+    found, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
+    for step in steps:
+        source, target = overlap(up, low, step)
+        if source.start < source.stop:
+            rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
+            first, count = low.first_k + 2 * source.start, source.stop - source.start
+            found[:, rows, columns] = _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
+    if rank > 1:
+        _add_folded(found, parts, up, low, (every_n, rise))
+    if closes.all():
+        return found
+    out = np.zeros((len(closes), up.size, low.size))
+    out[closes] = found
+    return out
+
+
+@lru_cache(maxsize=512)  # of N up to 100 some 20 MB
+def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
+    """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
+
+    Parameters
+    ----------
+    every_n : tuple of int
+        N of the lower blocks.
+    rise, rank, step : int
+        By how much N changes, rank of the tensor, by how much K changes.
+    first_k, count : int
+        The lowest K and their number.
+
+    Returns
+    -------
+    (N, K) array
+        0 where there is no such K; shared and read-only.
+    """
+    n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
+    m = n + rise
+    exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
+    inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
+    values = closed_coupling(n.astype(float), rise, rank, step, inside)
+    if step:
+        values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
+    out = np.where(exists, values, 0.0)
+    out.flags.writeable = False
+    return out
+
+
+def _add_folded(
+    found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[tuple[int, ...], int]
+) -> None:
+    """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
+    rank, (every_n, rise) = parts.shape[1] // 2, of_pairs
+    for column, k in enumerate(low.k[:rank].tolist()):
+        for row, k_up in enumerate(up.k[:rank].tolist()):
+            if k and k_up and k + k_up <= rank:
+                turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
+                found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
