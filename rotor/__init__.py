@@ -50,6 +50,7 @@ VERBS = (
     "zeeman",
     "align",
     "emission",
+    "fit",
     "assign",
     "torsion",
 )  # each a function of that name

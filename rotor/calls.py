@@ -38,6 +38,9 @@ EXAMPLES = {
     "torsion": (
         'rotor.torsion("C2H6", bond="1-2", potential="V3=1013 cm-1", vmax=0).table.energy_cm.round(2).tolist()', "[150.15, 150.15]",
     ),
+    "fit": (
+        'rotor.fit([(1, 0, 20.0, 0.1), (2, 1, 40.0, 0.1)], constants="B=9 MHz", free="B").parameters.value_mhz.round(6).tolist()', "[10.0]",
+    ),
     "tumble": (
         'rotor.tumble(moments="1,2,3", angular_velocity="0,1,0", times="0:1:2").motion_kind', "'steady'",
     ),

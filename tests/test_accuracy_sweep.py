@@ -12,7 +12,6 @@ import pytest
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
-from rotor.scenes.fit_sections import FitLines
 from rotor.scenes.knobs.knob import Knob, Measure, Setting
 from rotor.scenes.knobs.of_levels import energies_like, to_order
 from rotor.scenes.scene import (
@@ -35,6 +34,7 @@ from rotor.scenes.sections import (
     BodySection,
     EmissionConditions,
     EmittingMolecule,
+    FitLines,
     FluidConditions,
     FluidNumerics,
     GasNumerics,

@@ -109,7 +109,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,"), "names parted by commas"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,B"), "B is named twice"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--prior", "B"), "--prior 'B': name=error"),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--lin", "x.lin"), "--lin goes with a .par file"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--lin", "x.lin"), "--lin: goes with a .par file"),
         (("co.txt", "--constants", "B=57000 MHz", "--free", "B"), "assigned lines are read from"),
         (("empty.csv", "--constants", "B=57000 MHz", "--free", "B"), "no lines in it"),
         (("co.csv", "--constants", "A=6 B=5 C=4 GHz", "--free", "B"), "no column ka_upper"),
@@ -141,7 +141,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         ),
         (("co.par", "--lin", "none.lin"), "--lin: none.lin: no such file"),
         (("held.par", "--lin", "co.lin"), "no parameter is free"),
-        (("co.par", "--out", "co"), "co.par is an input"),
+        (("co.par", "--out", "co"), "--out co.par: is an input"),
         (("alone.par",), "there are no measured lines beside alone.par"),
     ],
 )
@@ -348,7 +348,7 @@ def test_the_options_and_keys_are_in_the_documents(call, folder):
     for verb in ("fit", "structure"):
         section = DOCS.split(f"## rotor {verb}\n")[1].split("\n## ")[0]
         for option in re.findall(r"--[a-z-]+", call(verb, "--help")[1].split("Examples")[0]):
-            assert f"`{option}" in section or option == "--help", (verb, option)
+            assert f"`{option}" in section or option in ("--help", "--help-all"), (verb, option)
         for key in json.loads((folder / f"{verb}.json").read_text(encoding="utf-8")):
             assert f"`{key}`" in section, (verb, key)
 

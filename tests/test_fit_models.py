@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.cli.fit import EXAMPLES
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.choose import choose_constants, promised, try_constants
 from rotor.fitting.criteria import chi_squared, f_test
@@ -25,6 +24,7 @@ from rotor.plots.fit import fit_figure
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+from rotor.verbs.fit import EXAMPLES
 
 ASYMMETRIC = ("j", "ka", "kc")
 TRUE = Constants(

@@ -290,7 +290,7 @@ def test_the_errors_of_the_table_may_be_those_of_the_scatter(call, folder, seen)
     assert "$-1.11$ (held)" in stated  # kHz
     code, _, err = call(*common, "--table", "x.tex", "--table-errors", "both")
     assert code == 2
-    assert "--table-errors both: one of stated, scatter is needed" in err
+    assert "--table-errors: 'both': expected one of stated, scatter" in err
 
 
 def test_what_is_not_written_is_said(call, folder, seen):
@@ -299,7 +299,7 @@ def test_what_is_not_written_is_said(call, folder, seen):
         "fit", "x.csv", "--constants", "A=5213 B=1897 C=1402 MHz", "--free", "A,B,C", "--poor-rms", "1", "--out", "t"
     )
     assert code == 1
-    assert "not converged: t.toml, t.par, t.var are not written" in err
+    assert "t.toml, t.par, t.var are not written: not converged" in err
     assert [path.name for path in sorted(folder.glob("t.*"))] == ["t.fit"]
 
 

@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 from rotor.scenes.accuracy_sweep import work_precision
-from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.kind import NoResultError
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import EmissionScene, FitScene
 from rotor.scenes.scene_file import parse_scene, read_scene, write_scene
-from rotor.scenes.sections import EmissionConditions, EmittingMolecule, MoleculeSection
+from rotor.scenes.sections import (
+    EmissionConditions,
+    EmittingMolecule,
+    FitLines,
+    FitNumerics,
+    FitOutputs,
+    FitParameters,
+    MoleculeSection,
+)
 
 DATA = Path(__file__).parent / "oracles" / "fits"
 OCS = ("--constants", "B=6081 D=0.001 H=0 MHz")
@@ -64,7 +71,7 @@ def test_a_scene_of_a_fit_saved_elsewhere_finds_its_files(call, lines):
 def test_a_choice_of_constants_is_no_scene(call, lines):
     code, _, err = call("fit", "ocs.csv", *OCS, "--free", "B", "--choose", "D", "--save-scene", "s.toml")
     assert code == 2
-    assert "a scene has no --choose" in err
+    assert "--choose: a scene holds no choice of constants" in err
     assert not Path("s.toml").exists()
 
 
@@ -81,7 +88,7 @@ BAD = [
     ),
     (
         FitScene(lines=FitLines(source="ocs.csv"), molecule=START, parameters=FitParameters(free=["B"]), numerics=FitNumerics(loss="l1")),
-        "numerics: loss 'l1'",
+        "numerics.loss 'l1'",
     ),
     (EmissionScene(molecules=[]), "molecules: expected one molecule or more"),
     (EmissionScene(molecules=[EmittingMolecule(source="nonesuch")]), "molecules[0]: molecule.source: 'nonesuch'"),

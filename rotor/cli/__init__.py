@@ -57,7 +57,7 @@ VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # what is
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 OTHERWISE = {"emission": "rotor.cli.shared.observed_verb"}  # verbs with options of the command line alone
 ONE_THREAD = frozenset(
-    {"spectrum", "levels", "raman", "thermo", "emission"}
+    {"spectrum", "levels", "raman", "thermo", "emission", "fit"}
 )  # small blocks; set before numpy is loaded
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143

@@ -63,6 +63,34 @@ class Assignments(Table):
     def __len__(self) -> int:
         return len(self.frequency_mhz)
 
+    @classmethod
+    def from_rows(cls, names: Sequence[str], rows: ArrayLike, source: str = "rows") -> Assignments:
+        """Lines from rows of numbers: labels of the upper state, of the lower state, frequency and error (MHz).
+
+        >>> Assignments.from_rows(["j"], [(1, 0, 115271.2018, 0.0005)]).columns["j_upper"].tolist()
+        [1]
+        """
+        table, k = np.array(rows, dtype=np.float64), len(names)
+        if table.ndim != 2 or table.shape[1] != 2 * k + 2:
+            raise ValueError(
+                f"rows of shape {table.shape}: expected {', '.join(names)} of the upper state, of the lower state, frequency and error"
+            )
+        labels = table[:, : 2 * k].astype(np.int64)
+        if (labels != table[:, : 2 * k]).any():
+            raise ValueError("rows: expected whole quantum numbers")
+        n = len(table)
+        return cls(
+            tuple(names),
+            labels[:, :k],
+            labels[:, k:],
+            table[:, -2],
+            table[:, -1],
+            np.ones(n),
+            np.arange(n),
+            np.zeros(n, dtype=bool),
+            source,
+        )
+
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
         """Labels as j_upper, ka_upper, ..., then frequency_mhz, error_mhz, weight, blend."""

@@ -33,12 +33,16 @@ from rotor.tops.top import Top
 from rotor.version import version
 
 if TYPE_CHECKING:
+    from rotor.fitting.choose import Suggestion, Trial
     from rotor.formats.molecules.molecule_file import MoleculeFile
 
 
 @dataclass(frozen=True)
 class FitFiles:
-    """Files that a request was read from: the lines or case.par, the .lin of a case.par, lines merged with them, the start."""
+    """Files that a request was read from: the lines or case.par, the .lin of a case.par, lines merged with them, the start.
+
+    Lines that are no file have their `source` as a name.
+    """
 
     source: str
     lin: str | None = None
@@ -98,10 +102,19 @@ class FittedParameters(Table):
 
 @dataclass(frozen=True, eq=False)
 class FitAnswer:
-    """A fit that was asked for."""
+    """A fit that was asked for.
+
+    steps: of a choice of constants. trials, suggestions, spread: what was tried beside the fit, see `rotor.formats.fit_further`;
+    interrupted: what of these is not complete.
+    """
 
     request: FitRequest
     fit: Fit
+    steps: tuple[Trial, ...] = ()
+    trials: tuple[Trial, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
+    spread: tuple[float, ...] = ()
+    interrupted: str = ""
 
     @property
     def parameters(self) -> FittedParameters:
@@ -137,7 +150,7 @@ def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
 
 
 def fit_of_lines(
-    lines: str,
+    lines: str | os.PathLike[str] | Assignments | Sequence[Sequence[float]],
     top: Top,
     free: Sequence[str] | None = None,
     *,
@@ -145,12 +158,13 @@ def fit_of_lines(
     priors_mhz: Mapping[str, float] | None = None,
     start: str | None = None,
 ) -> FitRequest:
-    """The request of a file of assigned lines and of constants to start from.
+    """The request of assigned lines and of constants to start from.
 
     Parameters
     ----------
     lines : path
-        .lin, .csv, .cat or .cat.gz.
+        .lin, .csv, .cat or .cat.gz; or assigned lines; or rows of the numbers of the upper state, of the lower state, frequency and error
+        (MHz).
     top : Top
         Whose constants the fit starts from.
     free : sequence of str, optional
@@ -169,9 +183,18 @@ def fit_of_lines(
     ValueError
         Lines or names that cannot be, and no constant to fit.
     """
+    if isinstance(lines, os.PathLike):
+        lines = os.fspath(lines)
     has, priors = constants_for(lines, top, free or ()), dict(priors_mhz or {})
     quanta, halves = (has.quanta, has.halves) if isinstance(has, TopConstants) else (QUANTA[top.kind], frozenset[str]())
-    read, notes = read_assigned_lines(lines, quanta, halves)
+    notes: Sequence[str] = ()
+    if isinstance(lines, str):
+        read, notes = read_assigned_lines(lines, quanta, halves)
+    else:
+        read = lines if isinstance(lines, Assignments) else Assignments.from_rows(quanta, lines)
+    if tuple(read.names) != tuple(quanta):
+        raise ValueError(f"lines: labels {', '.join(read.names)}: expected {', '.join(quanta)}, those of the start")
+    name = lines if isinstance(lines, str) else read.source
     names = list(has.uncertainties) if free is None else list(free)
     if not names:
         raise ValueError("free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
@@ -198,23 +221,25 @@ def fit_of_lines(
         made = parameters(begin, names, ties=ties, priors_mhz=priors)
         said = ", ".join(f"{name} at {value:.3g} MHz" for name, value in moved.items())
         notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
-    title = " ".join(top.name.split()) or Path(lines).name
-    files = FitFiles(lines, start=start)
+    title = " ".join(top.name.split()) or Path(name).name
+    files = FitFiles(name, start=start)
     return FitRequest(
         read, begin, made, FitOptions(), title, files, ties=tuple(ties), priors_mhz=priors, notes=tuple(notes)
     )
 
 
-def constants_for(lines: str, top: Top, free: Sequence[str]) -> ConstantSet:
+def constants_for(lines: Any, top: Top, free: Sequence[str]) -> ConstantSet:
     """The constants of a top as a fit of these lines takes them: with its further states, and its spins where the lines have F.
 
     Raises ValueError for lines or free constants of spins that the top has not.
     """
     rotation = len(QUANTA[top.kind]) + (top.states is not None) + 2 * (top.internal_rotation is not None)
-    hyperfine = names_sums(lines, rotation) or any("(" in name for name in free)
+    sums = names_sums(lines, rotation) if isinstance(lines, str) else "f" in getattr(lines, "names", ())
+    hyperfine = sums or any("(" in name for name in free)
     if hyperfine and top.spin_constants is None:
         raise ValueError(
-            f"{lines}: lines or free constants of spins, and the constants to start from have none; give them there, such as "
+            f"{lines if isinstance(lines, str) else 'lines'}: "
+            "lines or free constants of spins, and the constants to start from have none; give them there, such as "
             "[spins.14N] with chi_aa = -4.2" + ("" if top.states else "; a number v of the state needs [states] there")
         )
     further = top.states is not None or top.internal_rotation is not None

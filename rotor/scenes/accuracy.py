@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy
-from rotor.scenes.kind import quantity
+from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy, quantity
 from rotor.scenes.scene import Scene
 
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take

@@ -182,7 +182,7 @@ def made_of(request: FluidRequest) -> FluidRequest:
 
 
 def _by_energy(scene: Any, request: FluidRequest, asked: float) -> Choice:
-    from rotor.scenes.kind import quantity
+    from rotor.scenes.choice import quantity
 
     given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, type(scene.numerics)().step))
     if given != usual:

@@ -7,6 +7,9 @@ from typing import Annotated, Any
 
 import msgspec
 
+from rotor.requests.field import Field
+from rotor.requests.readers import Quantity as Number
+
 NOTHING_CHEAPER = "exact: nothing cheaper"
 
 
@@ -37,3 +40,9 @@ class Reached:
     error: float
     unit: str
     how: str
+
+
+def quantity(name: str, value: float | str, unit: str) -> float:
+    """A number in `unit`; a ValueError names the key."""
+    found: float = Field(Number(unit), "", name).read(value, "key")
+    return found

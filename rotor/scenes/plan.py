@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
-from rotor.scenes.kind import fields, kind_of
+from rotor.scenes.kind import kind_of
 from rotor.scenes.plan_parts import (
     LONG_SEARCH,
     Plan,
@@ -69,7 +69,7 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
     kind = kind_of(scene)
     request = kind.request(scene, folder)
-    with fields(**kind.names):
+    with kind.naming():
         return _plan(scene, request)
 
 

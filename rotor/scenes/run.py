@@ -12,21 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.atomic_write import resolved
-from rotor.scenes.kind import Kind, Where, Writer, fields, kind_of
+from rotor.scenes.kind import Kind, Where, Writer, kind_of
 from rotor.scenes.scene import Scene, SceneResult, within
 from rotor.temporary import locked_file
+from rotor.verbs.verb import verb_of
 
 if TYPE_CHECKING:
     from rotor.scenes.choice import Choice, Reached
     from rotor.table import Table
-
-PICTURES = (".png", ".pdf", ".svg")
-SUFFIXES: Mapping[str, tuple[str, ...]] = {
-    "csv": (".csv",), "parquet": (".parquet",), "json": (".json",), "cat": (".cat", ".cat.gz"), "profile_csv": (".csv",),
-    "plot": PICTURES, "egy": (".egy",), "trajectories": (".traj", ".xyz", ".extxyz"), "checkpoint": (".npz",),
-    "report": (".fit",), "toml": (".toml",), "par": (".par",), "var": (".var",), "table": (".txt", ".md", ".tex"),
-    "save_lines": (".lin", ".csv"),
-}  # fmt: skip  # of every output that is a file
 
 
 def run_scene(
@@ -82,13 +75,13 @@ def _run(
     if getattr(scene, "accuracy", None) is not None:
         from rotor.scenes.accuracy import chosen
 
-        with fields(**kind.names):
+        with kind.naming():
             choice = chosen(scene, request)
         request = choice.request
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start
     found = None if choice is None else _reached(scene, answer, choice)
-    table = kind.table(answer)
+    table = kind.verb.table(answer)
     _write(scene, kind, answer, table, targets, found)
     files = tuple(path for paths in targets.values() for path in paths)
     return SceneResult(scene, request, answer, table, files, seconds, found)
@@ -115,10 +108,16 @@ def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:
 
 def output_names(scene: Scene) -> Iterator[tuple[str, str]]:
     """Every output that is a file, with the name that the scene gives it."""
-    for name in SUFFIXES:
+    for name in suffixes_of(scene.kind):
         given = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
         names: list[str] = given if isinstance(given, list) else [] if given is None else [given]
         yield from ((name, one) for one in names)
+
+
+def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
+    """The suffixes of every output of a kind of scene that is a file."""
+    outputs = verb_of(kind).outputs
+    return {one.name: one.suffixes for one in outputs if one.scene} | {"json": (".json",)}
 
 
 def _reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
@@ -133,8 +132,9 @@ def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Pa
     Raises ValueError for a suffix that an output has not, a folder that is not there, and one file for two outputs.
     """
     found: dict[str, list[Path]] = {}
+    suffixes = suffixes_of(scene.kind)
     for name, text in output_names(scene):
-        found.setdefault(name, []).append(_checked_path(f"outputs.{name}", within(out, text), SUFFIXES[name]))
+        found.setdefault(name, []).append(_checked_path(f"outputs.{name}", within(out, text), suffixes[name]))
     paths = [path.resolve() for every in found.values() for path in every]
     for path in paths:
         if paths.count(path) > 1:

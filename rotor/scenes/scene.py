@@ -17,7 +17,6 @@ import msgspec
 from msgspec import Struct, field
 
 from rotor.scenes.choice import Accuracy
-from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import MoleculeSection
 from rotor.scenes.verbs import VERBS
 from rotor.verbs.scene_tables import entries_before, tables_of
@@ -78,23 +77,6 @@ class SceneResult:
     reached: Reached | None = None
 
 
-class FitScene(Scene, frozen=True, tag="fit"):
-    """Constants fitted to measured lines."""
-
-    lines: FitLines
-    molecule: Annotated[
-        str | MoleculeSection | None, said("where the fit starts; a .par file says so itself", "water")
-    ] = None
-    parameters: FitParameters = FitParameters()
-    numerics: FitNumerics = FitNumerics()
-    outputs: FitOutputs = FitOutputs()
-
-
-_WRITTEN: Mapping[str, type[Scene]] = {
-    "fit": FitScene,
-}
-
-
 @cache
 def _scene_class(kind: str) -> Any:
     """The structure of a kind of scene."""
@@ -116,8 +98,6 @@ class Kinds(Mapping[str, type[Scene]]):
     """The structures of all kinds of scene, each made from the declaration of its verb when it is first used."""
 
     def __getitem__(self, kind: str) -> type[Scene]:
-        if kind in _WRITTEN:
-            return _WRITTEN[kind]
         if kind not in SCENE_VERBS:
             raise KeyError(kind)
         found: type[Scene] = _scene_class(kind)

@@ -10,12 +10,7 @@ from typing import Any
 
 from rotor.verbs.subjects import molecule_section
 
-Quantity = float | str
-Grid = list[float] | str
-
-
 MoleculeSection: Any = molecule_section()
-
 
 _SHARED = {
     "QuantumEffects": "SpectrumEffects", "VibrationSection": "SpectrumVibration", "BasisNumerics": "SpectrumNumerics",

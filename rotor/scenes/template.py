@@ -12,13 +12,6 @@ from rotor.scenes.scene import KINDS, SCHEMA
 from rotor.scenes.scene_file import structures_in, toml_value
 from rotor.verbs.verb import verb_of
 
-STARTS: dict[str, dict[str, Any]] = {
-    "fit": {
-        "lines.source": "lines.csv", "molecule.source": "water", "parameters.free": ["A", "B", "C"],
-        "outputs.csv": "fit.csv", "outputs.report": "out.fit",
-    },
-}  # fmt: skip  # what a template has switched on, by dotted name
-
 TAGS = {
     "pulses": 'shape = "gaussian"  # or switched, kick, table, thz',
     "effects": 'effect = "constant torque"  # of a body: see docs/scenes.md',
@@ -48,7 +41,7 @@ def template(kind: str) -> str:
 @cache
 def _start(kind: str) -> dict[str, Any]:
     """What a template has switched on, by dotted name."""
-    found = dict(STARTS[kind] if kind in STARTS else verb_of(kind).start)
+    found = dict(verb_of(kind).start)
     if isinstance(found.get("molecule"), str):
         found["molecule.source"] = found.pop("molecule")
     return found

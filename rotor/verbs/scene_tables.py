@@ -10,7 +10,17 @@ from rotor.requests.field import Field
 from rotor.verbs.tables import entries_of, outputs_class, section_class
 from rotor.verbs.verb import Verb
 
-ORDER = ("body", "magnetic", "effects", "conditions", "observables", "vibration", "numerics")  # of tables
+ORDER = (
+    "body",
+    "lines",
+    "parameters",
+    "magnetic",
+    "effects",
+    "conditions",
+    "observables",
+    "vibration",
+    "numerics",
+)  # of tables
 
 
 def keyed(verb: Verb) -> dict[str, Field]:

@@ -24,6 +24,9 @@ def said(text: str, example: Any = None) -> Meta:
 
 
 TITLES = {
+    "body": "A rigid body instead of a molecule, in any coherent units.",
+    "lines": "The measured lines.",
+    "parameters": "What is free; a .par file says so itself.",
     "molecule": "Which molecule; either `source` or `constants`.",
     "effects": "What the Hamiltonian consists of besides the rigid rotor.",
     "conditions": "The conditions.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -135,7 +135,8 @@ def no_notes(answer: Any) -> Iterable[str]:
 @dataclass(frozen=True)
 class Extra:
     """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. metavar: empty for an option without a value.
-    read: values by identity from the text, which what was typed itself overrides; None: the verb reads all of them together.
+    read: values by identity from the text, which what was typed itself overrides; None: the verb reads all of them together. files: paths
+    by the names of outputs, of an option that stands for several files.
     """
 
     option: str
@@ -146,6 +147,7 @@ class Extra:
     panel: str = ""
     common: bool = False
     many: bool = False
+    files: Callable[[str], Mapping[str, str]] | None = None
 
 
 class SubjectKind:
@@ -189,6 +191,7 @@ class Verb:
     several fields. short: of a request that plain Python answers before a compiler would be loaded.
     accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
 
+    withheld: of files that are named, why some are not written. failure: why an answer that is shown is no result.
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
     these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
     """
@@ -217,6 +220,8 @@ class Verb:
     accuracy_example: Any = "1 kHz"
     sound: bool = True
     short: Callable[[Any], bool] = lambda request: False
+    withheld: Callable[[Any, Sequence[str]], Mapping[str, str]] = lambda answer, names: {}
+    failure: Callable[[Any], str] = lambda answer: ""
     build: Callable[[Verb, Given, Subject], Any] | None = None
     adapt: Callable[[Any, Mapping[str, Any], Given], Any] | None = None
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None

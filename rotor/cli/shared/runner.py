@@ -23,9 +23,11 @@ if TYPE_CHECKING:
 
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb with the texts that were typed, by identity."""
-    given = Given(with_extras(verb, typed), "option")
-    shown, files, growing = verb.read_shown(given), asked_files(verb, typed), growing_files(verb, typed)
-    refuse_overwriting({**files.paths, **growing.paths}, inputs_of(verb, typed))
+    typed, given = with_files(verb, typed), Given(with_extras(verb, typed), "option")
+    shown = verb.read_shown(given)
+    with as_typed(verb, typed):
+        files, growing = asked_files(verb, typed), growing_files(verb, typed)
+        refuse_overwriting({**files.paths, **growing.paths}, inputs_of(verb, typed))
     view = picture_settings(verb, typed, "--plot" in files.paths)
     request, subject = verb.read(given, Place(".", note))
     outputs = by_name(files, growing)
@@ -45,14 +47,19 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):
             note(text)
+        withhold(verb, answer, files)
         report.content["files"] = [*growing.names, *files.names]  # type: ignore[index]
         writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
-            writers["--save-scene"] = scene_writer(verb, request, subject, given, typed)
+            named = by_name(files, growing)
+            written = {name: value for name, value in typed.items() if name not in outputs or name in named}
+            writers["--save-scene"] = scene_writer(verb, request, subject, given, written)
         with naming(verb), reaching():
             deliver(
                 files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
             )
+        if reason := verb.failure(answer):
+            raise ComputationError(reason)
 
 
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
@@ -91,6 +98,41 @@ def report_of(
     with answering():
         content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
     return Report(content, shown, given, dict(head), view, bool(getattr(shown, "sources", False)), executor)
+
+
+def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
+    """The texts, options that stand for several files replaced by these."""
+    files: dict[str, Any] = {}
+    for one in verb.extras:
+        if one.files is not None and one.option in typed:
+            files |= one.files(typed[one.option])
+    return {**files, **typed}
+
+
+@contextmanager
+def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
+    """Inside, a ValueError about a file of an option that stands for several files names that option."""
+    try:
+        yield
+    except ValueError as error:
+        flag, text = str(error).partition(" ")[::2]
+        for one in verb.extras:
+            if (
+                one.files is not None
+                and any(flag == flag_of(verb, name) for name in one.files(""))
+                and one.option in typed
+            ):
+                raise ValueError(f"{one.option} {text}") from None
+        raise
+
+
+def withhold(verb: Verb, answer: Any, files: Files) -> None:
+    """Leave out the files that are not written, with a note."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in verb.withheld(answer, list(by_name(files))).items():
+        reasons.setdefault(reason, []).append(files.paths.pop(flag_of(verb, name)).name)
+    for reason, names in reasons.items():
+        note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
 
 def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from rotor.scenes.run import SUFFIXES, output_paths
+from rotor.scenes.run import output_paths, suffixes_of
 from rotor.scenes.scene import Scene, molecule_of
 from rotor.scenes.scene_file import scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
@@ -80,7 +80,7 @@ class Points:
                 put(content, axis.name, axis.values[i])
             outputs = content.get("outputs", {})
             words = self._words(indices)
-            for name in SUFFIXES.keys() & outputs.keys():
+            for name in suffixes_of(content["kind"]).keys() & outputs.keys():
                 texts = outputs[name]
                 outputs[name] = (
                     [named(text, words) for text in texts] if isinstance(texts, list) else named(texts, words)
@@ -100,7 +100,7 @@ class Points:
     def refuse_equal_names(self) -> None:
         """ValueError where two points would write one file."""
         seen: set[str] = set()
-        patterns = list(_output_names(self.base.get("outputs", {})))
+        patterns = list(_output_names(self.base.get("outputs", {}), self.base["kind"]))
         for indices in self._indices():
             words = self._words(indices)
             names = {os.path.normpath(named(pattern, words)) for pattern in patterns}
@@ -197,8 +197,8 @@ def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> str | None:
     return name
 
 
-def _output_names(outputs: Mapping[str, Any]) -> Iterator[str]:
-    for name in SUFFIXES.keys() & outputs.keys():
+def _output_names(outputs: Mapping[str, Any], kind: str) -> Iterator[str]:
+    for name in suffixes_of(kind).keys() & outputs.keys():
         texts = outputs[name]
         yield from texts if isinstance(texts, list) else [texts]
 
@@ -257,7 +257,7 @@ def check_first(every: Points, out: str | os.PathLike[str]) -> None:
     output_paths(first.scene, out)
     if every.combined is not None:
         target = Path(out) / every.combined
-        if not target.name.lower().endswith(SUFFIXES["parquet"]):
+        if not target.name.lower().endswith(".parquet"):
             raise ValueError(f"outputs.parquet: {every.combined}: the name must end in .parquet")
         if not target.parent.is_dir():
             raise ValueError(f"outputs.parquet: {target}: there is no folder {target.parent}; make it first")

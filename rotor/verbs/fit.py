@@ -1,0 +1,355 @@
+"""`fit`: measured lines back to constants, from SPFIT's files or from a line list with constants to start from."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.fit_request import (
+    FitAnswer,
+    FitRequest,
+    answer_fit,
+    fitted_par,
+    report_of,
+    table_of,
+    write_fitted_par,
+    write_fitted_toml,
+)
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
+from rotor.requests.readers import Flag, Text, Whole
+from rotor.table import Table as Columns
+from rotor.verbs.measured_lines import FitInput, MeasuredLines, Names, build
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work
+
+if TYPE_CHECKING:
+    from rotor.fitting.choose import Suggestion, Trial
+    from rotor.fitting.fit import Fit
+
+EXAMPLES = """\b
+Examples:
+  rotor fit case.par --out fitted
+  rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
+  rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
+  rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
+  rotor fit lines.lin --start water --free A,B,C --try DJ,DJK,DK
+  rotor fit lines.csv --start constants.toml --free A,B,C,DeltaK,deltaJ --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
+MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
+FORMS = {".txt": "text", ".md": "markdown", ".tex": "latex"}
+CONSTANTS = ("toml", "par", "var")  # outputs that hold the fitted constants
+
+
+@dataclass(frozen=True)
+class Further:
+    """What is done beside the fit."""
+
+    try_constants: tuple[str, ...] | None = declared(
+        None, Names(), "Try each of these constants more, or less", option="--try", panel=OBSERVABLES, common=True
+    )
+    choose: tuple[str, ...] | None = declared(
+        None,
+        Names(),
+        "Build the model up from these constants, one at a time",
+        option="--choose",
+        panel=OBSERVABLES,
+        common=True,
+    )
+    all_orders: bool = declared(
+        False,
+        Flag(),
+        "With a choice: constants of all orders compete from the first step on",
+        option="--all-orders",
+        panel=OBSERVABLES,
+    )
+    suggest: str | None = declared(
+        None,
+        Text(metavar="NAME"),
+        "Which unmeasured line would best fix this constant",
+        option="--suggest",
+        panel=OBSERVABLES,
+        common=True,
+    )
+    bootstrap: int = declared(
+        0,
+        Whole(0, MOST_SAMPLES),
+        "Errors from N samples of the lines beside the others",
+        option="--bootstrap",
+        panel=NUMERICS,
+    )
+    seed: int = declared(0, Whole(0), "Seed of the bootstrap", option="--seed", panel=NUMERICS)
+    table_errors: str = declared(
+        "stated", Text(("stated", "scatter"), "NAME"), "Errors in the table: from the stated errors of the lines, or from their scatter",
+        option="--table-errors", panel=OUTPUT,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Parameters(Columns):
+    """The free parameters by the keys of the JSON."""
+
+    of: Fit
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """name, value, error, scaled_error, start."""
+        fit = self.of
+        numbers = {
+            "value": fit.values,
+            "error": fit.errors,
+            "scaled_error": fit.scaled_errors,
+            "start": fit.parameters.start,
+        }
+        return {"name": np.array(fit.parameters.names), **numbers}
+
+
+def answer(request: FitRequest, work: Work) -> FitAnswer:
+    """The fit, and what is done beside it; iterations are shown on a terminal."""
+    from rotor.formats.fit_further import chosen_fit, with_further
+
+    further: Further = work.shown
+    if further.all_orders and further.choose is None:
+        raise ValueError("all_orders: expected with choose, which names the constants to choose from")
+    if further.choose is not None and "save_scene" in work.files:
+        raise ValueError(
+            "choose: a scene holds no choice of constants; choose first, then save the fit of those constants"
+        )
+    if further.choose is not None:
+        found = chosen_fit(request, further.choose, not further.all_orders)
+    else:
+        found = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
+    found = with_further(found, further.try_constants, further.suggest, further.bootstrap, further.seed)
+    if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
+        from rotor.formats.assigned_lin import note_of_lin
+
+        for text in note_of_lin(found.fit.marked_lines):
+            work.note(text)
+    return found
+
+
+def _show_iteration(one: Any) -> None:
+    taken = "" if one.taken else " refused"
+    print(f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr)
+
+
+def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Further) -> None:
+    """ValueError where a file is written over the lines that stand beside a .par file."""
+    lines = Path(request.files.source).with_suffix(".lin").resolve()
+    for name, paths in outputs.items():
+        if lines.exists() and any(path.resolve() == lines for path in paths):
+            raise ValueError(f"--{name.replace('_', '-')}: {paths[0]} is an input; write the result under another name")
+
+
+def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:
+    """Why files of constants are not written: of a fit that has failed, or that their format does not hold.
+
+    The best point of a fit that was interrupted is written.
+    """
+    fit = answer.fit
+    if not fit.converged and fit.minimum.status != "interrupted":
+        return dict.fromkeys((name for name in CONSTANTS if name in names), "not converged")
+    left = {}
+    if fit.constants is None and "toml" in names:
+        left["toml"] = "spins or several states; the .par and .var have everything"
+    for name in {"par", "var"} & set(names):
+        try:
+            fitted_par(answer, variances=name == "var")
+        except ValueError as error:
+            left[name] = str(error)
+    return left
+
+
+def failure(answer: FitAnswer) -> str:
+    """Why a fit is no result."""
+    fit = answer.fit
+    if not fit.converged:
+        more = "; --iterations allows more" if fit.minimum.status == "too many iterations" else ""
+        return f"not converged: {fit.reason}{more}"
+    return f"interrupted: {answer.interrupted}; the fit itself is complete" if answer.interrupted else ""
+
+
+def _text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
+    """The table of a publication as a file."""
+    _text(path, table_of(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
+
+
+def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
+    """The assigned lines, merged, as a file."""
+    from rotor.formats.assigned_lines import write_assigned_lines
+
+    write_assigned_lines(answer.fit.marked_lines, path)
+
+
+def draw(answer: FitAnswer, path: Path, report: Report) -> None:
+    """The residuals as a file."""
+    from rotor.plots.fit import plot_fit
+
+    plot_fit(answer.fit, path, title=answer.request.title, provenance=report.command)
+
+
+def content(answer: FitAnswer, shown: Further) -> dict[str, Any]:
+    """Constants, correlations, lines, and what was done beside the fit."""
+    from rotor.formats.fit_further import trial_record
+
+    fit, names = answer.fit, ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
+    constants: Any = fit.constants
+    values = [None] * 5
+    if constants is not None:
+        values = [getattr(constants, name) for name in names[:3]] + [
+            dict(constants.values),
+            dict(constants.uncertainties),
+        ]
+    return {
+        **dict(zip(names, values, strict=True)),
+        "bootstrap_errors": list(answer.spread) or None,
+        "correlations": fit.statistics.correlations,
+        "chosen": [trial_record(one) for one in answer.steps],
+        "trials": [trial_record(one) for one in answer.trials],
+        "suggestions": [vars(one) for one in answer.suggestions],
+        "lines": _line_records(fit),
+    }
+
+
+def _line_records(fit: Fit) -> list[dict[str, Any]]:
+    lines = fit.lines
+    leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    from rotor.fitting.report import dfbetas
+
+    of_frequencies = dfbetas(fit)
+    moved = {} if of_frequencies is None else dict(zip(fit.groups.tolist(), of_frequencies, strict=True))
+    difference = fit.difference_mhz
+    return [
+        {
+            "upper": lines.upper[i],
+            "lower": lines.lower[i],
+            "frequency_mhz": lines.frequency_mhz[i],
+            "error_mhz": fit.line_errors_mhz[i],
+            "calculated_mhz": fit.calculated_mhz[i],
+            "difference_mhz": difference[i],
+            "calculated_error_mhz": fit.calculated_errors_mhz[i],
+            "blend": lines.blend[i],
+            "used": bool(fit.used[i]),
+            "leverage": leverage.get(i),
+            "dfbetas": moved.get(i),
+        }
+        for i in range(len(lines))
+    ]
+
+
+def show(answer: FitAnswer, report: Report) -> None:
+    """Print the parameters with their errors, how well they fit, and what was done beside it."""
+    from rotor.fitting.report import far_off, statistics_text, status_text
+
+    fit = answer.fit
+    print(f"{answer.request.title}: {status_text(fit)}")
+    show_table(_parameter_table(fit, answer.spread))
+    print("\n".join(statistics_text(fit)))
+    for what, trials in (("chosen, in this order", answer.steps), ("tried", answer.trials)):
+        if trials:
+            show_table(_trial_table(what, trials))
+    if answer.suggestions:
+        show_table(_suggestion_table(fit, answer.suggestions))
+    if not far_off(fit):
+        show_facts([("lines", "none is more than 3 errors off")])
+
+
+def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
+    from rotor.fitting.publication import value_text
+    from rotor.fitting.report import scatter_text
+
+    columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
+    rows = []
+    for i, name in enumerate(fit.parameters.names):
+        error = float(fit.errors[i])
+        text = (
+            value_text(float(fit.values[i]), error)
+            if error < float("inf")
+            else f"{float(fit.values[i])!r} (not determined)"
+        )
+        numbers = [
+            f"{error:.3g}",
+            scatter_text(float(fit.scaled_errors[i]), ".3g"),
+            *([f"{spread[i]:.3g}"] if spread else []),
+        ]
+        rows.append([name, text, *numbers])
+    return Table("", columns, rows, frozenset({"parameter"}))
+
+
+def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
+    columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
+    rows = [
+        [
+            one.name, "added" if one.added else "left out", f"{one.f_ratio:.3g}", f"{one.chance:.2g}", f"{one.aicc:.1f}",
+            f"{one.aicc_before:.1f}", f"{one.cross_validated:.4g}", f"{one.fit.weighted_rms:.4g}", "yes" if one.better else "no",
+        ]
+        for one in trials
+    ]  # fmt: skip
+    return Table(title, columns, rows, frozenset({"constant", "step"}))
+
+
+def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
+    columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
+    rows = [
+        [
+            f"{fit.lines.label_text(one.upper)} - {fit.lines.label_text(one.lower)}",
+            f"{one.frequency_mhz:.4f}",
+            f"{one.error_mhz:.4f}",
+            f"{one.error_ratio:.4f}",
+        ]
+        for one in suggestions
+    ]
+    return Table("lines that would help most", columns, rows, frozenset({"upper - lower"}))
+
+
+def _stem(text: str) -> dict[str, str]:
+    """The files of --out by their names."""
+    return {"report": f"{text}.fit", **{name: f"{text}.{name}" for name in CONSTANTS}}
+
+
+VERB = Verb(
+    name="fit",
+    about="Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged.",
+    examples=EXAMPLES,
+    request=FitInput,
+    answer=answer,
+    table=lambda answer: answer.parameters,
+    rows="parameters",
+    records=lambda answer: Parameters(answer.fit),
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the fitted parameters as CSV", example="fit.csv"),
+        Output("parquet", (".parquet",), "Write the fitted parameters as Parquet", example="fit.parquet"),
+        Output("report", (".fit",), "Write the whole report", lambda answer, path, _: _text(path, report_of(answer)), "out.fit"),
+        Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations",
+               lambda answer, path, _: write_fitted_toml(answer, path), "out.toml"),
+        Output("par", (".par",), "Write the parameters for SPFIT",
+               lambda answer, path, _: write_fitted_par(answer, path, variances=False), "out.par"),
+        Output("var", (".var",), "Write the same with errors and correlations, for SPCAT",
+               lambda answer, path, _: write_fitted_par(answer, path, variances=True), "out.var"),
+        Output("table", (".txt", ".md", ".tex"), "Write a table for a publication", write_table, "table.tex"),
+        Output("save_lines", (".lin", ".csv"), "Write the assigned lines, merged", write_lines, "all.lin"),
+        Output("plot", PICTURES, "Draw the residuals against frequency, J and K (.png, .pdf, .svg)", draw, "rest.png"),
+    ),
+    subject=MeasuredLines(),
+    shown=Further,
+    content=content,
+    notes=lambda answer: (*answer.request.notes, *answer.fit.notes),
+    drawn=None,
+    sound=False,
+    build=build,
+    check=check,
+    withheld=withheld,
+    failure=failure,
+    extras=(Extra("--out", "STEM", "Write STEM.fit (report), .toml, .par and .var", files=_stem, panel=OUTPUT, common=True),),
+    start={"lines.source": "lines.csv", "molecule": "water", "parameters.free": ["A", "B", "C"], "outputs.csv": "fit.csv",
+           "outputs.report": "out.fit"},
+)  # fmt: skip

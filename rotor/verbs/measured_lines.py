@@ -1,0 +1,269 @@
+"""What `fit` computes of: measured lines, and constants to start from."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
+from rotor.requests.fill import Given, read_instance, renaming, written_fields
+from rotor.requests.readers import Custom, InsideError, Quantity, Reader, Text, Whole
+from rotor.requests.readers import Names as Texts
+from rotor.units import parse_quantity
+from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
+from rotor.verbs.subjects import beside, optional_molecule, saved_molecule
+from rotor.verbs.verb import Place, Subject, SubjectKind
+
+if TYPE_CHECKING:
+    from rotor.formats.fit_request import FitRequest
+    from rotor.verbs.verb import Verb
+
+_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # those in brackets are part of a name
+
+
+class Names(Reader):
+    """Names of constants: a text with commas, or a list; each once."""
+
+    metavar = "LIST"
+    scene_type: Any = list[str]
+
+    def read(self, given: Any) -> tuple[str, ...]:
+        """The names."""
+        names = [name.strip() for name in _COMMAS.split(given)] if isinstance(given, str) else list(given)
+        if not all(names):
+            raise ValueError(f"{given!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice:
+            raise ValueError(f"{given!r}: {twice} is named twice; once is enough")
+        return tuple(names)
+
+    def write(self, value: Any) -> list[str]:
+        """The names as a list."""
+        return list(value)
+
+
+class Priors(Reader):
+    """A-priori errors in MHz by name: texts such as DeltaK=0.02, or a table."""
+
+    metavar = "X=ERROR"
+    scene_type: Any = dict[str, float | str]
+    many = True
+
+    def read(self, given: Any) -> dict[str, float]:
+        """The errors by name, each named once."""
+        if isinstance(given, Mapping):
+            return {name: self._number(value, f".{name}: ") for name, value in given.items()}
+        found: dict[str, float] = {}
+        for text in (given,) if isinstance(given, str) else given:
+            name, equals, value = (part.strip() for part in text.partition("="))
+            if not (name and equals and value):
+                raise InsideError(f" {text!r}: name=error is needed, such as DeltaK=0.02")
+            if name in found:
+                raise InsideError(f" {text!r}: {name} has an a-priori error already; give one")
+            found[name] = self._number(value, ": ")
+        return found
+
+    def _number(self, value: float | str, place: str) -> float:
+        try:
+            return parse_quantity(value, "MHz")
+        except ValueError as error:
+            raise InsideError(f"{place}{error}") from None
+
+    def write(self, value: Any) -> dict[str, str]:
+        """The errors as texts."""
+        return {name: f"{number!r} MHz" for name, number in value.items()}
+
+
+def _lines(given: Any) -> Any:
+    """A file by its name, or lines or rows of numbers as they are."""
+    return os.fspath(given) if isinstance(given, os.PathLike) else given
+
+
+@dataclass(frozen=True)
+class LinesInput:
+    """The measured lines."""
+
+    source: Any = declared(
+        None, Custom(_lines), "Lines: .lin, .csv, .cat; or case.par (with case.lin)", "lines.source", option="SOURCE", panel=CONDITIONS,
+        example="lines.csv",
+    )  # fmt: skip
+    lin: str | None = declared(
+        None,
+        Text(metavar="FILE"),
+        "Lines of case.par, where they are not case.lin",
+        "lines.lin",
+        panel=CONDITIONS,
+        example="case.lin",
+    )
+    merge: str | None = declared(
+        None, Text(metavar="FILE"), "More lines (.lin, .csv, .cat) of the same kind", "lines.merge", panel=CONDITIONS, common=True,
+        example="more.csv",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FitInput:
+    """What is fitted, and how; a .par file says itself what is free. The numbers are those of `rotor.fitting.fit.FitOptions`."""
+
+    free: tuple[str, ...] | None = declared(
+        None, Names(), 'Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; by default those of the '
+        "start that have an error", "parameters.free", panel=OBSERVABLES, common=True, example=["A", "B", "C", "DeltaJ"],
+    )  # fmt: skip
+    ties: tuple[str, ...] = declared(
+        (), Texts(metavar="TEXT"), 'Constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable', "parameters.ties",
+        option="--tie", panel=OBSERVABLES, common=True, example=["deltaK = 0.5*deltaJ"],
+    )  # fmt: skip
+    priors: Mapping[str, float] | None = declared(
+        None, Priors(), "A-priori standard error of a free constant (MHz); repeatable", "parameters.priors", option="--prior",
+        panel=OBSERVABLES, common=True, example={"DeltaK": "20 kHz"},
+    )  # fmt: skip
+    reject_above: float | None = declared(
+        None, Quantity(), "Lines more errors off than this do not count; they are reported", "numerics.reject_above", option="--reject",
+        panel=NUMERICS, common=True, example=5.0,
+    )  # fmt: skip
+    loss: str = declared(
+        "squares", Text(metavar="NAME"), "squares, or huber or cauchy: lines far off weigh less", "numerics.loss"
+    )
+    default_error_mhz: float | None = declared(
+        None,
+        Quantity("MHz", above=0),
+        "Error of lines whose file gives 0 (MHz)",
+        "numerics.default_error",
+        example="10 kHz",
+    )
+    poor_rms: float = declared(10.0, Quantity(), "Weighted rms above which the fit has failed", "numerics.poor_rms")
+    most_iterations: int | None = declared(
+        None, Whole(1), "Most iterations; 100, or NITR of a .par file", "numerics.iterations", example=100
+    )
+
+
+LINES = {one.name: one for one in all_fields(LinesInput).values()}
+START = replace(
+    FIELDS["source"],
+    option="--start",
+    name="start",
+    common=True,
+    help="Constants to start from: a file (.toml, .var, ...) or a name",
+)
+_START = ("constants", "spin_constants", "spins", "state_constants")  # inputs of the start that are options too
+
+
+class MeasuredLines(SubjectKind):
+    """Measured lines, and the molecule whose constants the fit starts from."""
+
+    fields = {  # noqa: RUF012
+        **all_fields(LinesInput), **{one.identity: one for one in FIELDS.values()}, START.identity: START,
+    }  # fmt: skip
+
+    @property
+    def options(self) -> Mapping[str, Field]:
+        """Lines and start."""
+        start = {FIELDS[name].identity: FIELDS[name] for name in _START}
+        return {**all_fields(LinesInput), START.identity: START, **start}
+
+    def scene_fields(self) -> list[tuple[str, Any, Any]]:
+        """The key `molecule`, which a .par file needs not."""
+        return [optional_molecule("where the fit starts; a .par file says so itself")]
+
+    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
+        """The tables, a name alone being the source."""
+        molecule = content.get("molecule")
+        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The files of the lines, and the top to start from."""
+        lines: LinesInput = read_instance(LinesInput, given)
+        called = {name: one.called(given.style) for name, one in LINES.items()}
+        if lines.source is None:
+            raise ValueError(f"{called['source']} is missing; expected measured lines: .lin, .csv, .cat or case.par")
+        is_file = isinstance(lines.source, str)
+        of_spfit = is_file and lines.source.lower().endswith(".par")
+        if lines.lin is not None and not of_spfit:
+            raise ValueError(f"{called['lin']}: goes with a .par file; give the lines as the source otherwise")
+        paths = {name: _path(getattr(lines, name), called[name], place) for name in LINES}
+        values: dict[str, Any] = {"paths": paths, "asked": read_instance(FitInput, given), "top": None, "start": None}
+        text = lines.source if is_file else f"{len(lines.source)} lines"
+        if of_spfit:
+            _refuse_start(given, verb)
+            return Subject(values, (lines, None), text, place.note)
+        molecule = _start_of(given)
+        values["top"] = top_of(Reading(molecule, given.style, place.folder, place.note))
+        if molecule.source is not None:
+            file = Path(place.folder) / str(molecule.source)
+            values["start"] = str(file) if file.is_file() else str(molecule.source)
+        return Subject(values, (lines, molecule), text, place.note)
+
+    def saved(self, request: FitRequest, subject: Subject, folder: Path) -> dict[str, Any]:
+        """Lines, start and parameters, files counted from the folder of the scene."""
+        lines, molecule = subject.molecules
+        if not isinstance(lines.source, str):
+            raise ValueError("a scene holds no lines themselves; give a file")
+        content = {key: beside(value, folder) for key, value in written_fields(lines).items()}
+        start = {} if molecule is None else saved_molecule(molecule, folder)
+        return {**content, **start, **written_fields(subject.values["asked"])}
+
+
+def _path(name: Any, called: str, place: Place) -> Any:
+    """A file counted from the folder of the call; lines that are no file as they are."""
+    if not isinstance(name, str):
+        return name
+    path = Path(place.folder) / name
+    if not path.is_file():
+        raise ValueError(f"{called}: {path}: no such file" if called != "SOURCE" else f"{path}: no such file")
+    return str(path)
+
+
+def _refuse_start(given: Given, verb: Verb) -> None:
+    """ValueError for constants and parameters beside a .par file."""
+    others = [one for one in verb.fields.values() if one.table in ("molecule", "parameters") and given.has(one)]
+    if others:
+        names = ", ".join(one.called(given.style) for one in others)
+        raise ValueError(f"{names}: a .par file says itself what is free and where the fit starts")
+
+
+def _start_of(given: Given) -> MoleculeInput:
+    """The molecule to start from."""
+    molecule = read_molecule(given) if any(given.has(one) for one in FIELDS.values()) else MoleculeInput()
+    if (molecule.source is None) == (molecule.constants is None):
+        if given.style == "key" and molecule.source is None:
+            raise ValueError("molecule: expected constants from which the fit starts, as source or constants")
+        names = [one.called(given.style) for one in (START, FIELDS["constants"])]
+        raise ValueError(f"either {names[0]} or {names[1]} says where the fit starts; give one of them")
+    if molecule.source is not None and str(molecule.source).lower().endswith((".csv", ".lin")):
+        raise ValueError(
+            f"{START.called(given.style)} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
+        )
+    return molecule
+
+
+def build(verb: Verb, given: Given, subject: Subject) -> FitRequest:
+    """The fit of the lines."""
+    from rotor.formats.fit_request import fit_of_lines, fit_of_spfit, with_more_lines
+
+    asked, paths = subject.values["asked"], subject.values["paths"]
+    if subject.top is None:
+        request = fit_of_spfit(paths["source"], paths["lin"])
+    else:
+        names = {"tie": verb.fields["parameters.ties"].called(given.style)}
+        names["priors_mhz"] = verb.fields["parameters.priors"].called(given.style)
+        with renaming(names):
+            request = fit_of_lines(
+                paths["source"],
+                subject.top,
+                asked.free,
+                ties=asked.ties,
+                priors_mhz=asked.priors,
+                start=subject.values["start"],
+            )
+    if paths["merge"] is not None:
+        try:
+            request = with_more_lines(request, paths["merge"])
+        except ValueError as error:
+            raise ValueError(f"{LINES['merge'].called(given.style)}: {error}") from None
+    settings = {one.name for one in fields(request.options)}
+    changes = {name: value for name, value in vars(asked).items() if name in settings and value is not None}
+    return replace(request, options=replace(request.options, **changes))
