@@ -367,7 +367,7 @@ def test_a_killed_sweep_goes_on(folder):
 def test_a_scene_writes_every_file_of_its_verb(folder):
     """The thermodynamic functions of a torsion were passed over without a word."""
     (folder / "s.toml").write_text(
-        'schema = 1\nkind = "torsion"\nmolecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\nvmax = 1\n'
+        'schema = 1\nkind = "torsion"\nmolecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n'
         '[outputs]\nthermo_csv = "heat.csv"\n'
     )
     run_scene(read_scene("s.toml"))
