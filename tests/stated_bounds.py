@@ -221,6 +221,44 @@ def contrast(answer) -> float:
     return abs(float(contrast_k(frequency, request.sources[0])))
 
 
+def fitted(seed: int) -> Case:
+    """Constants fitted to noisy lines of an asymmetric top with a loose tolerance, in standard errors, against one of 1e-12."""
+    from rotor.fitting.budgets import constants_budget
+    from rotor.fitting.fit import FitOptions, fit_lines
+    from rotor.fitting.parameters import parameters
+
+    lines, start, names = fit_problem(rng_of(12, seed))
+    free = parameters(start, names)
+    tolerance = 10 ** rng_of(13, seed).uniform(-5, 0)
+    found = fit_lines(lines, start, free, FitOptions(tolerance=tolerance, poor_rms=1e9))
+    exact = fit_lines(lines, start, free, FitOptions(tolerance=1e-12, poor_rms=1e9))
+    budget, reference = constants_budget(found), constants_budget(exact)
+    floor = budget.rounding.value + reference.numerical
+    actual = float(np.abs((found.values - exact.values) / exact.errors).max())
+    return Case(budget.truncation.value + floor, actual, floor)
+
+
+def fit_problem(rng: np.random.Generator):
+    """Lines of J up to 8 of a top with distortion, with noise of 10 kHz to 1 MHz; constants that are off by a percent; names to fit."""
+    from rotor.fitting.assignment import assignments
+    from rotor.tops.constants import Constants
+
+    c = rng.uniform(1e3, 5e3)
+    b = c * rng.uniform(1.05, 1.6)
+    true = {"A": b * rng.uniform(1.3, 4.0), "B": b, "C": c, "DeltaJ": 1e-3 * rng.uniform(0.2, 2.0)}
+    top = Top.from_constants(Constants(**true), dipole_abc_debye=(1.0, 1.0, 0.0))
+    lines = rotor.api.line_list(top, jmax=8, temperature_k=20.0)
+    rows = rng.choice(len(lines), size=min(40, len(lines)), replace=False)
+    names = ("j", "ka", "kc")
+    labels = [
+        np.array([lines.levels.quanta[name][states[rows]] for name in names]).T for states in (lines.upper, lines.lower)
+    ]
+    sigma = 10 ** rng.uniform(-2, 0)
+    frequency = lines.frequency_mhz[rows] + sigma * rng.normal(size=len(rows))
+    start = Constants(**{name: value * (1 + 0.01 * rng.normal()) for name, value in true.items()})
+    return assignments(names, *labels, frequency, sigma), start, list(true)
+
+
 def fluid(seed: int) -> Case:
     """Conserved energy of argon or nitrogen about its mean by the rows that are recorded, against every step of the same run."""
     from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
@@ -240,5 +278,5 @@ def fluid(seed: int) -> Case:
 
 CASES: dict[str, Callable[[int], Case]] = {
     "driven": driven, "spins": spins, "thermo": thermo, "field_map": field_map, "magnetic_map": magnetic_map, "aligned": aligned,
-    "emission": emission, "torsion": torsion, "fluid": fluid,
+    "emission": emission, "torsion": torsion, "fluid": fluid, "fitted": fitted,
 }  # fmt: skip

@@ -11,8 +11,8 @@ import pytest
 from stated_bounds import CASES
 
 COUNTS = {
-    "driven": 150, "spins": 150, "thermo": 200, "field_map": 120, "magnetic_map": 60, "aligned": 120, "emission": 100, "torsion": 60,
-    "fluid": 40,
+    "driven": 100, "spins": 150, "thermo": 200, "field_map": 120, "magnetic_map": 60, "aligned": 120, "emission": 100, "torsion": 60,
+    "fluid": 40, "fitted": 50,
 }  # fmt: skip
 SHARE = 20  # cases of a test: enough for a median
 FAST = 4

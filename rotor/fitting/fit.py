@@ -25,6 +25,7 @@ from rotor.fitting.strategies import with_rejection
 from rotor.fitting.top_constants import ConstantSet
 from rotor.fitting.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.requests.budget import ROUNDING
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.table import counted
@@ -44,7 +45,8 @@ class Fit:
     prediction, from the stated errors. line_errors_mhz (lines,) : the errors of the lines as they counted, the default one among them;
     0 where there is none. used (lines,) : whether a line counted; left_out : why not, by line
     residuals (u,), jacobian's statistics : of the measured frequencies that counted, blends as one, in order of `groups`
-    minimum : how the search ended. converged, reason : whether this is a result, and the sentence that says why or why not
+    minimum : how the search ended. rounding_mhz : bound of rounding of a calculated line
+    converged, reason : whether this is a result, and the sentence that says why or why not
     changed_states : levels that are another state than at the start, as text. notes : what must be known
     """
 
@@ -62,6 +64,7 @@ class Fit:
     groups: Ints
     statistics: Regression
     minimum: Minimum
+    rounding_mhz: float
     converged: bool
     reason: str
     changed_states: tuple[str, ...]
@@ -270,7 +273,7 @@ def _finished(
     search: Search, minimum: Minimum, constants: ConstantSet | None, left_out: dict[int, str], labels: Ints
 ) -> Fit:
     values, parameters = minimum.parameters, search.parameters
-    calculated, jacobian, slopes = search.lines_of(values)
+    calculated, jacobian, slopes, largest = search.lines_of(values)
     residuals, _ = search.weighted(values)
     statistics = regression(minimum.jacobian, parameters.names, round_off(search, slopes))
     fitted, order = _constants(constants, parameters, values, statistics)
@@ -289,6 +292,7 @@ def _finished(
         groups=search.group.first,
         statistics=statistics,
         minimum=minimum,
+        rounding_mhz=2 * ROUNDING * largest,
         converged=False,
         reason="",
         changed_states=_changed(search, values, labels),

@@ -128,6 +128,15 @@ class Grouping(NamedTuple):
         return out
 
 
+class LineValues(NamedTuple):
+    """Calculated lines (lines,), derivatives by the parameters (lines, n), those of the levels (levels, n), the largest |E| in MHz."""
+
+    calculated: Floats
+    derivatives: Floats
+    slopes: Floats
+    largest_mhz: float
+
+
 @dataclass(frozen=True, eq=False)
 class Search:
     """What is evaluated at each point."""
@@ -141,25 +150,26 @@ class Search:
     sigma: Floats
     used: NDArray[np.bool_]
 
-    def lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
-        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n).
+    def lines_of(self, values: Floats) -> LineValues:
+        """Calculated lines, and derivatives of these and of the levels.
 
         The last point is not computed a second time: the search ends where it was.
         """
         point = values.tobytes()
-        before: tuple[bytes, tuple[Floats, Floats, Floats]] | None = self.__dict__.get("_last")
+        before: tuple[bytes, LineValues] | None = self.__dict__.get("_last")
         if before is None or before[0] != point:
             before = self.__dict__["_last"] = (point, self._lines_of(values))
         return before[1]
 
-    def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
+    def _lines_of(self, values: Floats) -> LineValues:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = self.parameters.slopes_of(slopes)
         if self.from_zero:  # the place -1 of such lower levels is the last one
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
         derivatives -= slopes[self.lower]
-        return energies[self.upper] - energies[self.lower], derivatives, slopes
+        largest = float(np.abs(energies).max(initial=0.0))
+        return LineValues(energies[self.upper] - energies[self.lower], derivatives, slopes, largest)
 
     @property
     def from_zero(self) -> bool:
@@ -175,7 +185,7 @@ class Search:
         return self.bent(*self.weighted(values))
 
     def weighted(self, values: Floats) -> tuple[Floats, Floats]:
-        calculated, jacobian, _ = self.lines_of(values)
+        calculated, jacobian = self.lines_of(values)[:2]
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma

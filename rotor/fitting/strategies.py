@@ -79,7 +79,7 @@ def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
 
 def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
     """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
-    calculated, _, _ = search.lines_of(values)
+    calculated = search.lines_of(values).calculated
     group = Grouping.of(search.lines, may)
     means = group.spread_back(group.mean(calculated), calculated)
     off = np.abs(search.lines.frequency_mhz - means) / search.sigma
@@ -187,7 +187,7 @@ def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress
     little. Tried are the few that went further than half their size and many standard errors.
     """
     start, moved = search.parameters.start, first.parameters - search.parameters.start
-    floor = round_off(search, search.lines_of(first.parameters)[2])
+    floor = round_off(search, search.lines_of(first.parameters).slopes)
     errors = regression(first.jacobian, search.parameters.names, floor).errors
     far = (start != 0) & (np.abs(moved) > _FURTHER * np.abs(start)) & (np.abs(moved) > _MANY_ERRORS * errors)
     order = np.argsort(np.where(far, -np.abs(moved) / np.maximum(np.abs(start), _AT_ZERO_MHZ), 0.0), kind="stable")
@@ -293,7 +293,7 @@ def _minimised(
         start,
         tolerance=search.options.tolerance,
         most_iterations=limit,
-        floor=round_off(search, search.lines_of(start)[2]),
+        floor=round_off(search, search.lines_of(start).slopes),
         progress=progress,
         hopeless=hopeless,
     )

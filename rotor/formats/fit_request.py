@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, merged
+from rotor.fitting.budgets import constants_budget, predictions_budget
 from rotor.fitting.first_values import beside_zero
 from rotor.fitting.fit import Fit, FitOptions, covariance_of_determined, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
@@ -27,6 +28,7 @@ from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
+from rotor.requests.budget import ErrorBudget
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table, counted
 from rotor.tops.top import Top
@@ -122,10 +124,21 @@ class FitAnswer:
         fit = self.fit
         return FittedParameters(fit.parameters.names, fit.values, fit.errors, fit.scaled_errors, fit.parameters.start)
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the frequencies of the lines can be trusted, in MHz."""
+        return predictions_budget(self.fit)
+
+    @property
+    def constants_errors(self) -> ErrorBudget:
+        """How far the constants can be trusted, in standard errors."""
+        return constants_budget(self.fit)
+
     def facts(self) -> dict[str, Any]:
         """What is known of the fit as a whole."""
         facts = fit_facts(self.fit)
-        return {"title": self.request.title, **facts, "notes": [*self.request.notes, *facts["notes"]]}
+        errors = {"errors": self.errors.as_json(), "constants_errors": self.constants_errors.as_json()}
+        return {"title": self.request.title, **facts, **errors, "notes": [*self.request.notes, *facts["notes"]]}
 
 
 def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnswer:

@@ -1,0 +1,99 @@
+"""Error budgets of a fit (`rotor.requests.budget`): of its constants, in standard errors, and of the frequencies of its lines, in MHz.
+
+With δr the change of the weighted residuals, constants move by at most |δr| of their standard errors, and a prediction by as much of its
+standard error, since (JᵀJ)⁻¹ is the covariance (Cauchy and Schwarz).
+
+| term | constants, standard errors | frequencies, MHz |
+|---|---|---|
+| rounding | √Σ (δν/σ_i)², δν of the energies | δν, and that times σ(ν) |
+| truncation | twice the step that would follow: the last ones halve it at least | that times σ(ν) |
+| model | √(χ²/f - 1) of f degrees of freedom, at least what its scatter √(2/f) hides | that times the error of a line |
+| data | 1: the errors of the lines | σ(ν) |
+| statistics | 1/√(2f): errors from the scatter of the lines are known no better | that times σ(ν) |
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rotor.fitting.fit import Fit
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+
+REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+CONFIDENCE = 0.95
+CONSTANTS = "constants"
+TIGHTER, LINES = "a smaller tolerance of the search", "more lines, or more precise ones"
+UNCHECKED = "as many frequencies as constants: nothing checks the model"
+
+
+def constants_budget(fit: Fit) -> ErrorBudget:
+    """The errors of the fitted constants, in standard errors."""
+    return _budget(fit, CONSTANTS, "standard errors", 1.0, 0.0, 1.0)
+
+
+def predictions_budget(fit: Fit) -> ErrorBudget:
+    """The errors of the calculated frequencies of the lines that counted, in MHz, the largest of each source."""
+    known = fit.calculated_errors_mhz[fit.used]
+    sigma = float(known.max(initial=0.0))
+    line = float(fit.line_errors_mhz[fit.used].max(initial=0.0))
+    return _budget(fit, "predicted frequencies", "MHz", sigma, fit.rounding_mhz, line)
+
+
+def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: float) -> ErrorBudget:
+    """scale: one standard error. rounding: beside that which moves constants. line: what a residual of 1 is."""
+    if not math.isfinite(scale) or (of == CONSTANTS and not np.isfinite(fit.errors).all()):
+        lost = ", ".join(one.text for one in fit.statistics.undetermined)
+        unknown = ErrorTerm(None, f"not determined by these lines: {lost}", LINES)
+        return ErrorBudget(of, unit, unknown, unknown, unknown, unknown, unknown)
+    free = fit.degrees_of_freedom
+    moved = scale * weighted_rounding(fit)
+    return ErrorBudget(
+        of=of,
+        unit=unit,
+        rounding=ErrorTerm(rounding + moved, "energies in double precision"),
+        truncation=ErrorTerm(
+            scale * REMAINING * fit.minimum.distance,
+            f"twice the next step, after {len(fit.minimum.iterations)}",
+            TIGHTER,
+        ),
+        model=_misfit(fit, line),
+        data=ErrorTerm(scale, f"errors of {len(fit.groups)} frequencies; {confidence_text(free)}", LINES),
+        statistics=ErrorTerm(scale / math.sqrt(2 * free), f"{free} degrees of freedom", LINES)
+        if free
+        else ErrorTerm(None, UNCHECKED, LINES),
+    )
+
+
+def weighted_rounding(fit: Fit) -> float:
+    """Norm of what rounding makes of the weighted residuals."""
+    sigma = fit.line_errors_mhz[fit.groups]
+    return fit.rounding_mhz * float(np.sqrt(np.sum(1.0 / sigma[sigma > 0] ** 2)))
+
+
+def _misfit(fit: Fit, line: float) -> ErrorTerm:
+    free = fit.degrees_of_freedom
+    if not free:
+        return ErrorTerm(None, UNCHECKED, LINES)
+    excess = max(fit.reduced_chi**2 - 1.0, math.sqrt(2.0 / free))
+    return ErrorTerm(
+        line * math.sqrt(excess),
+        f"misfit of the lines beyond their errors, reduced chi {fit.reduced_chi:.3g}",
+        "further constants",
+    )
+
+
+def confidence_text(free: int) -> str:
+    """Within how many standard errors a constant is at 95 %, by Student's distribution of errors from the scatter.
+
+    >>> confidence_text(10)
+    'at a confidence of 0.95 within 1.96 times this, 2.23 times the error from the scatter'
+    """
+    from scipy.special import ndtri, stdtrit
+
+    stated = float(ndtri(0.5 + 0.5 * CONFIDENCE))
+    if not free:
+        return f"at a confidence of {CONFIDENCE:g} within {stated:.3g} times this"
+    scatter = float(stdtrit(free, 0.5 + 0.5 * CONFIDENCE))
+    return f"at a confidence of {CONFIDENCE:g} within {stated:.3g} times this, {scatter:.3g} times the error from the scatter"
