@@ -443,3 +443,72 @@ def test_parquet_of_all_points_stays_in_the_folder(call, folder):
     write_scene(levels(sweep={"molecule": ["CO", "HCl"]}, outputs=LevelsOutputs(parquet="../a.parquet")), "s.toml")
     code, _, err = call("run", "s.toml")
     assert (code, "lies outside" in err) == (2, True)
+
+
+ORPHANS = """
+import os, sys, time
+from rotor.scenes.worker_processes import worker_processes
+
+def number(_):
+    time.sleep(0.2)
+    return os.getpid()
+
+if __name__ == "__main__":
+    with worker_processes(2) as pool:
+        print(*{future.result() for future in [pool.submit(number, n) for n in range(4)]}, flush=True)
+        time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no /proc")
+def test_workers_end_with_the_process_that_began(folder):
+    """Workers of a process that the system ended waited for pieces for ever."""
+    Path("orphans.py").write_text(ORPHANS)
+    command = [sys.executable, "orphans.py"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as began:
+        assert began.stdout is not None
+        workers = [int(word) for word in began.stdout.readline().split()]
+        began.kill()
+    assert len(workers) == 2
+    end = time.monotonic() + 20.0
+    while time.monotonic() < end and any(_runs(number) for number in workers):
+        time.sleep(0.05)
+    assert not any(_runs(number) for number in workers)
+
+
+def _runs(number: int) -> bool:
+    """Whether a process runs; one that has ended and that nothing waits for does not."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def _setting(name: str) -> str | None:
+    return os.environ.get(name)
+
+
+def _is_loaded(name: str) -> bool:
+    return name in sys.modules
+
+
+def test_workers_have_the_environment_of_now_and_the_modules_of_the_work(monkeypatch):
+    with worker_processes(1) as pool:
+        assert pool.submit(_setting, "ROTOR_MOLECULES").result() == os.environ.get("ROTOR_MOLECULES")
+        if sys.platform == "linux":
+            assert pool.submit(_is_loaded, "rotor.scenes.sweep.run").result()
+    monkeypatch.setenv("ROTOR_MOLECULES", "elsewhere")
+    with worker_processes(1) as pool:
+        assert pool.submit(_setting, "ROTOR_MOLECULES").result() == "elsewhere"
+
+
+def test_what_is_not_written_is_not_computed(monkeypatch, folder):
+    """The facts of an answer, with its budgets and limits, took a third of a sweep that writes one table of all points."""
+    from rotor.quantum.request import LevelsAnswer
+
+    def failing(_):
+        raise AssertionError("nothing shows them")
+
+    monkeypatch.setattr(LevelsAnswer, "facts", failing)
+    result = run_sweep(levels(sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(parquet="all.parquet")))
+    assert [made.get("error") for made in result.records] == [None, None]

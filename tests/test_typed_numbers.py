@@ -143,4 +143,6 @@ def test_an_error_names_the_table_of_a_pulse_and_its_key(call, folder, table, sa
 def test_a_list_without_a_pulse(call, folder):
     (folder / "s.toml").write_text(f"{HEAD}pulses = []\n")
     code, _, err = call("plan", "s.toml")
-    assert (code, err) == (2, "error: pulses: there is no pulse; give at least one, in a scene a table [[pulses]]\n")
+    assert code == 2
+    assert err.startswith("error: pulses: expected one or more, such as")
+    assert len(err.splitlines()) == 1

@@ -89,7 +89,7 @@ def command(context: typer.Context, options: Options) -> None:
     refuse_outside(scene, options.out)
     files = Files()
     files.ask_json(options.json)
-    with _workers(options) as pool:
+    with _workers(options, scene) as pool:
         if swept:
             _sweep(scene, options, files, pool, context.obj)
         else:
@@ -97,7 +97,7 @@ def command(context: typer.Context, options: Options) -> None:
 
 
 @contextmanager
-def _workers(options: Options) -> Iterator[Executor | None]:
+def _workers(options: Options, scene: Scene) -> Iterator[Executor | None]:
     """A pool of processes, or of workers of a cluster; None for one process."""
     number = options.workers
     if options.dask is not None:
@@ -111,9 +111,10 @@ def _workers(options: Options) -> Iterator[Executor | None]:
     if number is None or number == 1:
         yield None
         return
+    from rotor.scenes.run import modules_of
     from rotor.scenes.worker_processes import worker_processes
 
-    with worker_processes(number) as pool:
+    with worker_processes(number, modules_of(scene)) as pool:
         yield pool
 
 

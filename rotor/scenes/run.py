@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from rotor.table import Table
 
 
+_RDKIT = ("rdkit.Chem", "rdkit.Chem.rdDistGeom", "rdkit.Chem.rdForceFieldHelpers")
+
+
 def run_scene(
     scene: Scene,
     *,
@@ -64,6 +67,26 @@ def run_scene(
         for path in sorted({resolved(path) for paths in targets.values() for path in paths}):
             stack.enter_context(locked_file(path))
         return _run(scene, targets, folder, out, executor)
+
+
+def modules_of(scene: Scene) -> tuple[str, ...]:
+    """The modules that computing a scene imports, for processes that share its work.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> modules_of(LevelsScene(molecule="CO"))[0]
+    'rotor.verbs.levels'
+    """
+    from rotor.scenes.scene_file import scene_text
+
+    text = scene_text(scene)
+    of_smiles = "SMILES:" in text or any(suffix in text for suffix in (".csv", ".sdf", ".mol"))
+    common = (
+        f"rotor.verbs.{scene.kind}",
+        "rotor.formats.read_write",
+        "rotor.formats.tables",
+        "rotor.quantum.estimates.budgets",
+    )
+    return (*common, *(_RDKIT if of_smiles else ()))
 
 
 def _run(
@@ -156,7 +179,9 @@ def _checked_path(name: str, text: str, suffixes: tuple[str, ...]) -> Path:
 def _write(
     scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]], found: Reached | None
 ) -> None:
-    """Write all files together, but those that the answer itself has written."""
+    """Write all files together, but those that the answer itself has written; without any, nothing of them is computed."""
+    if not targets.keys() - kind.grows:
+        return
     from rotor.formats.atomic_write import write_together
     from rotor.scenes.scene_file import scene_text
 

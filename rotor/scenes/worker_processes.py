@@ -2,18 +2,21 @@
 
 A `ProcessPoolExecutor` is broken for good when one of its processes ends, as the system ends one that takes too much memory. Here every
 process is a pool of one, which is started again. Each takes one thread of BLAS: several processes of several threads wait for each other.
+
+On Linux the modules of the work are imported once, by a server from which the processes are forked; elsewhere by each of them.
 """
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from queue import SimpleQueue
 from typing import Any, ParamSpec, TypeVar
 
@@ -21,6 +24,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTING = threading.Lock()  # the environment is that of the whole process
+_METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # a fork after imports is not safe on macOS
 
 
 class WorkerKilledError(RuntimeError):
@@ -30,7 +34,11 @@ class WorkerKilledError(RuntimeError):
 class WorkerProcesses(Executor):
     """An executor of processes that do not depend on each other."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, modules: Sequence[str] = ()) -> None:
+        """So many processes. modules: those that the work needs, imported before the first piece comes."""
+        get_context(_METHOD).set_forkserver_preload(
+            ["rotor.scenes.sweep.run", *modules]
+        )  # without effect once the server runs
         self._threads = ThreadPoolExecutor(number)
         self._free: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
         self._ended = False
@@ -73,9 +81,9 @@ class WorkerProcesses(Executor):
 
 
 @contextmanager
-def worker_processes(number: int) -> Iterator[WorkerProcesses]:
+def worker_processes(number: int, modules: Sequence[str] = ()) -> Iterator[WorkerProcesses]:
     """So many processes until the end of the context; where it ends with an error or Ctrl-C, they are ended at once."""
-    pool = WorkerProcesses(number)
+    pool = WorkerProcesses(number, modules)
     try:
         yield pool
     except BaseException:
@@ -86,12 +94,15 @@ def worker_processes(number: int) -> Iterator[WorkerProcesses]:
 
 def _started_process() -> ProcessPoolExecutor:
     """A pool of one process that has started with one thread of BLAS, whatever this process has."""
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(),))
     with _STARTING:
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
         try:
-            pool.submit(_nothing)
+            try:
+                pool.submit(_nothing)
+            except (EOFError, ConnectionError):  # the server was ended from outside; another one is started
+                pool.submit(_nothing)
         finally:
             for name, value in before.items():
                 if value is None:
@@ -105,7 +116,22 @@ def _nothing() -> None:
     """The first piece: a process is started when it has one."""
 
 
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches all processes of a terminal; the one that began ends the others."""
+def _environment() -> dict[str, str]:
+    """That of this process with one thread of BLAS; a server has the environment of its own start."""
+    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
+
+
+def _begin(environment: dict[str, str]) -> None:
+    """Ctrl-C reaches all processes of a terminal: the one that began ends the others, which end with it whatever ends it."""
+    os.environ.clear()
+    os.environ.update(environment)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of the process that began, and end this one; a worker alone would wait for pieces for ever."""
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(1)

@@ -118,28 +118,34 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
     typical, doubts = _trust(mol, field)
     lowest = min(energies)
     distinct: list[Conformer] = []
+    shapes: list[tuple[float, Floats]] = []  # energies and planar moments of those
     for place in sorted(range(len(energies)), key=lambda i: energies[i]):
         energy = (energies[place] - lowest) * KJ_PER_KCAL
         if not np.isfinite(energy):  # its optimisation did not converge
             continue
+        if distinct:
+            shape = energy, _planar_moments(distinct[0].molecule.masses_u, mol.GetConformer(place).GetPositions())
+            if any(_same_conformer(shape, other) for other in shapes):
+                continue
         molecule = from_rdkit(mol, conformer=place, name=text)
         source = f"SMILES {text}: {field} geometry, of {counted(len(energies), 'conformer')}" if field else "one atom"
         one = Conformer(replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy)
-        if not any(_same_conformer(one, other) for other in distinct):
-            distinct.append(one)
+        distinct.append(one)
+        shapes.append((energy, _planar_moments(one.molecule.masses_u, one.molecule.positions_angstrom)))
     return tuple(distinct)
 
 
-def _same_conformer(one: Conformer, other: Conformer) -> bool:
-    if abs(one.energy_kj_per_mol - other.energy_kj_per_mol) > SAME_KJ_PER_MOL:
+def _same_conformer(one: tuple[float, Floats], other: tuple[float, Floats]) -> bool:
+    """Whether energies and planar moments agree."""
+    if abs(one[0] - other[0]) > SAME_KJ_PER_MOL:
         return False
-    first, second = _planar_moments(one.molecule), _planar_moments(other.molecule)
-    return bool(np.abs(first - second).max() <= SAME_MOMENTS * first.max())
+    return bool(np.abs(one[1] - other[1]).max() <= SAME_MOMENTS * one[1].max())
 
 
-def _planar_moments(molecule: Molecule) -> Floats:
+def _planar_moments(masses_u: Floats, positions_angstrom: Floats) -> Floats:
     """Σ m a², Σ m b², Σ m c² in u Å², falling."""
-    weighted = np.sqrt(molecule.masses_u)[:, None] * (molecule.positions_angstrom - molecule.centre_of_mass_angstrom)
+    centred = positions_angstrom - masses_u @ positions_angstrom / masses_u.sum()
+    weighted = np.sqrt(masses_u)[:, None] * centred
     return np.asarray(np.linalg.svd(weighted.T @ weighted, compute_uv=False))
 
 
