@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotor.tops.spins.spin_constants import SpinConstants as SpinConstants
     from rotor.tops.states.state_constants import StateConstants as StateConstants
     from rotor.tops.top import Top as Top
+    from rotor.viewer.widget import view as view
 
 VERBS = (
     "spectrum",
@@ -73,6 +74,7 @@ _MODULES = {
     "read_scene": "rotor.scenes.scene_file",
     "run_scene": "rotor.scenes.run",
     "run_sweep": "rotor.scenes.sweep",
+    "view": "rotor.viewer.widget",
     "write": "rotor.formats",
     "write_scene": "rotor.scenes.scene_file",
 }

@@ -45,6 +45,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "assign": "Constants of unknown molecules from a spectrum.",
     "structure": "Structures from the constants of isotopologues.",
     "convert": "Constants from one file format into another.",
+    "view": "A spectrum and its assignment in the browser.",
     "identify": "Which species an observed spectrum needs.",
     "catalogue": "A local catalogue of lines: add, list, show.",
     "cat": "A catalogue as a table, filtered or compared.",
@@ -85,6 +86,7 @@ Examples:
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
   rotor assign peaks.csv --plot found.png
+  rotor view spectrum.csv water
   rotor structure family.toml --plot molecule.png
   rotor new spectrum > s.toml && rotor run s.toml"""
 

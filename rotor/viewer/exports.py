@@ -1,0 +1,134 @@
+"""Files of a session for other programs: assigned lines, constants, SPFIT's files, a scene, a table for a publication."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rotor.viewer.fits import assignments_of, fit_of
+from rotor.viewer.prediction import Model
+from rotor.viewer.records import Line
+
+if TYPE_CHECKING:
+    from rotor.formats.fit_request import FitAnswer
+
+
+def exported(what: str, model: Model, lines: Mapping[int, Line]) -> tuple[str, str]:
+    """Name and text of a file. ValueError for what no file is written of, and as the fit gives it."""
+    if what not in WRITERS:
+        raise ValueError(f"export {what!r}: expected one of {', '.join(WRITERS)}")
+    if not lines and what != "toml":
+        raise ValueError(f"export {what}: no line is assigned to {model.record.name}")
+    stem = re.sub(r"[^\w.-]+", "_", model.record.name).strip("._") or "species"
+    return f"{stem}.{SUFFIXES.get(what, what)}", WRITERS[what](model, lines, stem)
+
+
+def _lines_as(suffix: str) -> Callable[[Model, Mapping[int, Line], str], str]:
+    def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+        from rotor.formats.assigned_lines import write_assigned_lines
+
+        return _written(f"{stem}.{suffix}", lambda path: write_assigned_lines(assignments_of(model, lines), path))
+
+    return text
+
+
+def answer_of(model: Model, lines: Mapping[int, Line], stem: str) -> FitAnswer:
+    """The fit with its request, as the writers of fits take it."""
+    from rotor.fitting.fit import FitOptions
+    from rotor.fitting.parameters import parameters, with_names
+    from rotor.formats.fit_request import FitAnswer, FitFiles, FitRequest
+
+    fit, free = fit_of(model, lines), list(model.record.free)
+    begin = with_names(model.constants, free)
+    files = FitFiles(f"{stem}.csv", start=model.file or None)
+    request = FitRequest(fit.lines, begin, parameters(begin, free), FitOptions(), model.record.name, files)
+    return FitAnswer(request, fit)
+
+
+def _par(variances: bool) -> Callable[[Model, Mapping[int, Line], str], str]:
+    def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+        from rotor.formats.fit_request import write_fitted_par
+
+        answer = answer_of(model, lines, stem)
+        return _written(f"{stem}.par", lambda path: write_fitted_par(answer, path, variances=variances))
+
+    return text
+
+
+def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+    """The molecule file: of a fit with errors and correlations, else the constants as they are."""
+    from rotor.fitting.top_constants import TopConstants
+    from rotor.formats.fit_request import write_fitted_toml
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+    from rotor.formats.molecules.molecule_writer import write_molecule_file
+
+    if lines and model.record.fit is not None:
+        answer = answer_of(model, lines, stem)
+        return _written(f"{stem}.toml", lambda path: write_fitted_toml(answer, path))
+    top, named = model.top, model.constants
+    file = MoleculeFile(
+        model.record.name,
+        constants=named.top.constants if isinstance(named, TopConstants) else named,
+        dipole_abc_debye=top.dipole_abc_debye,
+        spin_weights=top.spin_weights,
+        sources={"constants": "set in a session of rotor view"},
+        states=top.states,
+        spin_constants=top.spin_constants,
+        internal_rotation=top.internal_rotation,
+    )
+    return _written(f"{stem}.toml", lambda path: write_molecule_file(file, path))
+
+
+def _scene(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+    """The scene of the fit, which reads the exported STEM.csv and STEM.toml beside it."""
+    from rotor.scenes.fit_sections import FitLines, FitParameters
+    from rotor.scenes.scene import FitScene
+    from rotor.scenes.scene_file import scene_text
+
+    scene = FitScene(
+        title=f"fit of {model.record.name}",
+        molecule=f"{stem}.toml",
+        lines=FitLines(source=f"{stem}.csv"),
+        parameters=FitParameters(free=list(model.record.free)),
+    )
+    return scene_text(scene)
+
+
+def _table(form: str) -> Callable[[Model, Mapping[int, Line], str], str]:
+    def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+        from rotor.formats.fit_request import table_of
+
+        return table_of(answer_of(model, lines, stem), form)
+
+    return text
+
+
+def _report(model: Model, lines: Mapping[int, Line], stem: str) -> str:
+    from rotor.formats.fit_request import report_of
+
+    return report_of(answer_of(model, lines, stem))
+
+
+def _written(name: str, write: Callable[[Path], object]) -> str:
+    """The text that a writer of paths writes."""
+    with tempfile.TemporaryDirectory(prefix="rotor-view-") as folder:
+        path = Path(folder) / name
+        write(path)
+        return path.read_text(encoding="utf-8")
+
+
+WRITERS: Mapping[str, Callable[[Model, Mapping[int, Line], str], str]] = {
+    "lin": _lines_as("lin"),
+    "csv": _lines_as("csv"),
+    "par": _par(False),
+    "var": _par(True),
+    "toml": _toml,
+    "scene": _scene,
+    "fit": _report,
+    "md": _table("markdown"),
+    "tex": _table("latex"),
+}
+SUFFIXES = {"scene": "scene.toml"}

@@ -1,0 +1,56 @@
+"""Species and lines from `rotor assign`: the whole spectrum searched for unknown molecules, its answer as records of a session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.viewer.actions import free_blend, number_of
+from rotor.viewer.fits import lines_from
+from rotor.viewer.records import COLOURS, Record, Species, State, line_key, species_key
+
+MOST_SPECIES = 5
+USUAL_SECONDS, MOST_SECONDS = 20.0, 600.0
+
+
+def search(spectrum: ObservedSpectrum, message: Mapping[str, Any]) -> Any:
+    """The answer of `rotor assign` to the peaks of a spectrum. Message: species (1 to 5), seconds, temperature_k."""
+    count = int(number_of(message, "species", above=0, default=1))
+    seconds = min(number_of(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
+    temperature = number_of(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None
+    peaks = peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, spectrum.source)
+    return answer_assign(
+        AssignRequest(peaks, species=min(count, MOST_SPECIES), seconds=seconds, temperature_k=temperature)
+    )
+
+
+def records_of(answer: Any, state: State) -> tuple[str, dict[str, Record | None], list[str]]:
+    """Label, records and remarks of an answer of `rotor assign`; ValueError where it has no species."""
+    if not answer.species:
+        raise ValueError("rotor assign: no species stands above chance in this spectrum; nothing is assigned")
+    changes: dict[str, Record | None] = {}
+    remarks = []
+    number, line_number, blend = state.free_number("species"), state.free_number("line"), free_blend(state)
+    for place, one in enumerate(answer.species):
+        constants = one.constants
+        record = Species(
+            name=f"species {number + place}",
+            source="",
+            constants=dict(constants.values),
+            errors=dict(constants.uncertainties),
+            free=tuple(name for name in constants.values if name not in one.refined.open_constants),
+            temperature_k=float(one.grown.temperature_k),
+            dipole_abc_debye=tuple(one.dipole_ratio.tolist()),
+            colour=(number + place - 1) % COLOURS,
+            reduction=constants.reduction or "",
+            representation=constants.representation or "",
+        )
+        lines = lines_from(one.lines, number + place, blend, state.settings.default_error_mhz)
+        changes[species_key(number + place)] = record
+        changes |= {line_key(line_number + i): line for i, line in enumerate(lines)}
+        line_number, blend = line_number + len(lines), max((line.blend for line in lines), default=blend) + 1
+        remarks.append(f"species {number + place}: {one.word} (p = {one.probability:.4f}), {len(lines)} lines")
+    return f"rotor assign ({len(answer.species)} species)", changes, remarks

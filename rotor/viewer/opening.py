@@ -1,0 +1,153 @@
+"""From what a user gives (a spectrum or a session, molecules, assigned lines) to a session that is served or shown."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from rotor.formats.packed import first_bytes
+from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
+from rotor.viewer.actions import Context, add_species
+from rotor.viewer.records import SpectrumFile
+from rotor.viewer.service import Service
+from rotor.viewer.session import SUFFIX, Session, check_spectrum, is_session, read_session, spectrum_file
+
+Note = Callable[[str], None]
+
+
+def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSpectrum:
+    """The spectrum of a file: .npy with two columns or rows, FITS, or text. reading: its units and noise, where they are stated."""
+    from rotor.formats.spectra.axis import ReadChoices
+    from rotor.formats.spectra.read import read_spectrum
+
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; expected a spectrum (text, FITS or .npy) or a session ({SUFFIX})")
+    if first_bytes(path, 6) == b"\x93NUMPY":
+        values = np.load(path, allow_pickle=False)
+        if values.ndim != 2 or not {2, 3} & set(values.shape) or values.dtype.kind not in "fiu":
+            raise ValueError(f"{path}: an array of shape {values.shape}; two columns or rows of numbers are needed")
+        columns = values if values.shape[1] in (2, 3) else values.T
+        noise = None if reading is None else reading.noise
+        return observed_spectrum(columns[:, 0], columns[:, 1], noise=noise, source=path.name)
+    choices = (
+        ReadChoices()
+        if reading is None
+        else ReadChoices(axis_unit=reading.axis_unit, unit=reading.unit, noise=reading.noise)
+    )
+    return read_spectrum(path, choices)
+
+
+def open_session(
+    source: str | os.PathLike[str],
+    molecules: Sequence[str] = (),
+    *,
+    lines: str | None = None,
+    session: str | os.PathLike[str] | None = None,
+    temperature_k: float = 300.0,
+    axis_unit: str | None = None,
+    unit: str | None = None,
+    noise: float | None = None,
+    save: bool = True,
+    note: Note = lambda _: None,
+) -> Service:
+    """The session of a spectrum, resumed where it was saved before, with molecules and lines put in.
+
+    Parameters
+    ----------
+    source : path
+        A spectrum (text, FITS, .npy), or the file of a session.
+    molecules : sequence of str
+        Names, files or SMILES:... of species; those that the session has already are not added again.
+    lines : path, optional
+        Assigned lines (.lin, .csv, .cat) of the first molecule.
+    session : path, optional
+        The session file; by default SPECTRUM.view.json beside the spectrum.
+    temperature_k : float, optional
+        Of the added species.
+    axis_unit, unit, noise : optional
+        What the file of the spectrum does not state.
+    save : bool, optional
+        Whether the session is written to its file.
+    note : callable, optional
+        Takes remarks.
+
+    Returns
+    -------
+    Service
+
+    Raises
+    ------
+    ValueError
+        With file and rule for what cannot be read, and where another program has the session.
+    """
+    path = Path(source)
+    file = path if is_session(path) else Path(session) if session is not None else _session_beside(path)
+    if session is not None and not is_session(file):
+        raise ValueError(f"{file}: the name of a session ends in {SUFFIX}")
+    if is_session(path) and not path.is_file():
+        raise ValueError(f"{path}: no such session; give the spectrum to begin one")
+    resumed = file.is_file() and (save or is_session(path))
+    made = read_session(file) if resumed else Session(SpectrumFile("", "", 0), file if save else None)
+    if save:
+        made.hold()
+    try:
+        where = file.parent / made.spectrum.path if is_session(path) else path
+        stated = msgspec.structs.replace(
+            made.spectrum,
+            axis_unit=axis_unit or made.spectrum.axis_unit,
+            unit=unit or made.spectrum.unit,
+            noise=made.spectrum.noise if noise is None else noise,
+        )
+        spectrum = open_spectrum(where, stated)
+        _bind(made, stated, where, file.parent, len(spectrum), resumed)
+        service = Service(made, spectrum)
+        _fill(service, molecules, lines, temperature_k, note)
+        made.save()
+    except BaseException:
+        made.release()
+        raise
+    for text in made.warnings:
+        note(text)
+    return service
+
+
+def _bind(session: Session, stated: SpectrumFile, path: Path, folder: Path, points: int, resumed: bool) -> None:
+    """Tie the session to its spectrum; a warning where it is another than the session was saved with."""
+    session.spectrum = msgspec.structs.replace(stated, sha256=session.spectrum.sha256)
+    if resumed:
+        check_spectrum(session, path, points, folder)
+    else:
+        session.spectrum = spectrum_file(path, points, folder, stated)
+
+
+def _session_beside(path: Path) -> Path:
+    """spectrum.view.json of spectrum.csv."""
+    name = path.name
+    for suffix in (".gz", path.with_suffix("").suffix if name.endswith(".gz") else path.suffix):
+        name = name.removesuffix(suffix) or name
+    return path.with_name(name + SUFFIX)
+
+
+def _fill(service: Service, molecules: Sequence[str], lines: str | None, temperature_k: float, note: Note) -> None:
+    """Put in the molecules that are not there yet, and assigned lines."""
+    session = service.session
+    for source in molecules:
+        if any(one.source == service.predictions.stored(source) for one in session.state.species.values()):
+            continue
+        context = Context(service.spectrum, service.predictions, [])
+        message: dict[str, Any] = {"source": source, "temperature_k": temperature_k}
+        session.apply(*add_species(session.state, message, context))
+        for text in context.notes:
+            note(text)
+    if lines is not None:
+        if not session.state.species:
+            raise ValueError(f"{lines}: lines need a molecule that they belong to; name it after the spectrum")
+        chosen = service.predictions.stored(molecules[0]) if molecules else None
+        first = next(n for n, one in session.state.species.items() if chosen in (None, one.source))
+        for text in service.read_lines(lines, first):
+            note(text)

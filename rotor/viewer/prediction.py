@@ -1,0 +1,307 @@
+"""Predicted lines of the species of a session: from the records to tops, line lists, and what of them stands in a window.
+
+Line lists are computed by `rotor.spectra.lines` and remembered by what they depend on, so that a pan costs a search in sorted frequencies
+and a moved constant one line list.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.parameters import with_names
+from rotor.fitting.top_constants import ConstantSet, TopConstants
+from rotor.fitting.top_levels import model_of
+from rotor.formats.assigned_lines import QUANTA
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.labelled import MissingLevelsError
+from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.spectra.lines import Lines, line_list
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+from rotor.viewer.records import Species
+
+if TYPE_CHECKING:
+    from rotor.observed.species import SpeciesLines
+
+T = TypeVar("T")
+REMEMBERED = 12  # line lists
+WEAKEST = 1e-8  # of the strongest line, below which a line is not shown
+ASSUMED_DEBYE = 1.0  # of a molecule whose dipole is not known: along every axis that symmetry allows
+
+
+def constant_set(top: Top, hyperfine: bool) -> ConstantSet:
+    """The constants of a top as a fit takes them."""
+    further = top.states is not None or top.internal_rotation is not None
+    return TopConstants(top, hyperfine) if hyperfine or further else top.constants
+
+
+def top_of_source(source: str) -> Top:
+    """The top of a name, a file or a text such as SMILES:C=O. ValueError for what is none."""
+    from rotor.formats import read
+
+    top = read(source)
+    if not isinstance(top, Top):
+        raise ValueError(f"{source}: holds a {type(top).__name__}, not a molecule or constants")
+    return top
+
+
+def with_assumed_dipole(top: Top) -> tuple[Top, str]:
+    """The top with a dipole, an estimate or 1 D along each allowed axis where none is known, and the remark that says so."""
+    if top.dipole_abc_debye is not None:
+        return top, ""
+    from rotor.verbs.molecule import MoleculeInput, Reading, with_some_dipole
+
+    remarks: list[str] = []
+    try:
+        return with_some_dipole(top, Reading(MoleculeInput(), "name", ".", remarks.append)), "; ".join(remarks)
+    except ValueError:
+        axes = {"linear": (1, 0, 0), "prolate": (1, 0, 0), "oblate": (0, 0, 1)}.get(top.kind, (1, 1, 1))
+        dipole = tuple(ASSUMED_DEBYE * axis for axis in axes)
+        return top.with_dipole(dipole, "assumed"), (
+            f"{top.name or 'the molecule'}: dipole not known, {ASSUMED_DEBYE:g} D along each axis assumed; set it beside the constants"
+        )
+
+
+def species_of_source(
+    source: str, colour: int, temperature_k: float, base: Callable[[str], Top] = top_of_source
+) -> tuple[Species, str]:
+    """The record of a molecule, and a remark on its dipole."""
+    top, remark = with_assumed_dipole(base(source))
+    constants = constant_set(top, False)
+    record = Species(
+        name=" ".join(top.name.split()) or source,
+        source=source,
+        constants=dict(constants.values),
+        errors=dict(constants.uncertainties),
+        free=tuple(name for name in constants.values if name in ("A", "B", "C")),
+        temperature_k=temperature_k,
+        dipole_abc_debye=top.dipole_abc_debye,
+        colour=colour,
+        reduction=constants.reduction or "",
+        representation=constants.representation or "",
+    )
+    return record, remark
+
+
+def with_hyperfine(record: Species, on: bool, base: Callable[[str], Top] = top_of_source) -> Species:
+    """The record with its constants of spins, or without; ValueError where the source has none."""
+    if on == record.hyperfine:
+        return record
+    top = base(record.source) if record.source else None
+    if on and (top is None or top.spin_constants is None):
+        raise ValueError(f"{record.name}: its source has no constants of spins, so that no line is split")
+    known = constant_set(top, True) if on and top is not None else None
+    spins = {name: value for name, value in known.values.items() if "(" in name} if known is not None else {}
+    plain = {name: value for name, value in record.constants.items() if "(" not in name}
+    free = tuple(name for name in record.free if on or "(" not in name)
+    return msgspec.structs.replace(record, constants={**plain, **spins}, free=free, hyperfine=on)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A species ready for predictions and fits: its record, its top with the record's constants and dipole, and the constants by name.
+
+    file: that it comes from, or its name.
+    """
+
+    record: Species
+    top: Top
+    constants: ConstantSet
+    file: str = ""
+
+    @property
+    def quanta(self) -> tuple[str, ...]:
+        """Names of the quantum numbers that label a level in assignments."""
+        return self.constants.quanta if isinstance(self.constants, TopConstants) else QUANTA[self.top.kind]
+
+    @property
+    def halves(self) -> frozenset[str]:
+        """Those that are half-integers, stored as twice their value."""
+        return self.constants.halves if isinstance(self.constants, TopConstants) else frozenset()
+
+    @property
+    def effects(self) -> tuple[Any, ...]:
+        """Of the Hamiltonian."""
+        return self.constants.effects if isinstance(self.constants, TopConstants) else tuple(SEMI_RIGID)
+
+    def calculated_mhz(self, upper: Ints, lower: Ints) -> Floats:
+        """Frequencies (n,) of lines by their labels (n, k); nan for a level that does not exist."""
+        labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
+        energies = np.full(len(labels), np.nan)
+        there = np.ones(len(labels), dtype=bool)
+        while there.any():
+            try:
+                made = model_of(self.constants, labels[there])
+            except MissingLevelsError as error:
+                there[np.flatnonzero(there)[error.places]] = False
+                continue
+            energies[there] = made.levels(np.array(list(self.constants.values.values())))[0]
+            break
+        places = places.reshape(-1)
+        return np.asarray(energies[places[: len(upper)]] - energies[places[len(upper) :]])
+
+    def labels(self, levels: Any, rows: NDArray[Any]) -> Ints:
+        """Labels (n, k) of rows of levels in the order of `quanta`, species as numbers."""
+        columns = [levels.quanta[name][rows] for name in self.quanta]
+        return np.stack(
+            [np.array([SPECIES_NUMBERS[x] for x in column]) if column.dtype.kind in "US" else column for column in columns],
+            axis=1,
+        ).astype(np.int64)  # fmt: skip
+
+
+def model_of_species(record: Species, base: Callable[[str], Top] = top_of_source) -> Model:
+    """The model of a record. base: the top of a source, where it is remembered."""
+    if not record.source:
+        settings: dict[str, Any] = {
+            "reduction": record.reduction or None,
+            "representation": record.representation or None,
+        }
+        constants = Constants(**{**settings, **record.constants}, uncertainties=record.errors)
+        top = Top.from_constants(constants, dipole_abc_debye=record.dipole_abc_debye, name=record.name)
+        return Model(record, top, constants)
+    top = with_assumed_dipole(base(record.source))[0]
+    if record.dipole_abc_debye is not None and record.dipole_abc_debye != top.dipole_abc_debye:
+        top = top.with_dipole(record.dipole_abc_debye, "set in the session")
+    own = constant_set(top, record.hyperfine)
+    if dict(own.values) == record.constants:
+        return Model(record, top, own)  # with level energies and all else that the source has
+    own = with_names(own, [name for name in record.constants if name not in own])
+    moved = own.replace(**record.constants, uncertainties=record.errors)
+    return Model(record, moved.top if isinstance(moved, TopConstants) else top.with_constants(moved), moved)
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """The lines of a species in the band, rising in frequency, and their integrated absorption (n,)."""
+
+    model: Model
+    lines: Lines
+    intensity: Floats
+
+    @property
+    def strongest(self) -> float:
+        """Of the intensities; 0 without lines."""
+        return float(self.intensity.max(initial=0.0))
+
+    def between(self, first_mhz: float, last_mhz: float, most: int) -> Ints:
+        """Rows in a range; where there are more than `most`, the strongest in each of so many parts of it."""
+        a, b = np.searchsorted(self.lines.frequency_mhz, (first_mhz, last_mhz))
+        rows = np.arange(a, b)
+        if len(rows) <= most:
+            return rows
+        part = ((self.lines.frequency_mhz[a:b] - first_mhz) * (most / (last_mhz - first_mhz))).astype(np.int64)
+        order = np.lexsort((self.intensity[a:b], part))
+        last = np.append(np.diff(part[order]) != 0, True)
+        return np.asarray(rows[np.sort(order[last])])
+
+
+class Predictions:
+    """Line lists of species in the band of a spectrum, remembered while their constants stay."""
+
+    def __init__(self, band_mhz: tuple[float, float], folder: Path | None = None) -> None:
+        self.band_mhz = band_mhz
+        self.folder = (folder or Path()).resolve()
+        self._tops: dict[str, Top] = {}
+        self._lists: OrderedDict[bytes, Predicted] = OrderedDict()
+        self._jmax: dict[tuple[str, float, int], int] = {}
+        self._models: OrderedDict[bytes, Model] = OrderedDict()
+        self._emitters: dict[bytes, SpeciesLines] = {}
+
+    def top(self, source: str) -> Top:
+        """The top of a source, read once."""
+        if source not in self._tops:
+            self._tops[source] = top_of_source(self.located(source))
+        return self._tops[source]
+
+    def stored(self, source: str) -> str:
+        """How the session names a source: a file below its folder by its relative path, other files by their whole path."""
+        path = Path(source)
+        if not _is_file(path):
+            return source
+        where = path.resolve()
+        return (where.relative_to(self.folder) if where.is_relative_to(self.folder) else where).as_posix()
+
+    def located(self, source: str) -> str:
+        """The source as it is read: a file of the session's folder by its whole path."""
+        return str(self.folder / source) if _is_file(self.folder / source) else source
+
+    def model(self, record: Species) -> Model:
+        """The model of a record."""
+        return _remembered(self._models, _key(record, temperature=False), lambda: self._model(record))
+
+    def _model(self, record: Species) -> Model:
+        return replace(model_of_species(record, self.top), file=self.located(record.source) if record.source else "")
+
+    def lines(self, record: Species) -> Predicted:
+        """The predicted lines of a record in the band.
+
+        The highest J is that of the constants with which the species came, so that it does not change while constants move.
+        """
+        return _remembered(self._lists, _key(record), lambda: self._predicted(self.model(record)))
+
+    def _predicted(self, model: Model) -> Predicted:
+        record = model.record
+        key = (record.source or record.name, record.temperature_k, len(record.constants))
+        lines = line_list(
+            model.top,
+            temperature_k=record.temperature_k,
+            range_mhz=self.band_mhz,
+            jmax=self._jmax.get(key),
+            effects=model.effects,
+        )
+        self._jmax.setdefault(key, lines.jmax)
+        intensity = lines.intensity_nm2_mhz
+        strong = intensity >= WEAKEST * intensity.max(initial=0.0)
+        return Predicted(model, lines.where(strong), intensity[strong])
+
+    def emitter(self, record: Species) -> SpeciesLines:
+        """The lines of a record for emission models, with Q(T)."""
+        from rotor.observed.species import species_of_lines
+
+        key = _key(record)
+        if key not in self._emitters:
+            self._emitters[key] = species_of_lines(self.lines(record).lines, record.name)
+        return self._emitters[key]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a text that no path can be
+        return False
+
+
+def _key(record: Species, temperature: bool = True) -> bytes:
+    """What a line list depends on."""
+    number = record.temperature_k if temperature else 0.0
+    content = (record.source, record.name, record.constants, record.dipole_abc_debye, record.hyperfine, number)
+    return msgspec.json.encode(content)
+
+
+def _remembered(memory: OrderedDict[bytes, T], key: bytes, make: Callable[[], T]) -> T:
+    """The value of a key, made where it is not there; the oldest one leaves."""
+    if key not in memory:
+        memory[key] = make()
+        if len(memory) > REMEMBERED:
+            memory.popitem(last=False)
+    memory.move_to_end(key)
+    return memory[key]
+
+
+def changed(record: Species, constants: Mapping[str, float]) -> Species:
+    """The record with other constants, which lose their errors; ValueError for a value that is no number."""
+    bad = next((name for name, value in constants.items() if not math.isfinite(value)), None)
+    if bad is not None:
+        raise ValueError(f"{bad}: {constants[bad]}: expected a finite number (MHz)")
+    errors = {name: error for name, error in record.errors.items() if name not in constants}
+    return msgspec.structs.replace(record, constants={**record.constants, **constants}, errors=errors)

@@ -1,0 +1,340 @@
+"""One session served: messages of pages are answered, actions are carried out as steps, changes are announced to every page.
+
+The server, the widget of notebooks and the tests use the same `Service.answer`. docs/view.md lists the messages.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.version import version
+from rotor.viewer.actions import (
+    ACTIONS,
+    REFITTED_AFTER,
+    Context,
+    constants_in,
+    import_lines,
+    number_of,
+    species_of,
+)
+from rotor.viewer.exports import exported
+from rotor.viewer.fits import levels_of, refitted, residuals_of
+from rotor.viewer.loomis_wood import centres_of, rows_of, rows_of_labels
+from rotor.viewer.peak_fit import fit_peak
+from rotor.viewer.prediction import Predicted, Predictions, changed
+from rotor.viewer.pyramid import pyramid
+from rotor.viewer.records import Line, Record, Species, species_key
+from rotor.viewer.session import Session, facts
+
+MOST_PIXELS = 8000
+MOST_STICKS = 1500  # of a species in a window
+MOST_PICKED = 300
+SEARCH = "search"  # by rotor assign: long, so that it does not hold up other messages
+
+Answer = dict[str, Any]
+
+
+class Service:
+    """A session with its spectrum. answer: of one message. Threads may call it; one message is answered at a time."""
+
+    def __init__(self, session: Session, spectrum: ObservedSpectrum) -> None:
+        self.session = session
+        self.spectrum = spectrum
+        self.pyramid = pyramid(spectrum.frequency_mhz, spectrum.intensity)
+        self.band_mhz = (float(spectrum.frequency_mhz[0]), float(spectrum.frequency_mhz[-1]))
+        self.predictions = Predictions(self.band_mhz, session.path.parent if session.path else None)
+        self._lock = threading.RLock()
+        self._residuals: tuple[int, dict[int, dict[str, Any]]] | None = None
+        self._queries: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
+            "hello": self._hello,
+            "window": self._window,
+            "loomis_wood": self._loomis_wood,
+            "peak": self._peak,
+            "pick": self._pick,
+            "levels": self._levels,
+            "export": self._export,
+        }
+
+    def answer(self, message: Any) -> Answer:
+        """The answer to a message: `ok` with its content, or `error` with one line; `notes` where there is more to know."""
+        if not isinstance(message, dict) or not isinstance(message.get("do"), str):
+            return {"error": 'expected a message {"do": NAME, ...}'}
+        with self._lock:
+            try:
+                return self._answer(message["do"], message)
+            except ValueError as error:
+                return {"error": " ".join(str(error).split())}
+            except OSError as error:
+                return {"error": f"{error.filename or 'session'}: {error.strerror}"}
+            except (
+                ArithmeticError,
+                LookupError,
+                TypeError,
+                AttributeError,
+            ) as error:  # a message that nothing foresees
+                return {"error": f"{message['do']}: {type(error).__name__}: {error}"}
+
+    def _answer(self, name: str, message: Mapping[str, Any]) -> Answer:
+        if name in self._queries:
+            return {"ok": self._queries[name](message)}
+        if name in ("undo", "redo"):
+            return {"ok": {"label": self.session.undo() if name == "undo" else self.session.redo()}}
+        if name not in ACTIONS:
+            raise ValueError(f"do {name!r}: known are {', '.join([*self._queries, *ACTIONS, 'undo', 'redo', SEARCH])}")
+        context = self._context()
+        label, changes = ACTIONS[name](self.session.state, message, context)
+        if name in REFITTED_AFTER and self.session.state.settings.auto_refit:
+            changes |= self._refits(changes, context)
+        moved = self.session.apply(label, changes)
+        return {"ok": {"label": label if moved else None}, "notes": context.notes}
+
+    def _context(self) -> Context:
+        return Context(self.spectrum, self.predictions, [])
+
+    def _refits(self, changes: Mapping[str, Record | None], context: Context) -> dict[str, Record | None]:
+        """Species whose lines or free constants change, refitted; a note says why one is not."""
+        after = self.session.state.with_changes(changes)
+        before = self.session.state.records
+        touched = set[int]()
+        for key, record in changes.items():
+            for one in (record, before.get(key)):
+                if isinstance(one, Line):
+                    touched.add(one.species)
+            if key.startswith("species/"):
+                touched.add(int(key.partition("/")[2]))
+        made: dict[str, Record | None] = {}
+        for number in sorted(touched & after.species.keys()):
+            try:
+                made[species_key(number)] = refitted(
+                    self.predictions.model(after.species[number]), after.lines_of(number)
+                )
+            except ValueError as error:
+                context.notes.append(f"not refitted: {error}")
+        return made
+
+    def read_lines(self, path: str, species: int) -> list[str]:
+        """Put the assigned lines of a file into the session; remarks of the reader."""
+        with self._lock:
+            context = self._context()
+            self.session.apply(*import_lines(self.session.state, species, path, context))
+            return context.notes
+
+    # Queries
+
+    def facts(self) -> Answer:
+        """Everything of the session but the spectrum, with what is calculated for each line."""
+        with self._lock:
+            out = facts(self.session)
+            out["lines"] = {str(number): row for number, row in self._line_facts().items()}
+            out["quanta"] = {}
+            for number, record in self.session.state.species.items():
+                model = self.predictions.model(record)
+                out["quanta"][str(number)] = {"names": list(model.quanta), "halves": sorted(model.halves)}
+            return out
+
+    def _line_facts(self) -> dict[int, dict[str, Any]]:
+        """Residuals of all lines, once a revision."""
+        if self._residuals is None or self._residuals[0] != self.session.revision:
+            state, rows = self.session.state, dict[int, dict[str, Any]]()
+            for number, record in state.species.items():
+                rows |= residuals_of(self.predictions.model(record), state.lines_of(number))
+            self._residuals = (self.session.revision, rows)
+        return self._residuals[1]
+
+    def _hello(self, message: Mapping[str, Any]) -> Answer:
+        y = self.spectrum.intensity
+        return {
+            "rotor": version(),
+            "band_mhz": list(self.band_mhz),
+            "range": [float(y.min()), float(y.max())],
+            "channel_mhz": self.spectrum.channel_mhz,
+            "noise": float(np.median(self.spectrum.noise)),
+            "unit": self.spectrum.unit,
+            "notes": list(self.spectrum.notes),
+            "session": self.facts(),
+        }
+
+    def _previewed(self, message: Mapping[str, Any]) -> dict[int, Species]:
+        """The species, one with constants that are being moved."""
+        species = self.session.state.species
+        preview = message.get("preview")
+        if preview is None:
+            return species
+        number, record = species_of(self.session.state, preview)
+        if "temperature_k" in preview:
+            record = msgspec.structs.replace(record, temperature_k=number_of(preview, "temperature_k", above=0))
+        if "constants" in preview:
+            record = changed(record, constants_in(preview))
+        if "dipole_abc_debye" in preview:
+            a, b, c = (float(x) for x in preview["dipole_abc_debye"])
+            record = msgspec.structs.replace(record, dipole_abc_debye=(a, b, c))
+        if "scale" in preview:
+            record = msgspec.structs.replace(record, scale=number_of(preview, "scale", above=0))
+        return {**species, number: record}
+
+    def _window(self, message: Mapping[str, Any]) -> Answer:
+        """Spectrum and sticks of a range: points, and for each species frequencies, heights (of the strongest line: 1) and labels."""
+        first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
+        if not first < last:
+            raise ValueError(f"window: {first:g} to {last:g} MHz: expected a range that rises")
+        pixels = min(int(number_of(message, "pixels", above=0)), MOST_PIXELS)
+        x, y = self.pyramid.window(first, last, pixels)
+        species = {n: one for n, one in self._previewed(message).items() if one.visible}
+        answer: Answer = {"x": _numbers(x, 10), "y": _numbers(y), "sticks": {}}
+        for number, record in species.items():
+            answer["sticks"][str(number)] = self.sticks(self.predictions.lines(record), first, last)
+        if self.session.state.settings.emission and species and len(x) > 1:
+            answer["model"] = self._emission(species, first, last, pixels)
+        return answer
+
+    def sticks(self, predicted: Predicted, first: float, last: float, most: int = MOST_STICKS) -> Answer:
+        """Frequencies, heights and labels of the lines of a species in a range, as the page draws them."""
+        rows = predicted.between(first, last, most)
+        lines, strongest = predicted.lines, predicted.strongest or 1.0
+        chosen = lines.where(rows)
+        labels = [predicted.model.labels(lines.levels, side) for side in (chosen.upper, chosen.lower)]
+        return {
+            "x": _numbers(chosen.frequency_mhz, 12),
+            "height": _numbers(predicted.intensity[rows] / strongest * predicted.model.record.scale),
+            "upper": labels[0].tolist(),
+            "lower": labels[1].tolist(),
+        }
+
+    def _emission(self, species: Mapping[int, Species], first: float, last: float, pixels: int) -> Answer:
+        """The brightness of all species together, as an observed spectrum would have it (K)."""
+        from rotor.observed.model import Component, Sight, model
+
+        components = [
+            Component(
+                self.predictions.emitter(one), one.column_per_cm2, one.temperature_k, one.velocity_km_s, one.fwhm_km_s
+            )
+            for one in species.values()
+        ]
+        grid = np.linspace(max(first, self.band_mhz[0]), min(last, self.band_mhz[1]), 2 * pixels)
+        seen = model(components, grid, Sight(self.session.state.settings.background_k))
+        return {"x": _numbers(grid, 10), "y": _numbers(seen.brightness_k)}
+
+    def _loomis_wood(self, message: Mapping[str, Any]) -> Answer:
+        """The rows of the chosen series: centres, labels, points, and the line assigned in each."""
+        series = self.session.state.settings.series
+        if series is None:
+            return {"rows": []}
+        species = self._previewed(message)
+        record = species.get(series.species) if series.species is not None else None
+        predicted = None if record is None else self.predictions.lines(record)
+        centres = centres_of(series, self.band_mhz, predicted)
+        first, count = int(message.get("first_row", 0)), int(message.get("rows", 50))
+        chosen = centres.where(np.arange(len(centres.number))[max(first, 0) : max(first, 0) + max(count, 1)])
+        half = number_of(message, "half_width_mhz", above=0)
+        points = rows_of(chosen, self.pyramid, half, min(int(number_of(message, "pixels", above=0)), MOST_PIXELS))
+        assigned = {
+            (line.upper, line.lower): (number, line)
+            for number, line in self.session.state.lines_of(series.species or -1).items()
+        }
+        rows = []
+        for i, (x, y) in enumerate(points):
+            labels = tuple(chosen.upper[i].tolist()), tuple(chosen.lower[i].tolist())
+            number, line = assigned.get(labels, (None, None))
+            rows.append(
+                {
+                    "n": int(chosen.number[i]),
+                    "centre_mhz": float(chosen.frequency_mhz[i]),
+                    "upper": labels[0],
+                    "lower": labels[1],
+                    "x": _numbers(x, 8),
+                    "y": _numbers(y),
+                    "line": number,
+                    "at": None if line is None else line.frequency_mhz - float(chosen.frequency_mhz[i]),
+                    "rejected": None if line is None else line.rejected,
+                }
+            )
+        return {"rows": rows, "total": len(centres.number)}
+
+    def _peak(self, message: Mapping[str, Any]) -> Answer:
+        """The peak in a range, and the predicted lines that it may be: those in the range and near it, strongest first."""
+        first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
+        if not first < last:
+            raise ValueError(f"peak: {first:g} to {last:g} MHz: expected a range that rises")
+        answer: Answer = {"peak": None, "why": None, "candidates": []}
+        try:
+            peak = fit_peak(self.spectrum, first, last)
+            answer["peak"] = asdict(peak)
+            centre = peak.frequency_mhz
+        except ValueError as error:
+            answer["why"], centre = str(error), (first + last) / 2
+        reach = max(number_of(message, "reach_mhz", default=0.0), last - first)
+        for number, record in self.session.state.species.items():
+            if not record.visible:
+                continue
+            predicted = self.predictions.lines(record)
+            rows = predicted.between(centre - reach, centre + reach, 40)
+            answer["candidates"] += self._candidates(number, predicted, rows, centre)
+        answer["candidates"].sort(key=lambda one: -one["height"])
+        return answer
+
+    def _candidates(self, number: int, predicted: Predicted, rows: Any, centre: float) -> list[Answer]:
+        lines, model = predicted.lines.where(rows), predicted.model
+        labels = [model.labels(lines.levels, side).tolist() for side in (lines.upper, lines.lower)]
+        heights = predicted.intensity[rows] / (predicted.strongest or 1.0)
+        assigned = {(line.upper, line.lower) for line in self.session.state.lines_of(number).values()}
+        return [
+            {
+                "species": number,
+                "upper": upper,
+                "lower": lower,
+                "frequency_mhz": frequency,
+                "off_mhz": frequency - centre,
+                "height": height,
+                "assigned": (tuple(upper), tuple(lower)) in assigned,
+            }
+            for upper, lower, frequency, height in zip(
+                *labels, lines.frequency_mhz.tolist(), heights.tolist(), strict=True
+            )
+        ]
+
+    def _pick(self, message: Mapping[str, Any]) -> Answer:
+        """The allowed lines of a level in the band, by its quantum numbers; the strongest first."""
+        number, record = species_of(self.session.state, message)
+        label = message.get("level")
+        predicted = self.predictions.lines(record)
+        model = predicted.model
+        names = ", ".join(model.quanta)
+        if not isinstance(label, list) or len(label) != len(model.quanta) or not all(type(q) is int for q in label):
+            raise ValueError(f"level: {label!r}: expected {len(model.quanta)} whole numbers: {names}")
+        row = int(rows_of_labels(model, predicted.lines.levels, np.array([label]))[0])
+        if row < 0:
+            raise ValueError(
+                f"level {' '.join(map(str, label))}: there is no such level ({names}) up to J = {predicted.lines.jmax}"
+            )
+        here = np.flatnonzero((predicted.lines.upper == row) | (predicted.lines.lower == row))
+        here = here[np.argsort(-predicted.intensity[here])][:MOST_PICKED]
+        return {"candidates": self._candidates(number, predicted, here, 0.0)}
+
+    def _levels(self, message: Mapping[str, Any]) -> Answer:
+        number, record = species_of(self.session.state, message)
+        predicted = self.predictions.lines(record)
+        return levels_of(predicted.model, self.session.state.lines_of(number), predicted.lines.levels)
+
+    def _export(self, message: Mapping[str, Any]) -> Answer:
+        number, record = species_of(self.session.state, message)
+        lines = self.session.state.lines_of(number)
+        name, text = exported(str(message.get("what")), self.predictions.model(record), lines)
+        return {"name": name, "text": text}
+
+
+def _numbers(values: Floats, digits: int = 6) -> list[float]:
+    """Numbers for JSON, rounded to significant digits of the largest, so that messages are short."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if not largest > 0 or not math.isfinite(largest):
+        return np.asarray(values, dtype=np.float64).tolist()  # type: ignore[no-any-return]
+    places = digits - 1 - math.floor(math.log10(largest))
+    return np.round(values, places).tolist()  # type: ignore[no-any-return]

@@ -1,0 +1,520 @@
+"""`rotor view` without a browser: sessions, undo, resuming, windows of the spectrum, predictions, rows, fits, exports, the widget."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, write_case
+
+from rotor.viewer.actions import ACTIONS
+from rotor.viewer.opening import open_session
+from rotor.viewer.peak_fit import fit_peak
+from rotor.viewer.pyramid import pyramid
+from rotor.viewer.session import SUFFIX, read_session
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The folder of a case."""
+    folder = tmp_path_factory.mktemp("view")
+    write_case(folder)
+    return folder
+
+
+@pytest.fixture
+def service(made, tmp_path, monkeypatch):
+    """A session on the case with its molecule, in a folder of its own."""
+    for name in ("spectrum.csv", NAME):
+        (tmp_path / name).write_bytes((made / name).read_bytes())
+    monkeypatch.chdir(tmp_path)
+    opened = open_session("spectrum.csv", [NAME], temperature_k=KELVIN)
+    yield opened
+    opened.session.release()
+
+
+def done(service, name, **message):
+    """The content of an answer that is no error."""
+    answer = service.answer({"do": name, **message})
+    assert "ok" in answer, answer
+    return answer["ok"]
+
+
+# Sessions
+
+
+def test_every_action_can_be_undone_and_redone_and_is_on_disk(service):
+    def tried(name, **message):
+        before = service.session.state
+        done(service, name, **message)
+        after = service.session.state
+        assert after != before, name
+        done(service, "undo")
+        assert service.session.state == before, name
+        assert read_session(service.session.path).state == before
+        done(service, "redo")
+        assert service.session.state == after, name
+        assert read_session(service.session.path).state == after
+        return name
+
+    seen = {tried("add_species", source="CO", temperature_k=20.0)}
+    seen.add(tried("remove_species", species=2))
+    f = 16030.188
+    target = [{"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2]}]
+    seen.add(tried("assign", frequency_mhz=f, error_mhz=0.002, to=target))
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    seen.add(tried("edit", lines=[2], error_mhz=0.02, weight=0.5, comment="shoulder"))
+    seen.add(tried("reject", lines=[2], rejected=True))
+    seen.add(tried("remove", lines=[2]))
+    seen.add(tried("free", species=1, free=["A", "B", "C", "DeltaJ", "PhiJ"]))
+    seen.add(tried("free", species=1, free=["A", "B", "C"]))
+    seen.add(tried("constants", species=1, constants={"A": 9000.01}))
+    seen.add(tried("species", species=1, temperature_k=4.0, dipole_abc_debye=[1.0, 1.0, 0.0], scale=2.0, visible=False))
+    seen.add(tried("refit", species=1))
+    seen.add(tried("series", series={"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2], "step": [1, 0, 1]}))
+    seen.add(tried("assign_series", tolerance_mhz=0.4))
+    seen.add(tried("settings", auto_refit=True))
+    assert seen == set(ACTIONS)
+    labels = len(service.session.done)
+    for _ in range(labels):
+        done(service, "undo")
+    assert service.session.state.records == {}
+    for _ in range(labels):
+        done(service, "redo")
+    assert read_session(service.session.path).state == service.session.state
+
+
+_KILLED = """
+import sys
+from pathlib import Path
+from rotor.viewer.records import Line, SpectrumFile
+from rotor.viewer.session import Session, read_session
+path = Path(sys.argv[1])
+session = read_session(path) if path.exists() else Session(SpectrumFile("s.csv", "0", 1), path)
+session.hold()
+print("ready", flush=True)
+while True:
+    number = session.state.free_number("line")
+    session.apply("assign", {f"line/{number}": Line(1, (number, 0, number), (0, 0, 0), 1.0 * number, 0.1, number)})
+    print(number, flush=True)
+"""
+
+
+def test_a_session_killed_fifty_times_loses_no_assignment(tmp_path):
+    path, rng = tmp_path / f"s{SUFFIX}", random.Random(4)
+    known = 0
+    for _ in range(50):
+        process = subprocess.Popen([sys.executable, "-c", _KILLED, str(path)], stdout=subprocess.PIPE, text=True)
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(rng.uniform(0.0, 0.03))
+        process.kill()
+        said = [int(word) for word in process.communicate()[0].split("\n")[:-1]]  # what a page was told is finished
+        known = max([known, *said])
+        if path.exists():
+            resumed = read_session(path)
+            assert set(range(1, known + 1)) <= set(resumed.state.lines)
+            assert [len(step.after) for step in resumed.done] == [1] * len(resumed.done)
+    assert known > 50
+
+
+def test_a_changed_spectrum_is_said_and_a_second_program_is_refused(service, tmp_path):
+    assign_line(service, *SERIES[0])
+    with pytest.raises(ValueError, match="another run"):
+        open_session("spectrum.csv")
+    service.session.release()
+    again = open_session("spectrum.csv")
+    assert again.session.state == service.session.state
+    assert again.session.warnings == ()
+    again.session.release()
+    text = (tmp_path / "spectrum.csv").read_text().split("\n")
+    (tmp_path / "spectrum.csv").write_text("\n".join(text[:-100]) + "\n")
+    notes = []
+    other = open_session("spectrum.view.json", note=notes.append)
+    other.session.release()
+    assert "spectrum.csv has changed since the session was saved" in notes[0]
+    assert other.session.state == service.session.state
+    assert other.facts()["warnings"] == notes
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("{}", "not a session of rotor view"),
+        ('{"kind":"x"}', "not a session of rotor view"),
+        ("\x00\x01", "not a session of rotor view"),
+    ],
+)
+def test_what_is_no_session_is_refused_in_one_line(made, tmp_path, content, said):
+    path = tmp_path / f"a{SUFFIX}"
+    path.write_text(content)
+    with pytest.raises(ValueError, match=said):
+        open_session(path)
+    assert path.read_text() == content
+
+
+# Windows
+
+
+def test_a_window_has_the_extremes_of_every_pixel():
+    rng = np.random.default_rng(3)
+    x = np.sort(rng.uniform(0, 1000, 50_000))
+    y = rng.normal(size=len(x))
+    made = pyramid(x, y)
+    for first, last, pixels in (
+        (0, 1000, 100),
+        (200, 700.5, 333),
+        (0, 1000, 7),
+        (500, 501, 40),
+        (999.9, 1100, 20),
+        (-5, 0.0, 3),
+    ):
+        px, py = made.window(first, last, pixels)
+        inside = (x >= first) & (x <= last)
+        if inside.sum() <= 2 * pixels:  # the channels themselves
+            assert set(y[inside]) <= set(py)
+            continue
+        assert len(px) <= 2 * pixels
+        edges = np.linspace(first, last, pixels + 1)
+        slack = (last - first) / pixels  # a pixel
+        for a, b in pairwise(edges):
+            here = (x >= a) & (x < b)
+            if here.any():
+                near = (px >= a - slack) & (px <= b + slack)
+                assert py[near].max() >= y[here].max()
+                assert py[near].min() <= y[here].min()
+        assert py.max() == y[inside].max() or py.max() in y  # nothing is made up
+
+
+def test_a_single_spike_is_seen_at_every_zoom():
+    y = np.zeros(1_000_000)
+    y[777_777] = 1.0
+    made = pyramid(np.arange(1e6), y)
+    for span in (1e6, 3e5, 1e4, 500.0):
+        x, seen = made.window(777_777 - span / 2, 777_777 + span / 2, 800)
+        assert seen.max() == 1.0
+        assert abs(x[seen.argmax()] - 777_777) <= 1.5 * span / 800
+
+
+# Predictions
+
+
+def test_sticks_are_the_line_list_and_previews_change_nothing(service):
+    lines = service.predictions.lines(service.session.state.species[1]).lines
+    window = done(service, "window", first_mhz=9000, last_mhz=17000, pixels=500)
+    sticks = window["sticks"]["1"]
+    inside = (lines.frequency_mhz >= 9000) & (lines.frequency_mhz < 17000)
+    assert len(sticks["x"]) == inside.sum()
+    assert np.allclose(sticks["x"], lines.frequency_mhz[inside], atol=1e-6)  # rounded for the message
+    before = service.session.state
+    moved = done(
+        service,
+        "window",
+        first_mhz=9000,
+        last_mhz=17000,
+        pixels=500,
+        preview={"species": 1, "constants": {"B": 3001.0}},
+    )
+    assert max(moved["sticks"]["1"]["x"]) != max(sticks["x"])
+    assert service.session.state == before
+
+
+def test_of_many_lines_the_strongest_of_each_piece_stays(service):
+    predicted = service.predictions.lines(service.session.state.species[1])
+    few = predicted.between(8000.0, 17000.0, 10)
+    assert len(few) <= 10
+    assert int(np.argmax(predicted.intensity)) in few.tolist()
+
+
+def test_a_refit_finds_the_constants_that_made_the_spectrum(service):
+    for upper, lower in SERIES:
+        assert assign_line(service, upper, lower)["ok"]["label"]
+    done(service, "refit", species=1)
+    record = service.session.state.species[1]
+    for name in "ABC":
+        assert abs(record.constants[name] - TRUE[name]) < 5 * record.errors[name]
+        assert record.fit.before[name] != record.constants[name] or name == "C"
+    rows = service.facts()["lines"]
+    assert max(abs(row["difference_mhz"]) for row in rows.values()) < 0.005  # noise over height of the weakest line
+
+
+def test_automatic_refits_are_one_step_and_say_why_not(service):
+    done(service, "settings", auto_refit=True)
+    answer = assign_line(service, *SERIES[0])
+    assert answer["notes"][0].startswith("not refitted: lines of case: 3 free constants for 1")
+    for upper, lower in SERIES[1:4]:
+        assign_line(service, upper, lower)
+    assert service.session.state.species[1].fit.lines == 4
+    steps = len(service.session.done)
+    assign_line(service, *SERIES[4])
+    assert len(service.session.done) == steps + 1
+    assert service.session.state.species[1].fit.lines == 5
+    done(service, "undo")
+    assert service.session.state.species[1].fit.lines == 4
+
+
+def test_peak_fit_agrees_with_another_program_and_with_the_closed_form_of_its_error(service):
+    from scipy.optimize import curve_fit
+
+    spectrum = service.spectrum
+    f = spectrum.frequency_mhz[np.argmax(spectrum.intensity)]
+    peak = fit_peak(spectrum, f - 0.5, f + 0.5)
+    a, b = np.searchsorted(spectrum.frequency_mhz, (f - 0.5, f + 0.5))
+    x, y = spectrum.frequency_mhz[a:b], spectrum.intensity[a:b]
+
+    def gaussian(x, b0, b1, h, centre, width):
+        return b0 + b1 * (x - f) + h * np.exp(-4 * np.log(2) * ((x - centre) / width) ** 2)
+
+    best, covariance = curve_fit(
+        gaussian, x, y, p0=[0, 0, y.max(), f, 0.1], sigma=np.full(len(x), NOISE), absolute_sigma=True
+    )
+    assert abs(peak.frequency_mhz - best[3]) < 1e-3 * peak.error_mhz + 1e-9
+    assert abs(peak.width_mhz - best[4]) < 1e-3 * peak.width_error_mhz + 1e-8
+    noise = float(np.median(spectrum.noise))
+    assert abs(peak.error_mhz / (np.sqrt(covariance[3, 3]) * max(1.0, peak.rms) * noise / NOISE) - 1) < 1e-3
+    s = WIDTH / np.sqrt(2)
+    closed = noise / peak.height * np.sqrt(2 * s * 0.02 / np.sqrt(np.pi))
+    assert (
+        abs(peak.error_mhz / closed - 1) < 0.35
+    )  # the baseline is fitted too, and the residuals scatter a little more
+
+
+# Loomis-Wood rows
+
+
+def test_rows_of_a_series_stand_about_the_predicted_lines(service):
+    done(service, "series", series={"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2], "step": [1, 0, 1]})
+    rows = done(service, "loomis_wood", half_width_mhz=2.0, pixels=200)["rows"]
+    predicted = service.predictions.lines(service.session.state.species[1]).lines
+    levels = predicted.levels
+    for row in rows:
+        at = [levels.find(j=j, ka=ka, kc=kc) for j, ka, kc in (row["upper"], row["lower"])]
+        assert row["centre_mhz"] == pytest.approx(levels.energy_mhz[at[0]] - levels.energy_mhz[at[1]], abs=1e-9)
+        assert abs(max(row["x"]) - 2.0) < 0.05
+    assert [row["upper"][0] for row in rows] == sorted(row["upper"][0] for row in rows)
+    count = done(service, "assign_series", tolerance_mhz=0.4)
+    assert str(len(rows)) in count["label"]
+
+
+def test_two_lines_are_extrapolated_linearly_and_three_by_a_parabola(service):
+    done(service, "series", series={"frequencies_mhz": [9000.0, 10000.0]})
+    rows = done(service, "loomis_wood", half_width_mhz=1.0, pixels=50)["rows"]
+    assert [round(row["centre_mhz"]) for row in rows] == [9000, 10000, 11000, 12000, 13000, 14000, 15000, 16000]
+    done(service, "series", series={"frequencies_mhz": [9000.0, 10000.0, 11100.0]})
+    rows = done(service, "loomis_wood", half_width_mhz=1.0, pixels=50)["rows"]
+    assert [round(row["centre_mhz"], 6) for row in rows] == [8100, 9000, 10000, 11100, 12300, 13600, 15000, 16500]
+
+
+# Files
+
+
+def test_lines_written_and_read_again_are_the_same(service, tmp_path):
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    blend = [
+        {"species": 1, "upper": [3, 2, 2], "lower": [2, 2, 1], "weight": 0.25},
+        {"species": 1, "upper": [3, 2, 1], "lower": [2, 2, 0], "weight": 0.75},
+    ]
+    done(service, "assign", frequency_mhz=16200.5, error_mhz=0.0312, to=blend)
+    done(service, "edit", lines=[2], error_mhz=0.0077)
+    before = {
+        (line.upper, line.lower): (line.frequency_mhz, line.error_mhz, line.weight, line.rejected)
+        for line in service.session.state.lines.values()
+    }
+    for suffix in ("lin", "csv"):
+        made = done(service, "export", what=suffix, species=1)
+        (tmp_path / made["name"]).write_text(made["text"])
+        other = open_session("spectrum.csv", [NAME], lines=made["name"], session=f"{suffix}{SUFFIX}")
+        other.session.release()
+        lines = other.session.state.lines.values()
+        after = {
+            (line.upper, line.lower): (line.frequency_mhz, line.error_mhz, line.weight, line.rejected) for line in lines
+        }
+        assert after == before
+        numbers = [line.blend for line in lines if line.frequency_mhz == 16200.5]
+        assert len(numbers) == 2
+        assert len(set(numbers)) == 1
+        assert len({line.blend for line in lines}) == len(before) - 1
+
+
+def test_rejected_lines_stay_rejected_in_files(service, tmp_path):
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    done(service, "reject", lines=[2], rejected=True)
+    for suffix in ("lin", "csv"):
+        made = done(service, "export", what=suffix, species=1)
+        (tmp_path / made["name"]).write_text(made["text"])
+        other = open_session("spectrum.csv", [NAME], lines=made["name"], session=f"{suffix}{SUFFIX}")
+        other.session.release()
+        assert sum(line.rejected for line in other.session.state.lines.values()) == 1
+
+
+def test_exports_are_read_by_the_other_verbs(service, call, tmp_path):
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    done(service, "refit", species=1)
+    for what in ("lin", "csv", "par", "var", "toml", "scene", "fit", "md", "tex"):
+        made = done(service, "export", what=what, species=1)
+        (tmp_path / made["name"]).write_text(made["text"])
+    assert call("fit", "case.par", "--lin", "case.lin", "--json", "p.json")[0] == 0
+    assert call("fit", "case.csv", "--start", "case.toml", "--free", "A,B,C", "--json", "c.json")[0] == 0
+    assert call("run", "case.scene.toml")[0] == 0
+    record = service.session.state.species[1]
+    fitted = {one["name"]: one for one in json.loads((tmp_path / "c.json").read_text())["parameters"]}
+    for name in "ABC":
+        assert fitted[name]["value"] == pytest.approx(record.constants[name], abs=1e-6)
+    assert call("spectrum", "case.toml", "--range", "8000:9000", "--top", "1")[0] == 0
+
+
+def test_an_exported_page_has_everything_inside(service, tmp_path):
+    from rotor.viewer.export_page import data_of_page, export_page
+
+    assign_line(service, *SERIES[0])
+    text = export_page(service)
+    data = data_of_page(text)
+    assert data["hello"]["session"]["records"]["line/1"]["upper"] == [2, 0, 2]
+    assert data["x"]["steps"] == len(service.spectrum)
+    assert "src=" not in text.split('id="rotor-data"')[0]
+    assert '<link rel="stylesheet"' not in text
+
+
+# Messages
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        (7, "expected a message"),
+        ({"do": "nonsense"}, "known are hello, window"),
+        ({"do": "window", "first_mhz": "a"}, "first_mhz: 'a': expected a finite number"),
+        ({"do": "window", "first_mhz": 2, "last_mhz": 1, "pixels": 9}, "expected a range that rises"),
+        ({"do": "assign", "frequency_mhz": -1}, "expected a number above 0"),
+        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 9}]}, "species: 9: expected one of 1"),
+        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1], "lower": [0]}]}, "3 quantum numbers are needed"),
+        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1, 1, 1], "lower": [1, 1, 1]}]}, "are the same"),
+        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1, 5, 1], "lower": [1, 1, 1]}]}, "there is no such level"),
+        ({"do": "remove", "lines": [99]}, "there is no line 99"),
+        ({"do": "reject", "lines": [], "rejected": True}, "expected a list"),
+        ({"do": "constants", "species": 1, "constants": {"A": float("nan")}}, "expected a finite number"),
+        ({"do": "constants", "species": 1, "constants": {"Q": 1.0}}, "Q"),
+        ({"do": "free", "species": 1, "free": ["nonsense"]}, "nonsense"),
+        ({"do": "species", "species": 1, "temperature_k": 0}, "expected a number above 0"),
+        ({"do": "add_species", "source": "no such thing"}, "no such thing"),
+        ({"do": "refit", "species": 1}, "no line is assigned"),
+        ({"do": "series", "series": {"species": 1, "upper": [1], "lower": [1], "step": [0]}}, "3 quantum numbers each"),
+        ({"do": "series", "series": {"what": 1}}, "series"),
+        ({"do": "assign_series", "tolerance_mhz": 1}, "choose a series"),
+        ({"do": "export", "what": "exe", "species": 1}, "expected one of lin, csv"),
+        ({"do": "export", "what": "lin", "species": 1}, "no line is assigned"),
+        ({"do": "pick", "species": 1, "level": [50, 60, 1]}, "there is no such level"),
+        ({"do": "undo", "x": 1}, None),
+        ({"do": "redo"}, "no action was taken back"),
+    ],
+)  # fmt: skip
+def test_a_message_that_cannot_be_is_answered_with_one_line(service, message, said):
+    state = service.session.state
+    answer = service.answer(message)
+    if said is None:
+        assert "ok" in answer
+        return
+    assert said in answer["error"]
+    assert "\n" not in answer["error"]
+    assert service.session.state == state
+
+
+def test_species_of_many_kinds_are_predicted_and_labelled(service):
+    for source, names in (("CO", ["j"]), ("NH3", ["j", "k"])):
+        done(service, "add_species", source=source)
+        facts = service.facts()
+        number = str(max(service.session.state.species))
+        assert facts["quanta"][number]["names"][: len(names)] == names
+        window = done(service, "window", first_mhz=8000, last_mhz=17000, pixels=100)
+        assert number in window["sticks"]
+
+
+def test_combination_differences_close(service):
+    for upper, lower in (*SERIES, ([3, 0, 3], [2, 1, 2]), ([5, 1, 4], [5, 0, 5])):
+        assign_line(service, upper, lower)
+    found = done(service, "levels", species=1)
+    assert len(found["levels"]) >= 10
+    energies = {one["label"]: one["energy_mhz"] for one in found["levels"]}
+    assert found["differences"]
+    for one in found["differences"]:
+        a, b = (energies[label] for label in one["levels"])
+        assert one["observed_mhz"] - (a - b) == pytest.approx(one["difference_mhz"], abs=1e-6)
+        assert abs(one["difference_mhz"]) < 0.5  # the constants are off by 30 kHz
+
+
+def test_emission_is_the_model_of_the_library(service):
+    from rotor.observed.model import Component, Sight, model
+
+    done(service, "settings", emission=True)
+    done(service, "species", species=1, column_per_cm2=1e13, temperature_k=5.0, fwhm_km_s=2.0, velocity_km_s=1.0)
+    window = done(service, "window", first_mhz=16000, last_mhz=16060, pixels=400)
+    record = service.session.state.species[1]
+    component = Component(service.predictions.emitter(record), 1e13, 5.0, 1.0, 2.0)
+    expected = model([component], np.array(window["model"]["x"]), Sight(2.725)).brightness_k
+    assert np.allclose(
+        window["model"]["y"], expected, atol=1e-3 * expected.max()
+    )  # frequencies are rounded for the message
+    assert expected.max() > 0
+
+
+def test_the_dipole_of_a_molecule_without_one_is_said(service):
+    (Path.cwd() / "bare.toml").write_text('name = "bare"\n[constants]\nA = 9e3\nB = 3e3\nC = 2.4e3\n')
+    answer = service.answer({"do": "add_species", "source": "bare.toml"})
+    assert "dipole not known, 1 D along each axis assumed" in answer["notes"][0]
+
+
+# The command and the function
+
+
+def test_the_command_exports_a_page_and_refuses_what_it_must(service, call, tmp_path):
+    service.session.release()
+    code, out, err = call("view", "spectrum.view.json", "--export", "page.html")
+    assert (code, err) == (0, "")
+    assert out.startswith("page.html: 450000 points, 0 assigned lines")
+    for words, said in (
+        (("nothing.csv",), "nothing.csv: no such file"),
+        (("nothing.view.json",), "no such session"),
+        (("spectrum.csv", "--export", "page.png"), "must end in .html"),
+        (("spectrum.csv", "--port", "70000"), "--port: 70000"),
+        (("spectrum.csv", "--session", "a.json"), "ends in .view.json"),
+        (("spectrum.csv", "no such thing", "--export", "p.html"), "no such thing"),
+        (("spectrum.csv", "--lines", "x.lin", "--session", f"n{SUFFIX}"), "lines need a molecule"),
+    ):
+        code, out, err = call("view", *words)
+        assert (code, out) == (2, ""), words
+        assert said in err
+        assert err.count("\n") == 1
+    assert not (tmp_path / f"n{SUFFIX}").exists()
+
+
+def test_the_widget_answers_messages_and_announces_changes(service):
+    service.session.release()
+    import rotor
+
+    widget = rotor.view("spectrum.csv", NAME, temperature_k=KELVIN)
+    sent = []
+    widget.send = sent.append
+    widget._received(widget, {"do": "hello", "id": 3}, None)
+    assert sent[0]["re"] == 3
+    assert sent[0]["ok"]["session"]["records"]["species/1"]["name"] == "case"
+    widget._received(widget, {"do": "species", "species": 1, "scale": 2.0, "id": 4}, None)
+    assert [*sent[1]] == ["session"]
+    assert sent[2]["re"] == 4
+    assert widget.do("undo")["label"] == "change scale of case"
+    with pytest.raises(ValueError, match="no line is assigned"):
+        widget.do("refit", species=1)
+    widget.close()
+
+
+def test_dipole_of_the_case_is_that_of_its_file(service):
+    assert service.session.state.species[1].dipole_abc_debye == DIPOLE
