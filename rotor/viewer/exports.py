@@ -84,17 +84,17 @@ def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
 
 def _scene(model: Model, lines: Mapping[int, Line], stem: str) -> str:
     """The scene of the fit, which reads the exported STEM.csv and STEM.toml beside it."""
-    from rotor.scenes.fit_sections import FitLines, FitParameters
-    from rotor.scenes.scene import FitScene
-    from rotor.scenes.scene_file import scene_text
+    from rotor.scenes.scene_file import scene_of, scene_text
 
-    scene = FitScene(
-        title=f"fit of {model.record.name}",
-        molecule=f"{stem}.toml",
-        lines=FitLines(source=f"{stem}.csv"),
-        parameters=FitParameters(free=list(model.record.free)),
-    )
-    return scene_text(scene)
+    content = {
+        "schema": 1,
+        "kind": "fit",
+        "title": f"fit of {model.record.name}",
+        "molecule": f"{stem}.toml",
+        "lines": {"source": f"{stem}.csv"},
+        "parameters": {"free": list(model.record.free)},
+    }
+    return scene_text(scene_of(content, "scene"))
 
 
 def _table(form: str) -> Callable[[Model, Mapping[int, Line], str], str]:
