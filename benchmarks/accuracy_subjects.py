@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor.plots.work_precision import Panel, Point
+from rotor.requests.knob import Measure, Sweep, ladder
 from rotor.scenes.accuracy_panels import points_of
 from rotor.scenes.accuracy_sweep import knobs_of, sweep, timed
-from rotor.scenes.knobs.knob import Knob, Measure, ladder
 from rotor.scenes.scene import (
     FluidScene,
     GasScene,
@@ -280,7 +280,7 @@ def fit(_: Path | None) -> list[Panel]:
         )
 
     settings = ladder((1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8), 1e-4, lambda one: one)
-    knob = Knob("tolerance", (Measure("constants", "σ", error),), settings, 1e-12, "1e-12", answer)
+    knob = Sweep("tolerance", (Measure("constants", "σ", error),), settings, 1e-12, "1e-12", answer)
     rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
     return [
         Panel("tolerance of a fit, 500 lines, 15 constants", "a constant (standard errors)", {"fit": points_of(rows)})

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.scenes import accuracy_sweep
+from rotor.requests.knob import Measure, Setting, Sweep
+from rotor.scenes import accuracy_sweep, numerics
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
-from rotor.scenes.knobs.knob import Knob, Measure, Setting
 from rotor.scenes.knobs.of_levels import energies_like, to_order
 from rotor.scenes.scene import (
     KINDS,
@@ -198,8 +198,12 @@ def test_raman_lines():
     assert found["1e-06"] < 1e-3 < found["0.1"]  # percent of all cross sections
 
 
-def test_every_kind_of_scene_is_known():
-    assert set(accuracy_sweep._FILES) == set(KINDS)
+@pytest.mark.parametrize("kind", sorted(numerics._TABLE))
+def test_the_numerics_of_every_kind_can_be_loaded(kind):
+    assert kind in KINDS
+    entry = numerics.numerics_of(kind)
+    for name in filter(None, (entry.choose, entry.error, entry.sweeps, entry.plan)):
+        assert callable(numerics.load(name))
 
 
 def test_a_fit_and_a_source():
@@ -216,14 +220,14 @@ def test_a_fit_and_a_source():
     assert by_tolerance["1e-08"] <= by_tolerance["0.0001"] < 0.1  # standard errors
 
 
-def slow_knob(seconds: list[float], clock: list[float]) -> Knob:
+def slow_knob(seconds: list[float], clock: list[float]) -> Sweep:
     def answer(request: float) -> float:
         clock[0] += request
         return request
 
     measure = Measure("nothing", "", lambda one, other: abs(one - other))
     settings = tuple(Setting(f"{one:g}", one) for one in seconds)
-    return Knob("time", (measure,), settings, 1000.0, "a long one", answer)
+    return Sweep("time", (measure,), settings, 1000.0, "a long one", answer)
 
 
 def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
@@ -290,5 +294,5 @@ def test_an_interrupt_prints_what_there_is(call, folder, monkeypatch):
     code, out, said = call("accuracy", "s.toml", "--csv", "a.csv")
     assert code == 130
     assert "interrupted" in said
-    assert "numerics.jmax" in out
+    assert "observables.min_lgint" in out
     assert not (folder / "a.csv").exists()

@@ -88,6 +88,27 @@ def test_the_template_and_the_help_have_every_quantity(ring, call):
     assert "--mmax" not in call("ring", "--help")[1]  # not common
 
 
+def test_one_knob_serves_sweep_accuracy_and_plan(ring, call, folder):
+    """A verb says nothing of accuracy but the knob of one field: `rotor accuracy`, an accuracy of a scene and `rotor plan` follow."""
+    (folder / "s.toml").write_text('schema = 1\nkind = "ring"\nmolecule = "CO"\n[observables]\ncut = "none"\n')
+    code, out, err = call("accuracy", "s.toml", "--json", "-")
+    assert code == 0, err
+    rows = json.loads(out)["settings"]
+    assert [row["setting"] for row in rows] == ["100000", "10000", "1000", "1e-06"]
+    # 505379 m² MHz: the third is 48411 off in multiples of 1e5, the first 4621 in those of 1e4, the second 484 in those of 1e3
+    assert [row["error"] for row in rows] == [48411.0, 4621.0, 484.0, 0.0]
+    (folder / "t.toml").write_text('schema = 1\nkind = "ring"\naccuracy = "1 MHz"\nmolecule = "CO"\n')
+    content = json.loads(call("run", "t.toml", "--json", "-")[1])
+    assert content["accuracy"] == {"asked": 1.0, "error": 0.5, "unit": "MHz", "how": "tolerance 1"}
+    assert call("plan", "t.toml")[0] == 0
+    (folder / "u.toml").write_text('schema = 1\nkind = "ring"\naccuracy = "1e-9 MHz"\nmolecule = "CO"\n')
+    assert "the finest that is possible here is 1e-06" in call("run", "u.toml")[2]
+    (folder / "v.toml").write_text(
+        'schema = 1\nkind = "ring"\naccuracy = "1 MHz"\nmolecule = "CO"\n[numerics]\ntolerance = "2 MHz"\n'
+    )
+    assert "accuracy and numerics.tolerance: give one of them" in call("run", "v.toml")[2]
+
+
 @pytest.mark.parametrize("kind", [kind for kind in DECLARED if kind not in OTHERWISE])
 def test_defaults_of_a_request_and_of_its_scene_agree(kind):
     """What a scene says of nothing is the default of the request, and an empty scene is saved as an empty scene."""

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from rotor.reports.screen import show_facts
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Grid, Quantity, Text, Whole
 from rotor.table import Table
 from rotor.verbs.subjects import OneMolecule
@@ -31,6 +33,17 @@ class RingRequest:
     cut_mhz: float | None = declared(
         1e6, Quantity("MHz", above=0), "Leave out energies above; or 'none'", "observables.cut", none="none"
     )
+
+    tolerance_mhz: float = declared(
+        1e-6, Quantity("MHz", above=0), "Energies are rounded to this (MHz)", "numerics.tolerance", typed="1e-6 MHz",
+        knob=Knob(
+            (1e5, 1e4, 1e3),
+            1.0,
+            (Measure("energy", "MHz", lambda answer, true: np.abs(answer.table.energy_mhz - true.table.energy_mhz).max()),),
+            "multiples of {:g} MHz",
+            least=1e-6,
+        ),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -56,6 +69,14 @@ class RingAnswer:
     request: RingRequest
     table: RingTable
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """That of the rounding alone."""
+        exact = ErrorTerm(0.0, "exact")
+        return ErrorBudget(
+            "energies", "MHz", exact, ErrorTerm(self.request.tolerance_mhz / 2, "multiples"), exact, exact, exact
+        )
+
     def facts(self) -> dict[str, Any]:
         """Numbers of the report."""
         return {"levels": len(self.table), "radius_angstrom": self.request.radius_angstrom}
@@ -64,7 +85,8 @@ class RingAnswer:
 def answer_ring(request: RingRequest) -> RingAnswer:
     """E = B m² with B = ħ²/2μr² of one unit of mass: 505379 MHz/r² in Å."""
     m = np.arange(request.mmax + 1)
-    energy = 505379.0 / request.radius_angstrom**2 * m**2
+    exact = 505379.0 / request.radius_angstrom**2 * m**2
+    energy = np.round(exact / request.tolerance_mhz) * request.tolerance_mhz
     seen = np.ones(len(m), bool) if request.cut_mhz is None else energy <= request.cut_mhz
     return RingAnswer(request, RingTable(m[seen], energy[seen]))
 
@@ -81,5 +103,6 @@ VERB = Verb(
     outputs=(Output("csv", (".csv",), "Write the energies as CSV", example="ring.csv"),),
     subject=OneMolecule(),
     drawn=None,
+    accuracy="of the energies",
     start={"molecule": "water", "conditions.radius": "2 Å"},
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Names, Pairs, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
@@ -31,6 +32,25 @@ LONGEST_PS = 100.0  # after the pulses, of a top without revivals, where no last
 DEFAULT_POINTS = 2001
 PULSES = Choices("shape", lambda: SHAPES)
 FARTHEST_PS = 1e9  # a phase of 2π 1 THz times it has an error of 1e-6
+
+
+TOLERANCES = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+FINEST_TOLERANCE = 1e-11
+
+
+def cosine_error(trace: AlignmentTrace, reference: AlignmentTrace) -> float:
+    """The largest difference of a cosine."""
+    pairs = [(trace.cosines[name], true) for name, true in reference.cosines.items()]
+    return max(float(np.max(np.abs(one - true), initial=0.0)) for one, true in pairs)
+
+
+TOLERANCE = Knob(
+    TOLERANCES, lambda request: max(1e-2 * min(*TOLERANCES, request.tolerance), FINEST_TOLERANCE),
+    (Measure("cosine", "", lambda answer, reference: cosine_error(answer.trace, reference.trace)),), "a tolerance of {:g}",
+    FINEST_TOLERANCE,  # a J max that serves one tolerance is too small for a finer one
+    change=lambda request, name, value: replace(request, jmax=None, **{name: value}),
+    prepare=lambda request: replace(request, classical_molecules=0),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,7 +94,7 @@ class AlignRequest:
     )  # fmt: skip
     tolerance: float = declared(
         DEFAULT_TOLERANCE, Quantity(above=1e-12, below=0.1), "Of the cosines: steps, J max and populations follow from it",
-        "numerics.tolerance",
+        "numerics.tolerance", knob=TOLERANCE,
     )  # fmt: skip
     jmax: int | None = declared(
         None, Whole(2), "Highest J of the basis; by default what the tolerance needs", "numerics.jmax", example=30

@@ -39,7 +39,7 @@ class Field:
     none; one that does not begin with "-" stands without a name. hidden: the option is one that stands for several fields, see
     `rotor.verbs.verb.Extra`. none: the word for None. common: whether --help shows the option; --help-all shows all. example: of a
     template, where the default is nothing. typed: the default as a person writes it, where it is not plain. panel: heading in --help.
-    name, default: filled in.
+    knob: of an approximation, see `rotor.requests.knob`. name, default: filled in.
     """
 
     reader: Reader
@@ -53,6 +53,7 @@ class Field:
     typed: Any = None
     panel: str = ""
     metavar: str = ""
+    knob: Any = None
     name: str = ""
     default: Any = None
 

@@ -15,7 +15,6 @@ beside it in a plan. What double precision cannot give is refused.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -23,23 +22,13 @@ import numpy as np
 
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy, quantity
+from rotor.scenes.numerics import choose, choose_by_knob, error_of, numerics_of
 from rotor.scenes.scene import Scene
 
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
 MOST_CONFIRMED = 6  # J max that are confirmed by whole runs of an alignment, before the one of its tolerance is taken
 LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
-UNITS = {
-    "spectrum": "MHz",
-    "levels": "MHz",
-    "raman": "MHz",
-    "stark": "MHz",
-    "zeeman": "MHz",
-    "align": "",
-    "thermo": "",
-    "tumble": "rad",
-}
-SAMPLED = {"gas": ("K", "%", ""), "fluid": ("K", "%")}  # units, of which each is the accuracy of something else
 
 
 def asked_of(scene: Scene) -> float | None:
@@ -52,16 +41,17 @@ def asked_of(scene: Scene) -> float | None:
     given = accuracy_text(scene)
     if given is None:
         return None
-    if scene.kind in SAMPLED:
+    numerics = numerics_of(scene.kind)
+    if numerics.units:
         return _sampled(scene, given)
     text, scale = str(given).strip(), 1.0
     if text.endswith("%"):
         text, scale = text[:-1], 0.01
-    if scene.kind == "tumble":
+    if numerics.unit == "rad":
         text = text.removesuffix("rad").strip()
-    if scale != 1.0 and scene.kind not in ("thermo", "align"):
-        raise ValueError(f"accuracy: {given!r}: expected {UNITS[scene.kind]}, not a percentage")
-    unit = UNITS[scene.kind] if UNITS[scene.kind] == "MHz" else ""
+    if scale != 1.0 and not numerics.percent:
+        raise ValueError(f"accuracy: {given!r}: expected {numerics.unit}, not a percentage")
+    unit = numerics.unit if numerics.unit == "MHz" else ""
     value = scale * quantity("accuracy", text, unit)
     if not value > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
@@ -81,8 +71,9 @@ def unit_of(scene: Scene) -> str:
     >>> [unit_of(GasScene(molecule="water", accuracy=one)) for one in ("1 K", "0.1 %", 0.02)]
     ['K', '%', '']
     """
-    if scene.kind not in SAMPLED:
-        return UNITS[scene.kind]
+    numerics = numerics_of(scene.kind)
+    if not numerics.units:
+        return numerics.unit
     text = str(accuracy_text(scene)).strip()
     return "" if _of_curves(scene, text) else "%" if text.endswith("%") else "K"
 
@@ -107,7 +98,7 @@ def _sampled(scene: Scene, given: str | float) -> float:
     Raises ValueError for a unit that the kind has not.
     """
     text = str(given).strip()
-    if _is_number(text) and "" not in SAMPLED[scene.kind]:
+    if _is_number(text) and "" not in numerics_of(scene.kind).units:
         raise ValueError(f"accuracy: {given!r}: expected a unit: K of the conserved energy, or % of the forces")
     percent = text.endswith("%")
     value = quantity("accuracy", text.removesuffix("%"), "" if percent or _is_number(text) else "K")
@@ -123,7 +114,7 @@ def chosen(scene: Scene, request: Any) -> Choice:
     """
     asked = asked_of(scene)
     assert asked is not None
-    return _CHOICES[scene.kind](scene, request, asked)
+    return choose(scene, request, asked)
 
 
 def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
@@ -131,8 +122,7 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     asked = asked_of(scene)
     assert asked is not None
     unit = unit_of(scene)
-    own = _sampled_error(scene.kind, answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
-    error = max(own, choice.error)
+    error = max(error_of(scene.kind, answer, unit), choice.error)
     if error > asked:
         raise ValueError(
             f"accuracy: {asked:g} {unit}".rstrip()
@@ -173,25 +163,7 @@ def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
         )
 
 
-def _sampled_error(kind: str, answer: Any, unit: str) -> float:
-    from rotor.scenes.accuracy_sampled import error_of_fluid, error_of_gas
-
-    return error_of_gas(answer, unit) if kind == "gas" else error_of_fluid(answer, unit)
-
-
-def _gas(scene: Any, request: Any, asked: float) -> Choice:
-    from rotor.scenes.accuracy_sampled import choose_molecules
-
-    return choose_molecules(scene, request, asked, unit_of(scene))
-
-
-def _fluid(scene: Any, request: Any, asked: float) -> Choice:
-    from rotor.scenes.accuracy_sampled import choose_step
-
-    return choose_step(scene, request, asked, unit_of(scene))
-
-
-def _spectrum(scene: Any, request: Any, asked: float) -> Choice:
+def choose_spins(scene: Any, request: Any, asked: float) -> Choice:
     """Spins whose constants are known are taken where they are larger than what was asked for, several by the cheapest method.
 
     All orders of distortion that the constants have are taken: of J ≤ 40 of water, 13 ms, the orders above J⁴ are 3 ms, and those
@@ -243,6 +215,16 @@ def rounding_mhz(levels: Any) -> float:
     return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
 
 
+def error_of_list(answer: Any, unit: str) -> float:
+    """The error of the lines of an answer."""
+    return _levels_error(answer.lines.top, answer.lines.levels)
+
+
+def error_of_levels(answer: Any, unit: str) -> float:
+    """The error of the levels of an answer."""
+    return _levels_error(answer.request.top, answer.table.levels)
+
+
 def _levels_error(top: Any, levels: Any) -> float:
     """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
     from rotor.quantum.hyperfine_method import used_method
@@ -255,28 +237,14 @@ def _levels_error(top: Any, levels: Any) -> float:
     return rounding + (0.0 if top.spin_constants is None else _spin_size(top))
 
 
-def _tolerance(name: str, default: Any, least: float) -> Callable[[Any, Any, float], Choice]:
-    """A choice that hands what was asked for to one field of the request."""
-
-    def choose(scene: Any, request: Any, asked: float) -> Choice:
-        key = {"tolerance_mhz": "tolerance"}.get(name, name)
-        if getattr(scene.numerics, key) != default:
-            raise ValueError(f"accuracy and numerics.{key}: give one of them")
-        if asked < least:
-            raise ValueError(f"accuracy: {asked:g}: the finest that is possible here is {least:g}")
-        return Choice(replace(request, **{name: asked}), f"{key} {asked:g}")
-
-    return choose
-
-
-def _align(scene: Any, request: Any, asked: float) -> Choice:
+def choose_basis(scene: Any, request: Any, asked: float) -> Choice:
     """The loosest tolerance, in decades, whose error as it is found by a run is what was asked for, and then the smallest J max.
 
     A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """
     from rotor.alignment.request import answer_align
 
-    found = _tolerance("tolerance", 1e-6, 1e-11)(scene, request, asked)
+    found = choose_by_knob(request, asked)
     for looser in LOOSER:
         tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
         trace = answer_align(tried).trace
@@ -305,50 +273,3 @@ def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Ch
         if error <= asked:
             return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
     return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
-
-
-def _tumble(scene: Any, request: Any, asked: float) -> Choice:
-    from rotor.classical.tumble import TumbleRequest
-    from rotor.scenes.accuracy_motion import choose_tolerance
-
-    if isinstance(request, TumbleRequest):
-        return Choice(request, NOTHING_CHEAPER)
-    return choose_tolerance(scene, request, asked)
-
-
-def _tumble_error(answer: Any) -> float:
-    from rotor.classical.tumble import TumbleAnswer
-
-    if not isinstance(answer, TumbleAnswer):
-        return 0.0  # that of the steps was found when they were chosen
-    return float(answer.errors.rounding.value or 0.0)
-
-
-def _stark(scene: Scene, request: Any, asked: float) -> Choice:
-    """Energies alone decide: the population at the edge of the basis, which cosines need, is reported and not limited."""
-    found = _tolerance("tolerance_mhz", "1e-4 MHz", 1e-9)(scene, request, asked)
-    return replace(found, request=replace(found.request, most_at_edge=1.0))
-
-
-_CHOICES: dict[str, Callable[[Any, Any, float], Choice]] = {
-    "spectrum": _spectrum,
-    "levels": _spectrum,
-    "raman": _spectrum,
-    "gas": _gas,
-    "fluid": _fluid,
-    "stark": _stark,
-    "zeeman": _tolerance("tolerance_mhz", "1e-6 MHz", 1e-9),
-    "align": _align,
-    "thermo": _tolerance("relative_error", 1e-6, 1e-13),
-    "tumble": _tumble,
-}
-_ERRORS: dict[str, Callable[[Any], float]] = {
-    "spectrum": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
-    "levels": lambda answer: _levels_error(answer.request.top, answer.table.levels),
-    "raman": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
-    "stark": lambda answer: float(answer.states.accuracy_mhz),
-    "zeeman": lambda answer: float(answer.states.accuracy_mhz),
-    "align": lambda answer: float(answer.trace.error_estimate),
-    "thermo": lambda answer: float(answer.functions.relative_error.max()),
-    "tumble": _tumble_error,
-}

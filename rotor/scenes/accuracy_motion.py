@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.classical.step_errors import error_by_finer
-from rotor.scenes.choice import Choice
+from rotor.scenes.choice import NOTHING_CHEAPER, Choice
 from rotor.scenes.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 
 if TYPE_CHECKING:
@@ -244,3 +244,21 @@ def _refusal(asked: float, error: float) -> str:
         f"accuracy: {asked:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
         "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
     )
+
+
+def choose(scene: Any, request: Any, asked: float) -> Choice:
+    """The settings of a motion: nothing of a free one, else the tolerance."""
+    from rotor.classical.tumble import TumbleRequest
+
+    return (
+        Choice(request, NOTHING_CHEAPER)
+        if isinstance(request, TumbleRequest)
+        else choose_tolerance(scene, request, asked)
+    )
+
+
+def error_of_motion(answer: Any, unit: str) -> float:
+    """Round-off of a free motion; the error of steps was found when they were chosen."""
+    from rotor.classical.tumble import TumbleAnswer
+
+    return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0

@@ -73,7 +73,7 @@ def relative_spread(unit: str, degrees: int) -> float:
     return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
 
 
-def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -> Choice:
+def choose_molecules(scene: Any, request: GasRequest, asked: float) -> Choice:
     """The request with as many molecules as the accuracy needs.
 
     Parameters
@@ -83,9 +83,7 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
     request : GasRequest
         That of the scene.
     asked : float
-        In the unit.
-    unit : str
-        "K" of the temperature, "%" of the heat capacity, nothing of C1 and C2.
+        In K of the temperature, % of the heat capacity, or a number of C1 and C2, as `rotor.scenes.accuracy.unit_of` says.
 
     Returns
     -------
@@ -96,8 +94,10 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
     ValueError
         Where molecules are given too, and where more are needed than a run has.
     """
+    from rotor.scenes.accuracy import unit_of
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
+    unit = unit_of(scene)
     if scene.numerics.molecules != type(scene.numerics)().molecules:
         raise ValueError("accuracy and numerics.molecules: give one of them")
     z = quantile(request.confidence)
@@ -140,7 +140,7 @@ def error_of_gas(answer: GasAnswer, unit: str) -> float:
     return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
 
 
-def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> Choice:
+def choose_step(scene: Any, request: FluidRequest, asked: float) -> Choice:
     """The request with the longest step, or the coarsest tolerance of Ewald's sum, that reaches an accuracy.
 
     Parameters
@@ -150,9 +150,7 @@ def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> C
     request : FluidRequest
         That of the scene.
     asked : float
-        In the unit.
-    unit : str
-        "K" of the conserved energy, "%" of the forces.
+        In K of the conserved energy, or % of the forces.
 
     Returns
     -------
@@ -166,8 +164,10 @@ def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> C
     """
     if request.engine != "rotor":
         raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
+    from rotor.scenes.accuracy import unit_of
+
     made = made_of(request)
-    return _by_energy(scene, made, asked) if unit == "K" else _by_forces(scene, made, asked)
+    return _by_energy(scene, made, asked) if unit_of(scene) == "K" else _by_forces(scene, made, asked)
 
 
 def made_of(request: FluidRequest) -> FluidRequest:

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.requests.knob import Setting, Sweep, Sweeps
 from rotor.scenes.kind import kind_of
-from rotor.scenes.knobs.knob import Knob, Knobs, Setting
+from rotor.scenes.numerics import sweeps_of
 from rotor.scenes.scene import Scene
 from rotor.table import Table
 
@@ -82,30 +83,19 @@ class WorkPrecision(Table):
         return found
 
 
-def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
+def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     """All numerical knobs of a scene in a folder; where it asks for an accuracy, about the settings that are chosen for it.
 
     Raises ValueError for a scene with a sweep, and whatever the scene itself would be refused for.
     """
-    from importlib import import_module
-
     if scene.sweep:
         raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
-    module = import_module(f"rotor.scenes.knobs.{_FILES[scene.kind]}")
     request = kind_of(scene).request(scene, folder)
     if getattr(scene, "accuracy", None) is not None:
         from rotor.scenes.accuracy import chosen
 
         request = chosen(scene, request).request
-    found: Knobs = getattr(module, scene.kind)(request)
-    return found
-
-
-_FILES = {
-    "levels": "of_levels", "spectrum": "of_levels", "raman": "of_levels", "thermo": "of_fields", "stark": "of_fields",
-    "zeeman": "of_fields", "align": "of_fields", "tumble": "of_motion", "gas": "of_motion", "fluid": "of_motion", "fit": "of_measured",
-    "emission": "of_measured", "torsion": "of_torsion", "assign": "of_measured",
-}  # fmt: skip
+    return sweeps_of(scene.kind, request)
 
 
 def work_precision(
@@ -160,7 +150,7 @@ def work_precision(
 
 
 def sweep(
-    knob: Knob, limit_seconds: float, progress: Progress = lambda knob, setting: None
+    knob: Sweep, limit_seconds: float, progress: Progress = lambda knob, setting: None
 ) -> tuple[list[Row], str, list[str], float]:
     """The rows of one knob, what their errors are measured against, remarks on what was left out, and the seconds that were timed.
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
 from rotor.requests.field import Field
+from rotor.requests.knob import Choice as Choice
 from rotor.requests.readers import Quantity as Number
 
 NOTHING_CHEAPER = "exact: nothing cheaper"
@@ -20,16 +21,6 @@ class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 Accuracy = str | float | TotalAccuracy | None
-
-
-@dataclass(frozen=True)
-class Choice:
-    """request: with the settings that were chosen. how: which, in words. error: found while they were chosen, in the unit of the
-    accuracy; 0 where the answer alone says it."""
-
-    request: Any
-    how: str
-    error: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rotor.requests.fill import Given
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
 from rotor.scenes.kind import kind_of
+from rotor.scenes.numerics import load, numerics_of
 from rotor.scenes.plan_parts import (
     LONG_SEARCH,
     Plan,
@@ -28,6 +29,7 @@ from rotor.scenes.plan_parts import (
     timed,
 )
 from rotor.scenes.scene import Scene
+from rotor.verbs.verb import Work, verb_of
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -37,7 +39,6 @@ SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fl
 SHORT_GAS, SHORT_STEPS = (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
-OF_LEVELS = ("spectrum", "levels", "raman")
 
 
 def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
@@ -75,7 +76,7 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
 
 def _plan(scene: Scene, request: Any) -> Plan:
     if getattr(scene, "accuracy", None) is None:
-        return _PLANS[scene.kind](request)
+        return plan_of_request(scene.kind, request)
     if hasattr(request, "tolerance") and scene.kind == "tumble":
         from rotor.scenes.plan_of_motion import plan_with_accuracy
 
@@ -84,11 +85,32 @@ def _plan(scene: Scene, request: Any) -> Plan:
 
     found: list[Choice] = []
     search = timed(lambda: found.append(chosen(scene, request)), LONG_SEARCH)
-    plan, parts = _PLANS[scene.kind](found[-1].request), [("accuracy", found[-1].how)]
-    if scene.kind in OF_LEVELS:
+    plan, parts = plan_of_request(scene.kind, found[-1].request), [("accuracy", found[-1].how)]
+    if numerics_of(scene.kind).levels:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
         parts.append(("rounding", f"{_checked_rounding(scene, found[-1].request):.1e} MHz of the highest energy"))
     return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search)
+
+
+def plan_of_request(kind: str, request: Any) -> Plan:
+    """The plan of a request; of a kind that says nothing of its plan that of a run."""
+    if name := numerics_of(kind).plan:
+        plan: Plan = load(name)(request)
+        return plan
+    verb = verb_of(kind)
+    work = Work(shown=verb.read_shown(Given()))
+    found: list[Any] = []
+    seconds = timed(lambda: found.append(verb.answer(request, work)))
+    return Plan(
+        kind=kind,
+        effects=(),
+        good=(),
+        parts=(),
+        counts={"rows": len(verb.table(found[-1]))},
+        seconds=seconds,
+        memory_mb=peak_mb(lambda: verb.answer(request, work)),
+        left_out=(),
+    )
 
 
 def _checked_rounding(scene: Scene, request: Any) -> float:
@@ -173,7 +195,8 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
     return "".join({"e": "o", "o": "e"}[one] if change else one for one, change in zip(species, flip, strict=True))
 
 
-def _spectrum(request: Any) -> Plan:
+def plan_of_spectrum(request: Any) -> Plan:
+    """The plan of a spectrum request."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.request import answer_spectrum
 
@@ -207,7 +230,8 @@ def _spectrum(request: Any) -> Plan:
     )
 
 
-def _levels(request: Any) -> Plan:
+def plan_of_levels(request: Any) -> Plan:
+    """The plan of a list of levels."""
     from rotor.quantum.request import answer_levels
 
     top, jmax = request.top, request.jmax
@@ -233,13 +257,8 @@ def _levels(request: Any) -> Plan:
     )
 
 
-def _in_field(request: Any) -> Plan:
-    from rotor.scenes.plan_in_fields import plan_in_field
-
-    return plan_in_field(request)
-
-
-def _gas(request: Any) -> Plan:
+def plan_of_gas(request: Any) -> Plan:
+    """The plan of a gas request."""
     from rotor.classical.gas.ensembles import PIECE
     from rotor.thermodynamics.classical_gas import answer_gas
 
@@ -260,7 +279,8 @@ def _gas(request: Any) -> Plan:
     )
 
 
-def _raman(request: Any) -> Plan:
+def plan_of_raman(request: Any) -> Plan:
+    """The plan of a raman request."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.raman_request import answer_raman
 
@@ -280,7 +300,8 @@ def _raman(request: Any) -> Plan:
     )
 
 
-def _thermo(request: Any) -> Plan:
+def plan_of_thermo(request: Any) -> Plan:
+    """The plan of a thermo request."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.thermodynamics.request import answer_thermo
 
@@ -303,7 +324,8 @@ def _thermo(request: Any) -> Plan:
     )
 
 
-def _align(request: Any) -> Plan:
+def plan_of_align(request: Any) -> Plan:
+    """The plan of a gas under pulses request."""
     from rotor.alignment.request import answer_align
     from rotor.quantum.effects.watson import SEMI_RIGID
 
@@ -334,13 +356,8 @@ def _align(request: Any) -> Plan:
     )
 
 
-def _tumble(request: Any) -> Plan:
-    from rotor.scenes.plan_of_motion import plan_of_motion
-
-    return plan_of_motion(request)
-
-
-def _fluid(request: Any) -> Plan:
+def plan_of_fluid(request: Any) -> Plan:
+    """The plan of a fluid request."""
     from rotor.fluids.request import NewBox, answer_fluid, box_of
 
     settings = request.settings
@@ -378,25 +395,8 @@ def _left_out_of_fluid(atoms: Any, settings: Any) -> list[left_out.LeftOut]:
     return left_out.of_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
 
 
-def _fit(request: Any) -> Plan:
-    from rotor.scenes.plan_measured import plan_of_fit
-
-    return plan_of_fit(request)
-
-
-def _emission(request: Any) -> Plan:
-    from rotor.scenes.plan_measured import plan_of_emission
-
-    return plan_of_emission(request)
-
-
-def _assign(request: Any) -> Plan:
-    from rotor.scenes.plan_measured import plan_of_assign
-
-    return plan_of_assign(request)
-
-
-def _torsion(request: Any) -> Plan:
+def plan_of_torsion(request: Any) -> Plan:
+    """The plan of a torsion request."""
     from rotor.thermodynamics.torsion_request import answer_torsion
 
     found: list[Any] = []
@@ -415,10 +415,3 @@ def _torsion(request: Any) -> Plan:
             left_out.LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),
         ),
     )
-
-
-_PLANS: dict[str, Callable[[Any], Plan]] = {
-    "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _in_field, "zeeman": _in_field,
-    "align": _align, "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
-    "assign": _assign, "torsion": _torsion,
-}  # fmt: skip

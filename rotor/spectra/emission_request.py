@@ -21,6 +21,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hamiltonian_input import effects_of_each_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, part
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Each, Quantity, Range
 from rotor.spectra.emission import (
     BACKGROUND_K,
@@ -131,6 +132,16 @@ def _window(given: WindowInput, subject: Any) -> tuple[float, float]:
     return found
 
 
+def _brightness_error(answer: Any, reference: Any) -> float:
+    return float(np.max(np.abs(answer.spectrum.brightness_k - reference.spectrum.brightness_k), initial=0.0))
+
+
+DEPTH = Knob(
+    lambda request: [request.least_depth * more for more in (1e5, 1e4, 1e3, 1e2, 1e1)], lambda request: 1e-2 * request.least_depth,
+    (Measure("brightness", "K", _brightness_error),), "a least depth of {:g}",
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class EmissionRequest:
     """What is looked at; every field is checked when the request is made.
@@ -147,7 +158,7 @@ class EmissionRequest:
         WindowInput, _window, lambda value, _: WindowInput(value), REQUIRED, single=True, why="give one of them"
     )
     least_depth: float = declared(
-        LEAST_DEPTH, Quantity(above=0), "Leave out lines of less optical depth", "observables.least_depth"
+        LEAST_DEPTH, Quantity(above=0), "Leave out lines of less optical depth", "observables.least_depth", knob=DEPTH
     )
     effects: tuple[tuple[QuantumEffect, ...], ...] = effects_of_each_field()
 

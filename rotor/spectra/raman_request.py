@@ -18,6 +18,7 @@ from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Quantity, Whole
 from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import largest
@@ -39,6 +40,20 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor.tops.top import Top
+
+
+def section_left_out(answer: Any, reference: Any) -> float:
+    """The part of the cross section in percent that a list leaves out."""
+    part, whole = (float(one.lines.cross_section_cm2_per_sr.sum()) for one in (answer, reference))
+    return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
+
+
+SECTION = Measure("cross section left out", "%", section_left_out)
+RELATIVE_CUT = Knob(
+    lambda request: [cut for cut in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8) if request.min_relative is None or cut > request.min_relative],
+    lambda request: None if request.min_relative is None else 1e-2 * request.min_relative, (SECTION,),
+    lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -66,7 +81,7 @@ class RamanRequest:
     )
     min_relative: float | None = declared(
         DEFAULT_MIN_RELATIVE, Quantity(above=0, below=1), "Leave out lines below X of the strongest; or 'none'",
-        "observables.min_relative", none="none",
+        "observables.min_relative", none="none", knob=RELATIVE_CUT,
     )  # fmt: skip
     q: float | None = declared(
         None,

@@ -20,6 +20,7 @@ from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import INFINITE, Flag, Quantity, Range, Text, Whole
 from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import USUAL_CUT, largest
@@ -65,6 +66,25 @@ class GasLayer:
         check_fields(self)
 
 
+COARSER_CUTS = (5.0, 4.0, 3.0, 2.0, 1.0, 0.0)  # decades above the cut of the scene
+COARSE_CUTS = (-4.0, -6.0, -8.0, -10.0, -12.0)  # of log10 of the intensity, where a scene has no cut
+FINER_CUT = 2.0  # decades below it: a hundred times finer
+
+
+def intensity_left_out(answer: Any, reference: Any) -> float:
+    """The part of the intensity in percent that a list leaves out."""
+    part, whole = (float(one.lines.intensity_nm2_mhz.sum()) for one in (answer, reference))
+    return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
+
+
+INTENSITY = Measure("intensity left out", "%", intensity_left_out)
+CUT = Knob(
+    lambda request: COARSE_CUTS if request.min_lgint is None else tuple(request.min_lgint + decades for decades in COARSER_CUTS),
+    lambda request: None if request.min_lgint is None else request.min_lgint - FINER_CUT, (INTENSITY,),
+    lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class SpectrumRequest:
     """A spectrum to compute; every field is checked when the request is made.
@@ -86,7 +106,7 @@ class SpectrumRequest:
     )
     min_lgint: float | None = declared(
         DEFAULT_MIN_LGINT, Quantity(least=-300, most=300), "Leave out lines with log10(nm² MHz) below; or 'none'",
-        "observables.min_lgint", none="none", common=True,
+        "observables.min_lgint", none="none", common=True, knob=CUT,
     )  # fmt: skip
     range_mhz: tuple[float, float] = declared(
         INFINITE,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Text
 from rotor.table import TextOf
 from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
@@ -44,6 +45,25 @@ CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum 
 
 def _electronic(given: ElectronicStates | str) -> ElectronicStates:
     return ElectronicStates.parse(given) if isinstance(given, str) else given
+
+
+def _relative(name: str) -> Callable[[Any, Any], float]:
+    """The largest relative error in percent of a column, relative to its largest value where it passes through 0."""
+
+    def error(answer: Any, reference: Any) -> float:
+        import numpy as np
+
+        values, true = (np.asarray(getattr(one.functions, name)) for one in (answer, reference))
+        return 100.0 * float(np.max(np.abs(values - true) / np.maximum(np.abs(true), 1e-12)))
+
+    return error
+
+
+LEFT_OUT = Knob(
+    (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10), 1e-13,
+    tuple(Measure(of, "%", _relative(name)) for of, name in (("Q", "q_rot"), ("U", "energy_j_per_mol"), ("C_v", "cv_over_r"))),
+    "sums to {:g}", least=1e-13,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -76,7 +96,11 @@ class ThermoRequest:
         "observables.electronic", example="2,2@121.1",
     )  # fmt: skip
     relative_error: float = declared(
-        1e-6, Quantity(above=0), "Of Q, U and C_v: the levels left out of the sums", "numerics.relative_error"
+        1e-6,
+        Quantity(above=0),
+        "Of Q, U and C_v: the levels left out of the sums",
+        "numerics.relative_error",
+        knob=LEFT_OUT,
     )
     effects: tuple[QuantumEffect, ...] = effects_field()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from rotor.quantum.bond_torsion import BondTorsion, FourierSeries
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
 from rotor.table import Table, TextOf
 from rotor.thermodynamics.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
@@ -36,6 +37,19 @@ SAME_WELLS = 0.05  # largest difference of the probabilities in wells of two com
 SHARED = 0.75  # of one well: a state with more there is no tunnelling component
 _TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
 Progress = Callable[[int, int], object]
+
+
+def _level_error(answer: Any, reference: Any) -> float:
+    """Largest difference of the levels above the lowest one, cm⁻¹."""
+    one, other = (np.sort(each.levels.columns["above_lowest_cm"]) for each in (answer, reference))
+    count = min(len(one), len(other))
+    return float(np.max(np.abs(one[:count] - other[:count])))
+
+
+ANGLES = Knob(
+    (12, 18, 24, 36, 48, 72), 144, (Measure("levels", "cm-1", _level_error),), "{:g} angles",
+    change=lambda request, name, value: replace(request, **{name: int(value)}), used=lambda request: is_scan(request.potential),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -57,7 +71,7 @@ class TorsionRequest:
         "'V3=400 V6=-10 cm-1', 'table' (V3 of a similar molecule), or a relaxed scan: mmff or an ASE calculator", "observables.potential",
         common=True, example="V3=400 cm-1",
     )  # fmt: skip
-    points: int = declared(POINTS, Whole(6, 720), "Angles of a scan, in a whole turn", "numerics.points")
+    points: int = declared(POINTS, Whole(6, 720), "Angles of a scan, in a whole turn", "numerics.points", knob=ANGLES)
     vmax: int = declared(3, Whole(0, 200), "Highest torsional level", "numerics.vmax", common=True)
     temperatures_k: Sequence[float] = declared(
         TEMPERATURES_K, Grid("K", each=Quantity("K", above=0)), "Temperatures: 10:1000K:100 or 10,20,50 K", "conditions.temperature",

@@ -23,6 +23,7 @@ from rotor.quantum.effects.stark import (
 )
 from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.knobs import TOLERANCE
 from rotor.quantum.fields.map_request import MOST_AT_EDGE
 from rotor.quantum.fields.readers import MOST_J, highest_j, read_direction, read_m
 from rotor.quantum.hamiltonian_input import spins_field
@@ -83,7 +84,12 @@ class StarkRequest:
         example=30,
     )
     tolerance_mhz: float = declared(
-        1e-4, Quantity("MHz", above=0, metavar="E"), "Of the energies (MHz)", "numerics.tolerance", typed="1e-4 MHz"
+        1e-4,
+        Quantity("MHz", above=0, metavar="E"),
+        "Of the energies (MHz)",
+        "numerics.tolerance",
+        typed="1e-4 MHz",
+        knob=TOLERANCE,
     )
     diabatic_gap_mhz: float | None = declared(
         None, Quantity("MHz", above=0, metavar="GAP"),

@@ -18,6 +18,7 @@ from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, c
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.knobs import TOLERANCE
 from rotor.quantum.fields.map_request import checked_fields
 from rotor.quantum.fields.readers import MOST_J, highest_j
 from rotor.quantum.hamiltonian_input import spins_field
@@ -71,6 +72,7 @@ class ZeemanRequest:
         "Of the energies (MHz)",
         "numerics.tolerance",
         typed="1e-6 MHz",
+        knob=TOLERANCE,
     )
     hyperfine: bool = spins_field()
     nuclear_g: Mapping[str, float] | None = declared(

@@ -1,4 +1,4 @@
-"""Knobs of levels, of lines and of Raman lines: orders of distortion, method of hyperfine structure, J max, cut.
+"""Sweeps of levels, of lines and of Raman lines: orders of distortion, method of hyperfine structure, J max, cut.
 
 Energies of levels with one J are eigenvalues of whole blocks: no J max makes them better, and what a list loses is whole lines.
 """
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.requests.knob import Measure, Setting, Sweep, Sweeps
 from rotor.scenes.choice import NOTHING_CHEAPER
-from rotor.scenes.knobs.knob import Knob, Knobs, Measure, Setting
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 SHARES_OF_J = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)  # of the J max of the scene
 BEYOND = 1.3  # times that J max: the reference
-COARSER_CUTS = (5.0, 4.0, 3.0, 2.0, 1.0, 0.0)  # decades above the cut of the scene
-FINER_CUT = 2.0  # decades below it: a hundred times finer
-COARSE_CUTS = (-4.0, -6.0, -8.0, -10.0, -12.0)  # of log10 of the intensity, where a scene has no cut
 METHODS = ("first-order", "N-diagonal", "exact")
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
 
@@ -82,7 +79,7 @@ def to_order(top: Top, order: int) -> Top:
     return top.with_constants(top.constants.replace(**above))
 
 
-def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Knob]:
+def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
     """Orders of centrifugal distortion, up to those that the constants have; nothing where there are none.
 
     Parameters
@@ -97,7 +94,7 @@ def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer
 
     Returns
     -------
-    list of Knob
+    list of Sweep
     """
     top, names = request.top, [name for name in request.top.constants.values if name not in "ABC"]
     if not names or top.states is not None or not any(one.name == "centrifugal distortion" for one in request.effects):
@@ -108,10 +105,10 @@ def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer
         Setting(f"order J^{one}", replace(request, top=to_order(top, one)), one == orders[-1]) for one in orders
     ]
     against = "all constants; the orders that they do not have are in the plan"
-    return [Knob("effects.distortion", (Measure(of, "MHz", error),), tuple(settings), plain, against, answer)]
+    return [Sweep("effects.distortion", (Measure(of, "MHz", error),), tuple(settings), plain, against, answer)]
 
 
-def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Knob]:
+def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
     """Methods of hyperfine structure, and no spins at all; nothing where the calculation has none.
 
     Parameters
@@ -126,7 +123,7 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
 
     Returns
     -------
-    list of Knob
+    list of Sweep
     """
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.hyperfine_method import HyperfineMethod
@@ -141,7 +138,7 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
         )
     measure = Measure(of, "MHz", error)
     return [
-        Knob(
+        Sweep(
             "effects.hyperfine_method",
             (measure,),
             tuple(settings),
@@ -152,7 +149,7 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
     ]
 
 
-def levels(request: Any) -> Knobs:
+def levels(request: Any) -> Sweeps:
     """Of a scene of levels."""
     from rotor.quantum.request import answer_levels
 
@@ -161,7 +158,7 @@ def levels(request: Any) -> Knobs:
 
     of = "energy of a level"
     found = (*distortion(request, error, of, answer_levels), *hyperfine(request, error, of, answer_levels))
-    return Knobs(
+    return Sweeps(
         found, (f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well", *_of_states(request))
     )
 
@@ -170,9 +167,9 @@ def _of_states(request: Any) -> list[str]:
     return ["effects.distortion: not swept: the top has several states"] if request.top.states is not None else []
 
 
-def spectrum(request: Any) -> Knobs:
+def spectrum(request: Any) -> Sweeps:
     """Of a scene of lines."""
-    from rotor.spectra.request import answer_spectrum
+    from rotor.spectra.request import INTENSITY, answer_spectrum
 
     def error(found: Any, reference: Any) -> float:
         return line_error(found.lines, reference.lines)
@@ -180,71 +177,32 @@ def spectrum(request: Any) -> Knobs:
     jmax = answer_spectrum(request).lines.jmax
     fixed = replace(request, jmax=jmax)
     found = (
-        _reach(request, jmax, answer_spectrum, Measure("intensity left out", "%", _intensity_lost)),
-        _cut(request, answer_spectrum),
+        _reach(request, jmax, answer_spectrum, INTENSITY),
         *distortion(fixed, error, "frequency of a line", answer_spectrum),
         *hyperfine(fixed, error, "frequency of a line", answer_spectrum),
     )
-    return Knobs(found, tuple(_of_states(request)))
+    return Sweeps(found, tuple(_of_states(request)))
 
 
-def _intensity_lost(found: Any, reference: Any) -> float:
-    """The part of the intensity in percent that a list leaves out."""
-    one, whole = (float(answer.lines.intensity_nm2_mhz.sum()) for answer in (found, reference))
-    return 100.0 * max(1.0 - one / whole, 0.0) if whole else 0.0
-
-
-def _reach(request: Any, jmax: int, answer: Callable[[Any], Any], measure: Measure) -> Knob:
+def _reach(request: Any, jmax: int, answer: Callable[[Any], Any], measure: Measure) -> Sweep:
     values = sorted({max(1, round(share * jmax)) for share in SHARES_OF_J})
     settings = tuple(Setting(str(j), replace(request, jmax=j), j == jmax) for j in values)
     beyond = math.ceil(BEYOND * jmax) + 1
-    return Knob("numerics.jmax", (measure,), settings, replace(request, jmax=beyond), f"J max {beyond}", answer)
+    return Sweep("numerics.jmax", (measure,), settings, replace(request, jmax=beyond), f"J max {beyond}", answer)
 
 
-def _cut(request: Any, answer: Callable[[Any], Any]) -> Knob:
-    own = request.min_lgint
-    values = COARSE_CUTS if own is None else tuple(own + decades for decades in COARSER_CUTS)
-    finest = None if own is None else own - FINER_CUT
-    settings = [Setting(f"{cut:g}", replace(request, min_lgint=cut), cut == own) for cut in values]
-    if own is None:
-        settings.append(Setting("none", request, True))
-    measure = Measure("intensity left out", "%", _intensity_lost)
-    against = "no cut" if finest is None else f"a cut at {finest:g}"
-    return Knob(
-        "observables.min_lgint", (measure,), tuple(settings), replace(request, min_lgint=finest), against, answer
-    )
-
-
-def raman(request: Any) -> Knobs:
+def raman(request: Any) -> Sweeps:
     """Of a scene of Raman lines."""
-    from rotor.spectra.raman_request import answer_raman
+    from rotor.spectra.raman_request import SECTION, answer_raman
 
     def error(found: Any, reference: Any) -> float:
         return shift_error(found.lines, reference.lines)
 
-    def lost(found: Any, reference: Any) -> float:
-        sums = [float(one.lines.cross_section_cm2_per_sr.sum()) for one in (found, reference)]
-        return 100.0 * max(1.0 - sums[0] / sums[1], 0.0) if sums[1] else 0.0
-
     jmax = answer_raman(request).lines.jmax
-    measure, own = Measure("cross section left out", "%", lost), request.min_relative
-    cuts = [cut for cut in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8) if own is None or cut > own]
-    settings = [Setting(f"{cut:g}", replace(request, min_relative=cut)) for cut in cuts]
-    settings.append(Setting("none" if own is None else f"{own:g}", request, True))
-    finest = None if own is None else 1e-2 * own
-    relative = Knob(
-        "observables.min_relative",
-        (measure,),
-        tuple(settings),
-        replace(request, min_relative=finest),
-        "no cut" if finest is None else f"a cut at {finest:g}",
-        answer_raman,
-    )
     fixed = replace(request, jmax=jmax)
     found = (
-        _reach(request, jmax, answer_raman, measure),
-        relative,
+        _reach(request, jmax, answer_raman, SECTION),
         *distortion(fixed, error, "shift of a line", answer_raman),
         *hyperfine(fixed, error, "shift of a line", answer_raman),
     )
-    return Knobs(found, tuple(_of_states(request)))
+    return Sweeps(found, tuple(_of_states(request)))

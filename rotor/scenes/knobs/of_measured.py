@@ -1,4 +1,4 @@
-"""Knobs of fits and of emission: iterations and tolerance of the search, least optical depth of a line."""
+"""Knobs of fits: iterations and tolerance of the search; and kinds that have none beside those of their fields."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from rotor.scenes.knobs.knob import Knob, Knobs, Measure, ladder
+from rotor.requests.knob import Measure, Sweep, Sweeps, ladder
 
 ITERATIONS = (1, 2, 3, 4, 6, 10)
 TOLERANCES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 FINEST_TOLERANCE = 1e-12
-MORE_DEPTH = (1e5, 1e4, 1e3, 1e2, 1e1)  # times the least depth of the scene
 
 
-def fit(request: Any) -> Knobs:
+def fit(request: Any) -> Sweeps:
     """Of a scene of a fit: the search alone; weights and rejected lines are another question, not another accuracy."""
     from rotor.formats.fit_request import answer_fit
 
@@ -29,10 +28,10 @@ def fit(request: Any) -> Knobs:
     counts = [n for n in ITERATIONS if n < own.most_iterations]
     iterations = ladder(counts, own.most_iterations, lambda n: with_options(most_iterations=int(n)), "{:.0f}".format)
     tolerances = ladder(TOLERANCES, own.tolerance, lambda one: with_options(tolerance=one))
-    return Knobs(
+    return Sweeps(
         (
-            Knob("numerics.iterations", (measure,), iterations, finest, against, answer_fit),
-            Knob("tolerance of the search", (measure,), tolerances, finest, against, answer_fit),
+            Sweep("numerics.iterations", (measure,), iterations, finest, against, answer_fit),
+            Sweep("tolerance of the search", (measure,), tolerances, finest, against, answer_fit),
         ),
         ("numerics.loss, numerics.reject_above: which lines count is not a question of accuracy",),
     )
@@ -44,22 +43,14 @@ def _in_errors(found: Any, reference: Any) -> float:
     return float(np.max(np.abs(one.value_mhz - true.value_mhz) / true.error_mhz))
 
 
-def emission(request: Any) -> Knobs:
-    """Of a scene of emission: which weak lines are left out."""
-    from rotor.spectra.emission_request import answer_emission
-
-    own = request.least_depth
-    settings = ladder([own * more for more in MORE_DEPTH], own, lambda one: replace(request, least_depth=one))
-    measure = Measure("brightness", "K", _brightness)
-    finest = replace(request, least_depth=1e-2 * own)
-    against = f"a least depth of {1e-2 * own:g}"
-    return Knobs((Knob("observables.least_depth", (measure,), settings, finest, against, answer_emission),))
-
-
-def assign(request: Any) -> Knobs:
+def assign(request: Any) -> Sweeps:
     """Of a scene of an assignment: the search is seeded and has no setting of accuracy."""
-    return Knobs((), ("search: seeded; how sure the answer is stands with it as a probability",))
+    return Sweeps((), ("search: seeded; how sure the answer is stands with it as a probability",))
 
 
-def _brightness(found: Any, reference: Any) -> float:
-    return float(np.max(np.abs(found.spectrum.brightness_k - reference.spectrum.brightness_k), initial=0.0))
+def torsion(request: Any) -> Sweeps:
+    """Of a scene of a torsion; without a scan nothing is left to choose, since the basis follows from the energies."""
+    from rotor.thermodynamics.torsion_request import is_scan
+
+    why = "basis: its size follows from the highest energy; the error is stated with each run"
+    return Sweeps((), () if is_scan(request.potential) else (why,))

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.requests.knob import Measure, Sweep, Sweeps, ladder
 from rotor.scenes.choice import NOTHING_CHEAPER
-from rotor.scenes.knobs.knob import Knob, Knobs, Measure, ladder
 
 if TYPE_CHECKING:
     from rotor.fluids.request import FluidRequest
@@ -30,12 +30,12 @@ EWALD = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 FINEST_EWALD = 1e-10
 
 
-def tumble(request: Any) -> Knobs:
+def tumble(request: Any) -> Sweeps:
     """Of a scene of one body."""
     from rotor.classical.tumble import TumbleRequest
 
     if isinstance(request, TumbleRequest):
-        return Knobs((), (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",))
+        return Sweeps((), (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",))
     from rotor.classical.driven import answer_driven
 
     measure = Measure("attitude", "rad", _turned)
@@ -43,11 +43,11 @@ def tumble(request: Any) -> Knobs:
     against = f"steps to {finest.tolerance:g}"
     own = request.tolerance if request.step is None else None
     settings = ladder(TOLERANCES, own, lambda one: replace(request, step=None, tolerance=one))
-    knobs = [Knob("numerics.tolerance", (measure,), settings, finest, against, answer_driven)]
+    knobs = [Sweep("numerics.tolerance", (measure,), settings, finest, against, answer_driven)]
     remark = _refusal(request)
     if remark is None:
         knobs += [_splitting(request, order, finest, measure, against) for order in ORDERS]
-    return Knobs(tuple(knobs), () if remark is None else (f"numerics.step: {remark}",))
+    return Sweeps(tuple(knobs), () if remark is None else (f"numerics.step: {remark}",))
 
 
 def _turned(found: Any, reference: Any) -> float:
@@ -68,17 +68,17 @@ def _refusal(request: Any) -> str | None:
     return None
 
 
-def _splitting(request: Any, order: int, finest: Any, measure: Measure, against: str) -> Knob:
+def _splitting(request: Any, order: int, finest: Any, measure: Measure, against: str) -> Sweep:
     from rotor.classical.driven import answer_driven
 
     span = abs(request.times[-1] - request.times[0])
     own = request.step if request.step is not None and request.order == order else None
     steps = [span / (16 * number) for number in DIVISIONS]
     settings = ladder(steps, own, lambda one: replace(request, step=one, order=order), "{:.3g}".format)
-    return Knob(f"numerics.step, order {order}", (measure,), settings, finest, against, answer_driven)
+    return Sweep(f"numerics.step, order {order}", (measure,), settings, finest, against, answer_driven)
 
 
-def gas(request: Any) -> Knobs:
+def gas(request: Any) -> Sweeps:
     """Of a scene of a classical gas: the number of molecules, whose error is statistical."""
     from rotor.thermodynamics.classical_gas import answer_gas
 
@@ -90,15 +90,15 @@ def gas(request: Any) -> Knobs:
     make = partial(_with_molecules, still)
     exact = (Measure("temperature", "K", _temperature_error), Measure("heat capacity", "%", _heat_capacity_error))
     settings = ladder(counts, request.molecules, make, "{:.0f}".format)
-    knobs = [Knob("numerics.molecules", exact, settings, None, "kT/2 in every degree of freedom", answers, SEEDS)]
+    knobs = [Sweep("numerics.molecules", exact, settings, None, "kT/2 in every degree of freedom", answers, SEEDS)]
     if request.times_ps is not None:
         most = min(100 * request.molecules, MOST_IN_REFERENCE)
         many = replace(request, molecules=most, seed=request.seed + 1)
         curves = Measure("C1 and C2", "", _curve_error)
         own = ladder(counts, request.molecules, partial(_with_molecules, request), "{:.0f}".format)
         reference, against = many, f"{most} other molecules"
-        knobs.append(Knob("numerics.molecules", (curves,), own, reference, against, answer_gas))
-    return Knobs(tuple(knobs), (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",))
+        knobs.append(Sweep("numerics.molecules", (curves,), own, reference, against, answer_gas))
+    return Sweeps(tuple(knobs), (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",))
 
 
 def _with_molecules(request: Any, count: float) -> Any:
@@ -137,14 +137,14 @@ def _curve_error(found: Any, reference: Any) -> float:
     return max(float(np.max(np.abs(one - true))) for one, true in pairs if one is not None)
 
 
-def fluid(request: FluidRequest) -> Knobs:
+def fluid(request: FluidRequest) -> Sweeps:
     """Of a scene of a fluid: the step, by energy and positions over a short time; cutoff and Ewald's tolerance, by forces."""
     from rotor.fluids.request import NewBox, box_of
 
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
     made = replace(request, box=box_of(request)) if isinstance(request.box, NewBox) else request
-    return Knobs(
+    return Sweeps(
         (_step(made), _cutoff(made), *_ewald(made)), ("conditions.steps: the error of a mean is in its report",)
     )
 
@@ -186,14 +186,14 @@ def _moved(found: Any, reference: Any) -> float:
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
-def _step(request: FluidRequest) -> Knob:
+def _step(request: FluidRequest) -> Sweep:
     measures = (
         Measure("conserved energy per degree", "K", lambda found, _: conserved_k(found)),
         Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
     )
     settings = ladder(STEPS_FS, request.settings.step_fs, partial(followed, request))
     reference = followed(request, FINEST_STEP_FS)
-    return Knob("numerics.step", measures, settings, reference, f"a step of {FINEST_STEP_FS:g} fs", answer_followed)
+    return Sweep("numerics.step", measures, settings, reference, f"a step of {FINEST_STEP_FS:g} fs", answer_followed)
 
 
 def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, tolerance: float) -> Callable[[], Any]:
@@ -239,7 +239,7 @@ def _most(request: FluidRequest) -> float:
     return 0.5 * float(min(request.box.cell.lengths()))  # type: ignore[union-attr]
 
 
-def _cutoff(request: FluidRequest) -> Knob:
+def _cutoff(request: FluidRequest) -> Sweep:
     most, own = _most(request), request.settings
     make = partial(forces_of, request, own.electrostatics)
     cutoffs = [one for one in CUTOFFS if one < 0.95 * most]
@@ -247,10 +247,12 @@ def _cutoff(request: FluidRequest) -> Knob:
     reference = forces_of(request, "ewald", 0.99 * most, FINEST_EWALD)
     against = f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {0.99 * most:.3g} Å"
     measure = Measure("force", "%", force_difference)
-    return Knob(f"numerics.cutoff, {own.electrostatics}", (measure,), settings, reference, against, lambda call: call())
+    return Sweep(
+        f"numerics.cutoff, {own.electrostatics}", (measure,), settings, reference, against, lambda call: call()
+    )
 
 
-def _ewald(request: FluidRequest) -> list[Knob]:
+def _ewald(request: FluidRequest) -> list[Sweep]:
     """The tolerance of Ewald's sum, where the scene has one."""
     own = request.settings
     if own.electrostatics != "ewald":
@@ -259,4 +261,4 @@ def _ewald(request: FluidRequest) -> list[Knob]:
     settings = ladder(EWALD, own.ewald_tolerance, make)
     measure = Measure("force", "%", force_difference)
     against = f"a tolerance of {FINEST_EWALD:g}"
-    return [Knob("numerics.ewald_tolerance", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
+    return [Sweep("numerics.ewald_tolerance", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
