@@ -7,7 +7,7 @@ import pytest
 
 import rotor
 from rotor.quantum.internal_rotation.frames import RhoAxis, axis_of_angles, pam_of_ram, ram_of_pam, rho_axis
-from rotor.quantum.internal_rotation.levels import ram_model
+from rotor.quantum.internal_rotation.levels import turning_tops
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 # XIAM's printed BJ, BK, B-, F0, delta, barriers and quartic constants (GHz), and what it derives from them: F, rho, beta
@@ -84,7 +84,7 @@ def test_levels_do_not_depend_on_the_frame():
         {"V3": 1e3 * CYCLOTENE["V3"], **{name: ram[name] for name in ("F", "rho", "Dab")}}, "RAM", vt_max=0
     )
     constants = rotor.Constants(**{name: ram[name] for name in "ABC"}, reduction="A", representation="Ir")
-    angle = ram_model(top, top.internal_rotation).angle
+    angle = turning_tops(top, top.internal_rotation).angle
     turned = (0.1 * np.cos(angle) + 1.2 * np.sin(angle), 1.2 * np.cos(angle) - 0.1 * np.sin(angle), 0.0)
     same = rotor.Top.from_constants(constants, dipole_abc_debye=turned, internal_rotation=internal)
     ours, others = (rotor.line_list(one, jmax=4, q=1.0, min_lgint=None) for one in (top, same))

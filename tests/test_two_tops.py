@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+import rotor
 from rotor import units
+from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.two_tops import InternalTop, TwoTops
+from rotor.quantum.internal_rotation.two_tops import InternalTop, TwoTops, two_tops
 
 CM = units.MHZ_PER_CM
-ABC = (9800.0, 4300.0, 3200.0)
+ABC = {"A": 9800.0, "B": 4300.0, "C": 3200.0}
 FIRST = InternalTop(5.6 * CM, 300.0 * CM, (0.06, 0.02, 0.0))
 SECOND = InternalTop(6.1 * CM, 40.0 * CM, (0.05, -0.03, 0.0))
 COUPLED = {"f12": -0.4 * CM, "v12": 12.0 * CM, "v12_sine": -7.0 * CM}
@@ -34,7 +36,7 @@ def direct_product(model, j, species, waves):
         along = sum(value * component for value, component in zip(top.rho_abc, components, strict=True))
         p = np.diag(m[i])
         slips.append(whole(unit, *((p, one) if i == 0 else (one, p))) - whole(along, one, one))
-    total = whole(sum(x * c @ c for x, c in zip(model.abc, components, strict=True)), one, one)
+    total = whole(sum(x * c @ c for x, c in zip(model.rotation.values(), components, strict=True)), one, one)
     for i, (top, slip) in enumerate(zip(model.tops, slips, strict=True)):
         barrier = top.v3_mhz / 2 * (one - cos3)
         total = total + top.f_mhz * slip @ slip + whole(unit, *((barrier, one) if i == 0 else (one, barrier)))
@@ -60,7 +62,7 @@ def test_two_tops_that_do_not_see_each_other_are_two_molecules():
     """ρ2 = 0 and no coupling: levels of the first top plus the torsion of the second."""
     alone = InternalTop(SECOND.f_mhz, SECOND.v3_mhz, (0.0, 0.0, 0.0))
     model = TwoTops(ABC, (InternalTop(FIRST.f_mhz, FIRST.v3_mhz, (0.06, 0.0, 0.0)), alone))
-    single = RamModel(dict(zip("ABC", ABC, strict=True)) | {"F": FIRST.f_mhz, "V3": FIRST.v3_mhz, "rho": 0.06})
+    single = RamModel(ABC | {"F": FIRST.f_mhz, "V3": FIRST.v3_mhz, "rho": 0.06})
     for sigma in (0, 1):
         both = model.blocks((sigma, 0), 3, count=9, each=9).solve(model.coefficients, 0)
         expected = single.blocks(sigma, 3, count=9).solve(single.coefficients, 0)
@@ -79,3 +81,115 @@ def test_products_converge_from_above():
     errors = [np.abs(np.sort(energies) - np.sort(lowest[-1])).max() for energies in lowest[:-1]]
     assert errors[1] < errors[0] / 10
     assert (np.sort(lowest[0]) >= np.sort(lowest[1]) - 1e-5).all()  # the variational principle, but for rounding
+
+
+DIMETHYL = {
+    "F0_1": 158e3,
+    "delta_1": 0.56,
+    "V3_1": 100.0 * CM,
+    "F0_2": 161e3,
+    "delta_2": 2.5,
+    "epsilon_2": 0.2,
+    "V3_2": 140.0 * CM,
+}
+
+
+def test_f_and_rho_are_those_of_the_inverse_kinetic_energy():
+    """T of five velocities as a matrix, inverted as a whole."""
+    model = two_tops(ABC, DIMETHYL)
+    abc = np.array(list(ABC.values()))
+    axes = np.array([axis_of_angles(DIMETHYL["delta_1"]), axis_of_angles(DIMETHYL["delta_2"], DIMETHYL["epsilon_2"])])
+    moments = np.array([1 / (2 * DIMETHYL["F0_1"]), 1 / (2 * DIMETHYL["F0_2"])])  # ħ = 1
+    inertia = np.zeros((5, 5))
+    inertia[:3, :3] = np.diag(1 / (2 * abc))
+    inertia[3:, 3:] = np.diag(moments)
+    inertia[:3, 3:] = (axes * moments[:, None]).T
+    inertia[3:, :3] = inertia[:3, 3:].T
+    expected = np.linalg.inv(inertia) / 2  # of P P, P p and p p
+    rho = np.array([top.rho_abc for top in model.tops])
+    f = np.array([[model.tops[0].f_mhz, model.f12], [model.f12, model.tops[1].f_mhz]])
+    assert np.allclose(expected[3:, 3:], f, rtol=1e-12)
+    assert np.allclose(expected[:3, 3:], -rho.T @ f, rtol=1e-12)
+    assert np.allclose(expected[:3, :3], np.diag(abc) + rho.T @ f @ rho, rtol=1e-12)
+
+
+FILE = """
+name = "dimethyl"
+[constants]
+A = 9800
+B = 4300
+C = 3200
+reduction = "A"
+representation = "Ir"
+[dipole]
+a = 0.3
+b = 1.3
+[internal_rotation]
+frame = "PAM"
+F0_1 = 158000
+delta_1 = 0.56
+V3_1 = "250 cm-1"
+F0_2 = 161000
+delta_2 = 2.5
+V3_2 = "340 cm-1"
+vt_max = 0
+"""
+
+
+def test_a_molecule_file_with_two_tops_has_levels_and_lines_of_five_species(tmp_path):
+    path = tmp_path / "dimethyl.toml"
+    path.write_text(FILE)
+    top = rotor.read(path)
+    levels = rotor.api.solve_levels(top, 2)
+    assert len(levels) == 5 * 9
+    nine = {
+        name: levels.degeneracy[levels.find(species=name, vt=0, j=0, ka=0, kc=0)]
+        for name in ("AA", "AE", "EA", "EE", "EE*")
+    }
+    assert list(nine.values()) == [2, 2, 2, 1, 1]  # 16, 16, 16, 8 and 8 of the 64 spin functions
+    assert len({tuple(row) for row in zip(*levels.quanta.values(), strict=True)}) == len(levels)
+    model = two_tops(top.constants.values, top.internal_rotation.values)
+    energies = model.blocks((1, -1), 2).solve(model.coefficients, 0).energies
+    assert np.allclose(
+        np.sort(levels.energy_mhz[levels.quanta["species"] == "EE*"]), np.sort(energies), atol=1e-6, rtol=0
+    )
+    lines = rotor.api.line_list(top, jmax=2, q=1.0, min_lgint=None)
+    upper, lower = (lines.levels.quanta["species"][rows] for rows in (lines.upper, lines.lower))
+    assert (upper == lower).all()
+    assert set(upper.tolist()) == set(nine)
+
+
+def test_a_top_behind_a_high_wall_leaves_the_other_one():
+    """V3_2 of 3000 cm-1: species of the second top coincide, and splittings of the first are those of one top."""
+    rotation = {"A": 9800.0, "B": 4300.0, "C": 3200.0}
+    constants = {"F0_1": 158e3, "delta_1": 0.0, "V3_1": 250 * CM, "F0_2": 161e3, "delta_2": 0.0, "V3_2": 3000 * CM}
+    both = two_tops(rotation, constants)
+    ground = {name: both.ground_energies(species, 2) for name, species in both.species.items()}
+    assert np.allclose(ground["AE"], ground["AA"], atol=1e-3, rtol=0)  # MHz, of energies of 1e9
+    assert np.abs(ground["EA"] - ground["AA"]).min() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [(('frame = "PAM"', 'frame = "RAM"'), "two tops in the frame RAM"), (("F0_2 = 161000", ""), "F0_2 missing"),
+     (("vt_max", 'rho = 0.1\nvt_max'), "rho of two tops")],
+)  # fmt: skip
+def test_mistakes_in_constants_of_two_tops_are_named(tmp_path, change, text):
+    path = tmp_path / "dimethyl.toml"
+    path.write_text(FILE.replace(*change))
+    with pytest.raises(ValueError, match=text):
+        rotor.read(path)
+
+
+def test_a_plan_and_a_fit_of_two_tops(tmp_path, call):
+    path = tmp_path / "dimethyl.toml"
+    path.write_text(FILE)
+    code, output, _ = call("spectrum", str(path), "--jmax", "2", "--temperature", "10")
+    assert code == 0
+    assert "EE*" in output
+    names = [f"{name}_{side}" for side in ("upper", "lower") for name in ("j", "ka", "kc", "species", "vt")]
+    table = [",".join([*names, "frequency_mhz", "error_mhz"]), "1,0,1,AA,0,0,0,0,AA,0,7500,0.1"]
+    (tmp_path / "lines.csv").write_text("\n".join(table))
+    code, _, error = call("fit", str(tmp_path / "lines.csv"), "--start", str(path), "--free", "B")
+    assert code == 2
+    assert "two tops" in error

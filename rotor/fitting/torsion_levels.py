@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.internal_rotation.levels import SPECIES
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.species import SpeciesBlocks
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
@@ -84,6 +83,8 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     """
     internal = constants.top.internal_rotation
     assert internal is not None
+    if internal.tops == 2:
+        raise ValueError("fits with internal rotation of two tops are not computed")
     if internal.frame != "RAM":
         raise ValueError(
             f"fits of constants in the frame {internal.frame}: convert them to the rho-axis frame (RAM) first"
@@ -91,12 +92,15 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j", "vt", "ka", "kc")])
     sigma = columns["species"]
-    wrong = ~np.isin(sigma, list(SPECIES.values())) | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
+    wrong = ~np.isin(sigma, list(RamModel.species.values())) | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
     if wrong.any():
         places = np.flatnonzero(wrong)
         text = ", ".join(f"{name} = {columns[name][places[0]]}" for name in constants.quanta)
         raise MissingLevelsError(f"there is no level with {text} (species 0 is A, 1 is E) in this model", places)
-    parts = [LabelledSpecies(value, np.flatnonzero(sigma == value), keys[sigma == value]) for value in SPECIES.values()]
+    parts = [
+        LabelledSpecies(value, np.flatnonzero(sigma == value), keys[sigma == value])
+        for value in RamModel.species.values()
+    ]
     names = tuple(constants.values)
     return TorsionLevels(
         names,

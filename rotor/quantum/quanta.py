@@ -3,7 +3,7 @@
 | name | what it is |
 |---|---|
 | `v` | number of the vibrational or tunnelling state |
-| `species` | of the permutations of a turning group: A, E |
+| `species` | of the permutations of a turning group: A, E; of two AA, AE, EA, EE, EE* for (σ1, σ2) = 00, 01, 10, 11, 1-1 |
 | `vt` | number of the torsional state of a species |
 | `n` | rotational angular momentum where spins are coupled to it (`j` where there are none) |
 | `j` | total angular momentum without nuclear spins; the rotational one where there is no spin |
@@ -66,7 +66,15 @@ _HEADINGS = {
 # how a picture writes sums with spins, in TeX
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
 
-SPECIES_NUMBERS = {"A": 0, "E": 1}  # how labels of whole numbers have species
+SPECIES_NUMBERS = {
+    "A": 0,
+    "E": 1,
+    "AA": 10,
+    "AE": 11,
+    "EA": 12,
+    "EE": 13,
+    "EE*": 14,
+}  # how labels of whole numbers have species
 
 Quanta = Mapping[str, NDArray[Any]]
 

@@ -138,7 +138,10 @@ def _extrapolated(
     return most + rate * (work(size) - work(second))
 
 
-MOST_J_COMPARED = 30  # J up to which the truncation of the torsion is compared with more functions
+MOST_J_COMPARED = {
+    1: 30,
+    2: 8,
+}  # J up to which the truncation of the torsion is compared with more functions, by the number of tops
 
 
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
@@ -189,14 +192,16 @@ def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
 
 def _torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -> list[tuple[str, str]]:
     """Basis, method and truncation error of levels with an internal rotor."""
-    from rotor.quantum.internal_rotation.levels import ram_model
+    from rotor.quantum.internal_rotation.levels import turning_tops
     from rotor.quantum.internal_rotation.truncation import truncation_mhz
 
     count = constants.functions
     size = (2 * jmax + 1) * count
-    error = truncation_mhz(ram_model(top, constants), min(jmax, MOST_J_COMPARED), constants.vt_max, count)
+    compared = min(jmax, MOST_J_COMPARED[constants.tops])
+    error = truncation_mhz(turning_tops(top, constants), compared, constants.vt_max, count)
+    functions = "torsional functions" if constants.tops == 1 else "products of torsional functions"
     return [
-        ("basis", f"J to {jmax}; {count} torsional functions for each K, blocks of up to {size} states"),
+        ("basis", f"J to {jmax}; {count} {functions} for each K, blocks of up to {size} states"),
         ("method", f"torsion of each K and species first; {ENERGY}"),
-        ("truncation", f"at most {error:.1g} MHz at J = {min(jmax, MOST_J_COMPARED)}, v_t up to {constants.vt_max}"),
+        ("truncation", f"at most {error:.1g} MHz at J = {compared}, v_t up to {constants.vt_max}"),
     ]

@@ -6,7 +6,8 @@ In the rho-axis frame (RAM) z is along ρ and the rotational constants of the to
 
 A beside F (p - ρPa)². In the principal-axis frame (PAM, as XIAM has it) the rotational constants and distortion are those of the principal
 axes, F0 = ħ²/2I_α of the top alone, and delta is the angle of its axis from a, in the plane ab. The names of further terms are in
-`rotor.quantum.internal_rotation.terms`. Constants without a stated frame are refused.
+`rotor.quantum.internal_rotation.terms`. Two tops are given in the PAM, with the number of the top behind each name: F0_1, delta_1,
+epsilon_1 (about a, from b), V3_1, V6_1, F0_2 ..., and V12, V12s for what couples them. Constants without a stated frame are refused.
 """
 
 from __future__ import annotations
@@ -29,7 +30,16 @@ SPELLED = re.compile(
 )
 FRAMES = ("RAM", "PAM")
 NEEDED = {"RAM": ("F", "rho", "V3"), "PAM": ("F0", "delta", "V3")}
-BARE = ("rho", "delta")  # without a unit, radians
+NUMBERED = tuple(f"{name}_{top}" for top in (1, 2) for name in ("F0", "delta", "epsilon", "V3", "V6"))  # of two tops
+BETWEEN_TOPS = ("V12", "V12s")
+NEEDED_OF_TWO = tuple(name for name in NUMBERED if not name.startswith(("epsilon", "V6")))
+BARE = (
+    "rho",
+    "delta",
+    *(name for name in NUMBERED if name.startswith(("delta", "epsilon"))),
+)  # without a unit, radians
+DEFAULT_FUNCTIONS = {1: 9, 2: 25}  # n_v by the number of tops: 1 Hz for v_t = 0 at J = 25 of one, MHz at J = 20 of two
+MOST_FUNCTIONS = {1: 20, 2: 81}
 
 
 def is_torsional(name: str) -> bool:
@@ -38,7 +48,7 @@ def is_torsional(name: str) -> bool:
     >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
     [True, True, False, False]
     """
-    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED):
+    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED, *NUMBERED, *BETWEEN_TOPS):
         return True
     match = SPELLED.fullmatch(name)
     return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
@@ -46,10 +56,11 @@ def is_torsional(name: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class InternalRotationConstants:
-    """Constants of one threefold top: MHz by name, rho without a unit.
+    """Constants of one threefold top, or of two: MHz by name, rho without a unit.
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
-    vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K. spin_states: 2I + 1 of
+    vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K; 0 stands for 9, and for
+    25 products of two tops. spin_states: 2I + 1 of
     each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
     "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
     uncertainties: in MHz (of rho without a unit). source: where the values are from.
@@ -62,7 +73,7 @@ class InternalRotationConstants:
     values: Mapping[str, float]
     frame: str
     vt_max: int = 1
-    functions: int = 9
+    functions: int = 0
     spin_states: int = 2
     names: str = "K"
     uncertainties: Mapping[str, float] = field(default_factory=dict)
@@ -74,33 +85,51 @@ class InternalRotationConstants:
                 f"internal rotation in the frame {self.frame or '(not stated)'}: expected RAM (z along rho; F, rho) or PAM (principal "
                 "axes; F0, delta), which have other values of A, B, C"
             )
+        self._check_names()
+        numbers = {n: float(value) if n in BARE else parse_quantity(value, "MHz") for n, value in self.values.items()}
+        for name in numbers:
+            if name in ("F", "F0", "F0_1", "F0_2") and not numbers[name] > 0:
+                raise ValueError(f"{name} = {numbers[name]:g} MHz: expected a number above 0")
+        if not self.functions:
+            object.__setattr__(self, "functions", DEFAULT_FUNCTIONS[self.tops])
+        most = MOST_FUNCTIONS[self.tops]
+        if not 0 <= self.vt_max <= self.functions - 2 <= most - 2:
+            raise ValueError(
+                f"torsional states up to v_t = {self.vt_max} from n_v = {self.functions} functions: expected n_v of at least v_t + 2 "
+                f"and at most {most}"
+            )
+        if self.names not in ("K", "energy"):
+            raise ValueError(f"names {self.names!r} of levels of internal rotation: expected K or energy")
+        object.__setattr__(self, "values", MappingProxyType(numbers))
+        object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
+
+    def _check_names(self) -> None:
+        """ValueError for names that are none, that another frame has, and that are missing."""
         for name in self.values:
             if not is_torsional(name):
                 known = ", ".join(("F", "rho", *BARRIERS, *NAMED))
                 raise ValueError(
                     f"{name!r} is no constant of an internal rotor: known are {known}, and terms such as J2p2"
                 )
-        needed, others = NEEDED[self.frame], NEEDED["PAM" if self.frame == "RAM" else "RAM"]
+        needed: tuple[str, ...] = NEEDED[self.frame]
+        others: tuple[str, ...] = NEEDED["PAM" if self.frame == "RAM" else "RAM"]
+        place = f"in the frame {self.frame}"
+        if self.tops == 2:
+            needed, place = NEEDED_OF_TWO, "of two tops"
+            others = tuple(name for name in self.values if name not in (*NUMBERED, *BETWEEN_TOPS))
+            if self.frame != "PAM":
+                raise ValueError(
+                    f"internal rotation of two tops in the frame {self.frame}: expected PAM (principal axes)"
+                )
         if missing := [name for name in needed if name not in self.values]:
-            raise ValueError(
-                f"internal rotation: {', '.join(missing)} missing; expected {', '.join(needed)} in the frame {self.frame}"
-            )
+            raise ValueError(f"internal rotation: {', '.join(missing)} missing; expected {', '.join(needed)} {place}")
         if strange := [name for name in others if name in self.values and name not in needed]:
-            raise ValueError(
-                f"internal rotation: {', '.join(strange)} in the frame {self.frame}: expected {', '.join(needed)}"
-            )
-        numbers = {n: float(value) if n in BARE else parse_quantity(value, "MHz") for n, value in self.values.items()}
-        if not numbers[needed[0]] > 0:
-            raise ValueError(f"{needed[0]} = {numbers[needed[0]]:g} MHz: expected a number above 0")
-        if not 0 <= self.vt_max <= self.functions - 2 <= 18:
-            raise ValueError(
-                f"torsional states up to v_t = {self.vt_max} from n_v = {self.functions} functions: expected n_v of at least v_t + 2 "
-                "and at most 20"
-            )
-        if self.names not in ("K", "energy"):
-            raise ValueError(f"names {self.names!r} of levels of internal rotation: expected K or energy")
-        object.__setattr__(self, "values", MappingProxyType(numbers))
-        object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
+            raise ValueError(f"internal rotation: {', '.join(strange)} {place}: expected {', '.join(needed)}")
+
+    @property
+    def tops(self) -> int:
+        """How many tops turn."""
+        return 2 if any(name in (*NUMBERED, *BETWEEN_TOPS) for name in self.values) else 1
 
     def __reduce__(self) -> tuple[Any, ...]:
         others = (self.vt_max, self.functions, self.spin_states, self.names, dict(self.uncertainties), self.source)

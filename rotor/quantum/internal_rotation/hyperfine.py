@@ -18,8 +18,14 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.contraction import Sector, Space, contracted_elements, coupled, spin_space
 from rotor.quantum.internal_rotation.contracted import Product
-from rotor.quantum.internal_rotation.levels import REPRESENTATION, SPECIES, ram_model, reduced_weights
-from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.levels import (
+    REPRESENTATION,
+    TurningTops,
+    components_of,
+    reduced_weights,
+    species_blocks,
+    turning_tops,
+)
 from rotor.quantum.internal_rotation.species import SpeciesLevels
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.algebra import Operator, half_anticommutator
@@ -47,7 +53,7 @@ class NucleusTensors:
 class SpeciesHyperfine:
     """The states of one species with spins: the last space, its names, and the rotational levels behind them."""
 
-    model: RamModel
+    model: TurningTops
     levels: SpeciesLevels
     space: Space
     quanta: tuple[Mapping[str, Ints], ...]
@@ -128,21 +134,21 @@ def hyperfine_levels(
     ValueError
         For electron spins, total spins of like nuclei, and constants with powers of N.
     """
-    model = ram_model(top, constants)
+    model = turning_tops(top, constants)
     nuclei = _nuclei(top, effects, model.angle)
     total = sum(nucleus.spin.twice for nucleus in nuclei)
     names = [*(f"f{i}" for i in range(1, len(nuclei))), "f"]
     blocks: list[HyperfineBlock] = []
     columns: dict[str, list[NDArray[Any]]] = {}
     start = 0
-    for name, sigma in SPECIES.items():
-        states = _species(model, constants, sigma, nuclei, names, (max(0, nmin - total), nmax + total))
+    for name in model.species:
+        states = _species(model, constants, name, nuclei, names, (max(0, nmin - total), nmax + total))
         for sector, quanta in enumerate(states.quanta):
             here = np.flatnonzero((quanta["n"] >= nmin) & (quanta["n"] <= nmax))
             if not len(here):
                 continue
             energies = states.space.sectors[sector].energies[here]
-            blocks.append(HyperfineBlock(states, sector, here, energies, start, 1 if sigma == 0 else 2))
+            blocks.append(HyperfineBlock(states, sector, here, energies, start, components_of(name)))
             start += len(here)
             table = {"species": np.full(len(here), name)} | {
                 key: quanta[key][here] for key in ("vt", "n", "ka", "kc", *names)
@@ -155,7 +161,7 @@ def hyperfine_levels(
     for key in names:
         if key not in halves:
             quanta[key] = quanta[key] // 2
-    is_a = quanta["species"] == "A"
+    species, weights = quanta["species"].tolist(), reduced_weights(constants)
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
@@ -163,8 +169,8 @@ def hyperfine_levels(
         energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
         quanta=quanta,
         multiplicity=multiplicity,
-        components=np.where(is_a, 1, 2),
-        weight=np.where(is_a, *reduced_weights(constants)).astype(np.int64),
+        components=np.array([components_of(name) for name in species], dtype=np.int64),
+        weight=np.array([weights[name] for name in species], dtype=np.int64),
         halves=halves,
         effects=effects,
         blocks=tuple(blocks),
@@ -227,11 +233,11 @@ def _real(components: NDArray[Any]) -> NDArray[Any]:
 
 
 def _species(
-    model: RamModel, constants: InternalRotationConstants, sigma: int, nuclei: Sequence[NucleusTensors], names: Sequence[str],
+    model: TurningTops, constants: InternalRotationConstants, species: str, nuclei: Sequence[NucleusTensors], names: Sequence[str],
     n_range: tuple[int, int],
 ) -> SpeciesHyperfine:  # fmt: skip
     """All states of one species with N in a range."""
-    blocks = model.blocks(sigma, n_range[1], jmin=n_range[0], count=constants.functions)
+    blocks = species_blocks(model, species, *n_range, constants.functions)
     levels = blocks.solve_once(model.coefficients, constants.vt_max, constants.names == "energy")
     space = _rotation_space(levels, nuclei, model.has_plane)
     quanta = _rotation_quanta(levels, space)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.internal_rotation.contracted import Product, contracted_torsion
+from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.species import SpeciesLevels
+from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
+from rotor.quantum.internal_rotation.two_tops import TwoTops, two_tops
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-SPECIES = {"A": 0, "E": 1}  # σ; that of E stands for both components ±1, which have equal energies at ∓K
+TurningTops = RamModel | TwoTops
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
@@ -41,7 +42,7 @@ class SpeciesMoments:
     """Reduced elements of molecule-fixed tensors between the blocks of one species, made when first used."""
 
     levels: SpeciesLevels
-    model: RamModel
+    model: TurningTops
     _known: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
 
     def between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
@@ -131,7 +132,7 @@ class TorsionBlock(MomentBlock):
 def torsion_rotation_levels(
     top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
 ) -> Levels:
-    """Levels of both species with v_t ≤ vt_max and J from `jmin` to `jmax`.
+    """Levels of every species with v_t ≤ vt_max and J from `jmin` to `jmax`.
 
     Parameters
     ----------
@@ -155,15 +156,15 @@ def torsion_rotation_levels(
         For a top that is not asymmetric in the representation Iʳ.
     """
     _refuse_axes(top)
-    model = ram_model(top, constants)
+    model = turning_tops(top, constants)
     blocks: list[TorsionBlock] = []
     quanta: dict[str, list[NDArray[Any]]] = {}
     start = 0
-    for name, sigma in SPECIES.items():
-        species = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions).solve_once(
+    for name in model.species:
+        species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
-        made = _blocks(species, model, start, 1 if sigma == 0 else 2)
+        made = _blocks(species, model, start, components_of(name))
         columns = {
             "species": np.full(len(species.rows), name),
             **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
@@ -190,9 +191,9 @@ def energies_alone(
     Functions that lie above `below_mhz` with all that they couple to are left out.
     """  # fmt: skip
     _refuse_axes(top)
-    model, pieces, energies = ram_model(top, constants), [], []
-    for name, sigma in SPECIES.items():
-        blocks = model.blocks(sigma, jmax, jmin=jmin, count=constants.functions)
+    model, pieces, energies = turning_tops(top, constants), [], []
+    for name in model.species:
+        blocks = species_blocks(model, name, jmin, jmax, constants.functions)
         highest = float(
             blocks.functions.torsion.energies[jmax].max()
         )  # of K = 0: low levels lean on all torsional functions
@@ -219,8 +220,9 @@ def _table(
     top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmax: int,
     quanta: dict[str, NDArray[Any]], energies: Floats, blocks: tuple[TorsionBlock, ...],
 ) -> Levels:  # fmt: skip
-    """Levels with the degeneracies of both species."""
-    is_a = quanta["species"] == "A"
+    """Levels with the degeneracies of their species."""
+    species = quanta["species"].tolist()
+    weights = reduced_weights(constants)
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
@@ -228,8 +230,8 @@ def _table(
         energy_mhz=energies,
         quanta=quanta,
         multiplicity=2 * quanta["j"] + 1,
-        components=np.where(is_a, 1, 2),
-        weight=np.where(is_a, *reduced_weights(constants)).astype(np.int64),
+        components=np.array([components_of(name) for name in species], dtype=np.int64),
+        weight=np.array([weights[name] for name in species], dtype=np.int64),
         effects=effects,
         blocks=blocks,
     )
@@ -244,8 +246,10 @@ def _refuse_axes(top: Top) -> None:
         )
 
 
-def ram_model(top: Top, constants: InternalRotationConstants) -> RamModel:
-    """The constants of the top and of the internal rotor together."""
+def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
+    """The constants of the top and of what turns in it together."""
+    if constants.tops == 2:
+        return two_tops(top.constants.values, constants.values)
     if constants.frame == "RAM":
         return RamModel({**top.constants.values, **constants.values})
     others = {name: value for name, value in constants.values.items() if name not in ("F0", "delta")}
@@ -254,14 +258,34 @@ def ram_model(top: Top, constants: InternalRotationConstants) -> RamModel:
     return RamModel({**top.constants.values, "F": rotor.f, "rho": rotor.rho, **others}, angle=angle)
 
 
-def reduced_weights(constants: InternalRotationConstants) -> tuple[int, int]:
-    """Spin weights of A and E levels without their common divisor."""
-    weights = constants.weights
-    divisor = int(np.gcd(*weights))
-    return weights[0] // divisor, weights[1] // divisor
+def species_blocks(model: TurningTops, name: str, jmin: int, jmax: int, count: int) -> SpeciesBlocks:
+    """The blocks of a species by name."""
+    if isinstance(model, TwoTops):
+        return model.blocks(model.species[name], jmax, jmin=jmin, count=count)
+    return model.blocks(model.species[name], jmax, jmin=jmin, count=count)
 
 
-def _blocks(species: SpeciesLevels, model: RamModel, start: int, components: int) -> list[TorsionBlock]:
+def components_of(species: str) -> int:
+    """States that coincide in a level: (σ1, σ2) and (-σ1, -σ2) of all species but A and AA."""
+    return 1 if set(species) == {"A"} else 2
+
+
+def reduced_weights(constants: InternalRotationConstants) -> dict[str, int]:
+    """Spin weights of levels by species without their common divisor.
+
+    Those of inequivalent tops are products; of EE and EE*, each with two of the four components, half of it.
+    """
+    a, e = constants.weights
+    weights = (
+        {"A": a, "E": e}
+        if constants.tops == 1
+        else {"AA": a * a, "AE": a * e, "EA": e * a, "EE": e * e // 2, "EE*": e * e // 2}
+    )
+    divisor = int(np.gcd.reduce(list(weights.values())))
+    return {name: weight // divisor for name, weight in weights.items()}
+
+
+def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[TorsionBlock]:
     """The blocks of one species with the states that are levels, in the order of its rows."""
     moments, made = SpeciesMoments(species, model), []
     linear = species.solved.linear
@@ -280,8 +304,11 @@ def _blocks(species: SpeciesLevels, model: RamModel, start: int, components: int
 
 
 def species_splitting(top: Top, constants: InternalRotationConstants, j: int) -> float:
-    """The largest |E_E(K) - E_A(K) - E_E(0) + E_A(0)| of the torsional ground state for |K| ≤ J, MHz."""
-    torsion = ram_model(top, constants).torsion
-    ground = [contracted_torsion(torsion, sigma, j, 1).energies[:, 0] for sigma in SPECIES.values()]
-    difference = ground[1] - ground[0]
-    return float(np.abs(difference - difference[j]).max())
+    """The largest |E_s(K) - E_A(K) - E_s(0) + E_A(0)| of the torsional ground state of any species s for |K| ≤ J, MHz."""
+    model = turning_tops(top, constants)
+    if isinstance(model, TwoTops):
+        ground = [model.ground_energies(species, j) for species in model.species.values()]
+    else:
+        ground = [model.ground_energies(sigma, j) for sigma in model.species.values()]
+    differences = np.array(ground[1:]) - ground[0]
+    return float(np.abs(differences - differences[:, [j]]).max())

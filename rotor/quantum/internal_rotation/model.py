@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,9 @@ class RamModel:
     values: Mapping[str, float]
     fold: int = 3
     angle: float = 0.0
+    species: ClassVar[Mapping[str, int]] = MappingProxyType(
+        {"A": 0, "E": 1}
+    )  # σ; E stands for ±1, of equal energies at ∓K
 
     def __post_init__(self) -> None:
         missing = [name for name in ("A", "B", "C", "F", "rho") if name not in self.values]
@@ -79,6 +83,10 @@ class RamModel:
         matrix[count:, names.index("F")] = [1.0, rho, rho**2]
         matrix[count:, names.index("rho")] = [0.0, f, 2 * f * rho]
         return matrix
+
+    def ground_energies(self, sigma: int, k_max: int) -> Floats:
+        """Energies (K,) of the lowest torsional state for K from -k_max to k_max, MHz."""
+        return np.asarray(contracted_torsion(self.torsion, sigma, k_max, 1).energies[:, 0])
 
     @property
     def has_plane(self) -> bool:

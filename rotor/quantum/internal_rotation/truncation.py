@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.two_tops import EACH, TwoTops
 
 STEP = 4  # further functions that levels are compared with
 MARGIN = 1.5  # on the fall from n_v to n_v + 4 functions: the series falls at least fivefold in four functions
 ROUNDING = 64 * float(np.finfo(float).eps)  # of the largest energy in a block
 
 
-def truncation_mhz(model: RamModel, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
+def truncation_mhz(model: RamModel | TwoTops, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
     """A bound of how far levels with v_t ≤ vt_max lie above those of all torsional functions, MHz, at J = jmax, where it is largest.
 
-    Energies are upper bounds that fall with n_v. The fall from n_v to n_v + 4 functions, half as much again, and round-off.
+    Energies are upper bounds that fall with n_v. The fall from n_v to n_v + 4 functions (of two tops to 2 n_v products), half as much
+    again, and round-off.
 
     >>> model = RamModel({"A": 9e3, "B": 4e3, "C": 3e3, "Dab": 0.0, "F": 2e5, "rho": 0.1, "V3": 1e7})
     >>> truncation_mhz(model, 3, 0, 9) < 1e-5
     True
     """
     largest, scale = 0.0, 0.0
-    more = min(count + STEP, 2 * waves + 1)
-    for sigma in (0, 1):
+    two = isinstance(model, TwoTops)
+    more = min(2 * count, EACH**2) if two else min(count + STEP, 2 * waves + 1)
+    for species in model.species.values():
         energies = []
         for functions in (count, more):
-            blocks = model.blocks(sigma, jmax, jmin=jmax, count=functions, waves=waves)
+            solve: Any = model.blocks  # of σ, or of (σ1, σ2)
+            blocks = solve(species, jmax, jmin=jmax, count=functions, waves=waves)
             levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])
             energies.append(levels.energies[order])

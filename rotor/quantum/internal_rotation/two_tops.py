@@ -13,29 +13,40 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import Any
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesBlocks
+from rotor.quantum.internal_rotation.terms import products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.quantum.torsion import TorsionalPotential
+from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS
 
+EACH = 9  # functions of each top that products are made of
 Pair = tuple[Operator | None, Operator | None]  # operators of both torsions
 
 
 @dataclass(frozen=True)
 class InternalTop:
-    """One of two tops: F and V3 in MHz, ρ along a, b, c."""
+    """One of two tops: F, V3 and V6 in MHz, ρ along a, b, c."""
 
     f_mhz: float
     v3_mhz: float
     rho_abc: tuple[float, float, float]
+    v6_mhz: float = 0.0
+
+    @property
+    def torsion(self) -> Torsion:
+        """The part that is solved first for each K."""
+        return Torsion(self.f_mhz, self.rho_abc[0], TorsionalPotential({3: self.v3_mhz, 6: self.v6_mhz}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,21 +97,47 @@ class ProductTorsion:
 
 @dataclass(frozen=True)
 class TwoTops:
-    """Constants of a molecule with two internal rotors, MHz: A, B, C of the principal axes, both tops, and what couples them."""
+    """Constants of a molecule with two internal rotors, MHz: A, B, C and distortion in principal axes, both tops, and what couples them."""
 
-    abc: tuple[float, float, float]
+    rotation: Mapping[str, float]
     tops: tuple[InternalTop, InternalTop]
     f12: float = 0.0
     v12: float = 0.0
     v12_sine: float = 0.0
+    angle: ClassVar[float] = 0.0  # of z from the axis a
+    species: ClassVar[Mapping[str, tuple[int, int]]] = MappingProxyType(
+        {"AA": (0, 0), "AE": (0, 1), "EA": (1, 0), "EE": (1, 1), "EE*": (1, -1)}
+    )  # (σ1, σ2); each stands for (-σ1, -σ2) too
 
     @property
     def has_plane(self) -> bool:
         """Whether both ρ lie in the plane ab."""
         return not any(top.rho_abc[2] for top in self.tops)
 
+    def ground_energies(self, species: tuple[int, int], k_max: int) -> Floats:
+        """Energies (K,) of the lowest product for K from -k_max to k_max, MHz."""
+        first, second = self._torsions(species, k_max, 1, 10)
+        return np.asarray(first.energies[:, 0] + second.energies[:, 0])
+
+    def _torsions(
+        self, species: tuple[int, int], k_max: int, each: int, waves: int
+    ) -> tuple[ContractedTorsion, ContractedTorsion]:
+        """Contracted functions of both tops."""
+        first, second = (
+            contracted_torsion(top.torsion, sigma, k_max, each, waves)
+            for top, sigma in zip(self.tops, species, strict=True)
+        )
+        return first, second
+
     def blocks(
-        self, species: tuple[int, int], jmax: int, *, count: int = 25, each: int = 7, waves: int = 10
+        self,
+        species: tuple[int, int],
+        jmax: int,
+        *,
+        jmin: int = 0,
+        count: int = DEFAULT_FUNCTIONS[2],
+        each: int = EACH,
+        waves: int = 10,
     ) -> SpeciesBlocks:
         """The blocks of a species.
 
@@ -108,8 +145,8 @@ class TwoTops:
         ----------
         species : (int, int)
             σ of both tops: 0, 1 or -1.
-        jmax : int
-            Highest J.
+        jmax, jmin : int
+            Range of J.
         count : int, optional
             Products of torsional functions retained for each K, the lowest by energy.
         each : int, optional
@@ -121,17 +158,12 @@ class TwoTops:
         -------
         SpeciesBlocks
         """
-        torsions = [
-            contracted_torsion(
-                Torsion(top.f_mhz, top.rho_abc[0], TorsionalPotential({3: top.v3_mhz})), sigma, jmax, each, waves
-            )
-            for top, sigma in zip(self.tops, species, strict=True)
-        ]
+        torsions = self._torsions(species, jmax, each, waves)
         middle = torsions[0].energies[jmax][:, None] + torsions[1].energies[jmax]
         retained = np.column_stack(np.unravel_index(np.argsort(middle, axis=None, kind="stable")[:count], middle.shape))
         product: Any = ProductTorsion(torsions[0], torsions[1], retained)
         folded = species == (0, 0) and self.has_plane
-        return SpeciesBlocks(TorsionRotation(product, 0, jmax, folded), self.terms(species))
+        return SpeciesBlocks(TorsionRotation(product, jmin, jmax, folded), self.terms(species))
 
     def terms(self, species: tuple[int, int]) -> Mapping[str, tuple[Product, ...]]:
         """Sums of products by coefficient, in the order of `coefficients`."""
@@ -140,9 +172,7 @@ class TwoTops:
         along = [
             _sum([value * axis for value, axis in zip(top.rho_abc, axes, strict=True) if value]) for top in self.tops
         ]
-        terms: dict[str, tuple[Product, ...]] = {
-            name: (Product(axis @ axis),) for name, axis in zip("ABC", axes, strict=True)
-        }
+        terms: dict[str, tuple[Product, ...]] = {name: products_of(name, 0) for name in self.rotation}
         for i, (top, sigma) in enumerate(zip(self.tops, species, strict=True)):
             square = p_alpha(sigma, 2)
             terms[f"F{i + 1}"] = (
@@ -150,7 +180,8 @@ class TwoTops:
             )  # fmt: skip
             if not any(top.rho_abc):
                 terms[f"F{i + 1}"] = (Product(UNIT, _at(i, square)),)
-            terms[f"V3 {i + 1}"] = (Product(UNIT, _at(i, 0.5 * (UNIT - cosine(1)))),)
+            for n in (3, 6):
+                terms[f"V{n} {i + 1}"] = (Product(UNIT, _at(i, 0.5 * (UNIT - cosine(n // 3)))),)
         hindering = UNIT - cosine(1)
         terms["F12"] = (
             Product(2.0 * UNIT, _both(p[0], p[1])), Product(-2.0 * along[1], _at(0, p[0])), Product(-2.0 * along[0], _at(1, p[1])),
@@ -164,8 +195,60 @@ class TwoTops:
     @property
     def coefficients(self) -> Floats:
         """The values of the coefficients, MHz."""
-        each = [value for top in self.tops for value in (top.f_mhz, top.v3_mhz)]
-        return np.array([*self.abc, *each, self.f12, self.v12, self.v12_sine])
+        each = [value for top in self.tops for value in (top.f_mhz, top.v3_mhz, top.v6_mhz)]
+        return np.array([*self.rotation.values(), *each, self.f12, self.v12, self.v12_sine])
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The coefficients by name."""
+        return dict(zip(self.terms((0, 0)), self.coefficients.tolist(), strict=True))
+
+    @property
+    def jacobian(self) -> Floats:
+        """∂(coefficients)/∂(values)."""
+        return np.eye(len(self.coefficients))
+
+
+def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> TwoTops:
+    """Two tops from F0, delta and epsilon of each, and their barriers.
+
+    With the unit vectors λ_i of the axes, B_g = A, B, C and F0_i = ħ²/2I_αi, eliminating the velocities from T gives
+
+        ρ_i = (λ_ig B_g/F0_i),    F = M⁻¹,    M_ij = δ_ij/F0_i - Σ_g λ_ig λ_jg B_g/(F0_i F0_j),    T = Σ B_g P_g² + Σ_ij F_ij π_i π_j
+
+    (derived from T = ½ω·Iω + Σ I_αi α'_i λ_i·ω + ½Σ I_αi α'_i²; for one top F = F0/(1 - Σ λ_g ρ_g), as `frames` has it).
+
+    Parameters
+    ----------
+    rotation : mapping
+        A, B, C and distortion in principal axes, MHz.
+    constants : mapping
+        F0_1, delta_1, V3_1, F0_2 ... as `rotor.tops.internal_rotation` has them.
+
+    Returns
+    -------
+    TwoTops
+
+    Examples
+    --------
+    >>> tops = {"F0_1": 150e3, "delta_1": 0.5, "V3_1": 9e6, "F0_2": 150e3, "delta_2": 2.6, "V3_2": 9e6}
+    >>> model = two_tops({"A": 9000.0, "B": 5000.0, "C": 3400.0}, tops)
+    >>> round(model.tops[0].f_mhz), round(model.f12), round(model.tops[0].rho_abc[0], 6)
+    (158782, -6183, 0.052655)
+    """
+    abc = np.array([rotation[name] for name in "ABC"])
+    axes = np.array([axis_of_angles(constants[f"delta_{i}"], constants.get(f"epsilon_{i}", 0.0)) for i in (1, 2)])
+    f0 = np.array([constants[f"F0_{i}"] for i in (1, 2)])
+    rho = axes * abc / f0[:, None]
+    f = np.linalg.inv(np.diag(1 / f0) - (axes * abc) @ axes.T / np.outer(f0, f0))
+    first, second = (
+        InternalTop(
+            float(f[i, i]), constants[f"V3_{i + 1}"], (float(rho[i, 0]), float(rho[i, 1]), float(rho[i, 2])),
+            constants.get(f"V6_{i + 1}", 0.0),
+        )
+        for i in (0, 1)
+    )  # fmt: skip
+    return TwoTops(rotation, (first, second), float(f[0, 1]), constants.get("V12", 0.0), constants.get("V12s", 0.0))
 
 
 def _sum(operators: list[Operator]) -> Operator:
