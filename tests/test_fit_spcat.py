@@ -146,7 +146,7 @@ a  3  2  0  30  0  1  1  1  0  -1  0
 """
 
 
-def test_the_unit_blocks_are_the_cores_levels_and_derivatives():
+def test_the_linear_blocks_are_the_cores_levels_and_derivatives():
     """Two states with a Coriolis term and a quadrupole nucleus: energies as the core has them, slopes by differences."""
     file = read_par(TWO_STATES)
     groups = groups_for_fit(file)

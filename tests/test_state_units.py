@@ -7,10 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotor.arrays import Workspace
 from rotor.formats.spcat.fits import fit_states
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit
 from rotor.formats.spcat.text.par import read_par
-from rotor.quantum.estimates.unit_blocks import UnitBlocks
+from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.label_tracking import LabelledBlocks
+from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 
 THREE = """three states
   17  100   20    0    0.0  1.0E+06  1.0 1.0
@@ -80,7 +84,7 @@ def test_levels_that_a_state_does_not_have_are_named():
 
 def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     """Side by side and padded, or one at a time."""
-    from rotor.quantum.estimates import unit_blocks
+    from rotor.quantum import linear_stacks
 
     labels = np.array([[n, ka, n - ka, v] for n in range(3, 9) for ka in range(3) for v in range(3)])
     text = THREE.format(options=OPTIONS["prolate"])  # less what connects all blocks of one J
@@ -89,10 +93,10 @@ def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     values = np.array([p.value for p in file.parameters])
     other = values * (1 + 1e-9)
     together = FileLevels.of(file, labels).levels(other)
-    monkeypatch.setattr(unit_blocks, "_AT_ONCE", 1)
+    monkeypatch.setattr(linear_stacks, "_AT_ONCE", 1)
     model = FileLevels.of(file, labels)
     blocks = model.solved[0].blocks
-    assert isinstance(blocks, UnitBlocks)
+    assert isinstance(blocks, LabelledBlocks)
     alone = model.levels(other)
     at_start, _ = model.levels(values)
     assert at_start == pytest.approx(alone[0], rel=2e-9)  # the step of 1e-9
@@ -153,3 +157,40 @@ def test_states_that_hardly_mix_have_one_name_by_diag_0_and_3():
         order = np.argsort(levels.energy_mhz)
         names.append(np.column_stack([levels.quanta[name] for name in ("j", "ka", "kc", "v")])[order])
     assert (names[0] == names[1]).all()
+
+
+def norms(blocks) -> np.ndarray:
+    """Twice the largest energy of each block: a bound of the norm of its matrix and of what was taken off its diagonal."""
+    return np.concatenate([np.full(len(b.energies_mhz), 2 * np.abs(b.energies_mhz).max()) for b in blocks])
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_linear_blocks_have_the_energies_and_slopes_of_the_solved_blocks(name):
+    """Energies at the values of the parameters within 32 eps ||H_b||; Σ c ∂E/∂c = E since H is linear in all of them."""
+    file = read_par(THREE.format(options=OPTIONS[name]).encode())
+    group = groups_for_fit(file)[0]
+    levels = group.levels((0, 24))
+    values = group.effect.parameters(group.top)
+    linear = linear_blocks_of(group.top, levels, tuple(values), levels.blocks)
+    energies = np.empty(len(levels))
+    for numbers in stack_numbers(linear):
+        solved = LinearStack.of([linear[i] for i in numbers.tolist()]).solved(
+            np.array(list(values.values())), Workspace()
+        )
+        for place, block in enumerate(levels.blocks[i] for i in numbers.tolist()):
+            size = len(block.energies_mhz)
+            energies[block.start : block.start + size] = solved.energies[place, :size]
+    allowed = 32 * np.finfo(float).eps * norms(levels.blocks)  # round-off of sums of the terms and of the solver
+    assert (np.abs(energies - levels.energy_mhz) <= allowed).all()
+    slopes = level_derivatives(group.top, levels)
+    assert (np.abs(slopes @ list(values.values()) - levels.energy_mhz) <= allowed).all()
+
+
+def test_slopes_of_some_parameters_are_those_of_all():
+    file = read_par(THREE.format(options=OPTIONS["prolate"]).encode())
+    group = groups_for_fit(file)[0]
+    levels = group.levels((0, 10))
+    names = tuple(group.effect.parameters(group.top))
+    some, rows = names[4:7] + names[-3:], np.arange(0, len(levels), 3)
+    slopes = level_derivatives(group.top, levels, names)[rows][:, [names.index(name) for name in some]]
+    assert level_derivatives(group.top, levels, some, rows) == pytest.approx(slopes, rel=1e-12)  # order of sums

@@ -1,7 +1,7 @@
 """Chosen levels of a top with further states or with spins, and their derivatives by its named constants.
 
 The Hamiltonian is that of `rotor.quantum.effects.of_top`, the same that predictions have. Only the J or F are solved in which a line
-has a level: connected Wang blocks of states (`state_units`), blocks of an F (`labelled_spins`), or, where nothing connects the states
+has a level: connected Wang blocks of states (`labelled_states`), blocks of an F (`labelled_spins`), or, where nothing connects the states
 of a symmetric top, E = Σ c ∂E/∂c, which is exact.
 """
 
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.estimates.state_units import state_units
-from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
+from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
+from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
@@ -36,7 +36,7 @@ class TopLevels(LevelModel):
 
     names: tuple[str, ...]
     count: int
-    parts: tuple[tuple[Ints, UnitBlocks | ContractedLevels], ...]
+    parts: tuple[tuple[Ints, LabelledBlocks | ContractedLevels], ...]
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
@@ -97,7 +97,7 @@ def _text(constants: TopConstants, label: Ints) -> str:
 def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
     asked = np.column_stack([columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]])
     values = np.array(list(begin.values.values()))
-    blocks = state_units(begin.top, begin.effects, names, asked, values)
+    blocks = labelled_states(begin.top, begin.effects, names, asked, values)
     missing = np.ones(len(labels), dtype=bool)
     missing[blocks.found] = False
     _refuse(begin, labels, missing)
@@ -120,14 +120,14 @@ def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names
     for one in found:
         missing[one.rows] = False
     _refuse(begin, labels, missing)
-    whole = [(one.blocks, one.rows, every) for one in found if isinstance(one.blocks, UnitBlocks)]
-    parts: list[tuple[Ints, UnitBlocks | ContractedLevels]] = []
+    whole = [(one.blocks, one.rows, every) for one in found if isinstance(one.blocks, LabelledBlocks)]
+    parts: list[tuple[Ints, LabelledBlocks | ContractedLevels]] = []
     if whole:
         rows = np.concatenate([own for _, own, _ in whole])
         starts = np.cumsum([0, *(len(own) for _, own, _ in whole)])
         moved = [(one[0], np.arange(a, b), every) for one, a, b in zip(whole, starts, starts[1:], strict=False)]
         parts.append((rows, joined(moved, len(rows))))
-    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, UnitBlocks)]
+    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, LabelledBlocks)]
     return TopLevels(names, len(labels), tuple(parts))
 
 

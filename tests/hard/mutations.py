@@ -160,7 +160,7 @@ MUTATIONS = (
         "tests/test_least_squares.py::test_what_is_not_determined_is_named",
     ),
     Mutation(
-        18, "rotor/quantum/estimates/unit_blocks.py",
+        18, "rotor/quantum/label_tracking.py",
         "        if not moved.any():", "        if True:",
         "tests/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
     ),

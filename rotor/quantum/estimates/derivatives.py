@@ -13,19 +13,19 @@ The states of all blocks go through this at once, one row a state.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import CoupledBlock, elements_between
+from rotor.arrays import Floats, Workspace, distinct
+from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.levels import Levels, MomentBlock
-from rotor.quantum.states import OperatorOfJ, State
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
@@ -130,98 +130,26 @@ def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str,
     return found
 
 
-class _PartsOfStates(NamedTuple):
-    """The parts of coupled blocks in one state v as levels without couplings: a row for each state of a block and each part.
-
-    blocks : with `basis`, `vectors` of the part (functions, states) and `start`. rotational : J. of_level : (rows,) row of the level
-    """
-
-    blocks: tuple[_PartOfStates, ...]
-    rotational: Ints
-    of_level: Ints
-
-
-class _PartOfStates(NamedTuple):
-    basis: WangBlock
-    vectors: Floats
-    start: int
-
-
-def _parts_of(levels: Levels, v: int) -> _PartsOfStates:
-    found, of_level, start = [], [], 0
-    for block in levels.blocks:
-        count = len(block.energies_mhz)
-        for part in (part for part in block.parts if part.v == v):
-            found.append(_PartOfStates(part.basis, block.vectors[part.place], start))
-            of_level.append(np.arange(block.start, block.start + count))
-            start += count
-    rows = np.concatenate(of_level) if of_level else np.zeros(0, dtype=np.int64)
-    return _PartsOfStates(tuple(found), levels.rotational[rows], rows)
-
-
 def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """⟨i|∂H/∂c|i⟩ of coupled blocks: powers of J within each state for all blocks at once, other operators block by block."""
-    out, place = np.zeros((len(levels), len(names))), {name: column for column, name in enumerate(names)}
-    for state in (one for effect in levels.effects for one in (State(0, effect.operators(top)), *effect.states(top))):
-        terms = {name: operators for name, operators in state.terms.items() if name in place and operators}
-        powers = sorted({each for operators in terms.values() for each in operators})
-        parts = _parts_of(levels, state.v)
-        if not powers or not parts.blocks:
-            continue
-        expectations = _of_parts(parts, powers)
-        factors = np.array([[operators.get(each, 0.0) for operators in terms.values()] for each in powers])
-        columns = np.array([place[name] for name in terms])
-        np.add.at(out, (parts.of_level[:, None], columns), expectations @ factors)
-    for effect in levels.effects:
-        links = [(one.name, one.bra, one.ket, one.operator) for one in effect.couplings(top) if one.name in place]
-        own = [name for name in effect.parameters(top) if name in place]
-        _add_links(out, top, levels, effect, links, own, place)
-    return out[rows]
-
-
-def _of_parts(parts: _PartsOfStates, powers: Sequence[Powers]) -> Floats:
-    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ of the parts, (rows, powers)."""
-    j = parts.rotational.astype(float)
-    of_basis = np.repeat(
-        [part.basis.first_k % 2 for part in parts.blocks], [part.vectors.shape[1] for part in parts.blocks]
-    )
-    by_k, terms = np.empty((len(j), len(powers))), [(q, n) for _, q, n in powers]
-    step = max(1, _AT_ONCE // (int(parts.rotational.max(initial=0)) // 2 + 1))
-    for odd in (0, 1):
-        places = np.flatnonzero(of_basis == odd)
-        for start in range(0, len(places), step):
-            chosen = places[start : start + step]
-            by_k[chosen] = _of_one_parity(parts, terms, chosen, odd)
-    return np.asarray(by_k * np.stack([(j * (j + 1)) ** p for p, _, _ in powers], axis=1))
-
-
-def _add_links(
-    out: Floats,
-    top: Top,
-    levels: Levels,
-    effect: QuantumEffect,
-    links: Sequence[tuple[str, int, int, OperatorOfJ]],
-    own: Sequence[str],
-    place: Mapping[str, int],
-) -> None:
-    """Adds the derivatives by couplings, and by operators of the top's own state that no powers describe."""
-    representation = str(levels.representation)
-    for j in distinct(np.array([block.j for block in levels.blocks])).tolist():
-        operators = [(place[name], bra, ket, of(j, representation)) for name, bra, ket, of in links]
-        operators += [
-            (place[name], 0, 0, operator)
-            for name in own
-            if (operator := effect.j_operator(top, name, j, representation))
-        ]
-        if not operators:
-            continue
-        for block in (block for block in levels.blocks if block.j == j):
-            states = slice(block.start, block.start + len(block.energies_mhz))
-            for column, bra, ket, operator in operators:
-                for up, low, element in elements_between(block, bra, ket, operator):
-                    moved = element @ block.vectors[low.place]
-                    twice = 1.0 if bra == ket else 2.0
-                    out[states, column] += twice * np.einsum("in,in->n", block.vectors[up.place], moved)
+    """⟨i|∂H/∂c|i⟩ of coupled blocks, as their linear blocks have it."""
+    starts = np.array([block.start for block in levels.blocks])
+    blocks = [levels.blocks[i] for i in distinct(np.searchsorted(starts, rows, side="right") - 1).tolist()]
+    linear = linear_blocks_of(top, levels, names, blocks)
+    out, space = (
+        np.zeros((len(levels) + 1, len(names) + 1)),
+        Workspace(),
+    )  # the last row and column are those of padding
+    for numbers in stack_numbers(linear):
+        stack = LinearStack.of([linear[i] for i in numbers.tolist()])
+        vectors = np.zeros((len(numbers), stack.size, stack.size))
+        own = np.full((len(numbers), stack.size), len(levels))
+        for place, block in enumerate(blocks[i] for i in numbers.tolist()):
+            size = len(block.energies_mhz)
+            vectors[place, :size, :size] = block.vectors
+            own[place, :size] = block.start + np.arange(size)
+        states = np.tile(np.arange(stack.size), (len(numbers), 1))
+        out[own[:, :, None], stack.parameters[:, None, :]] = stack.slopes(vectors, states, space)
+    return out[rows, :-1]
 
 
 def _of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
@@ -274,7 +202,7 @@ def _pieces(levels: Levels, rows: Rows, odd: int) -> Iterator[NDArray[np.intp]]:
         yield places[start : start + step]
 
 
-def _of_one_parity(levels: Levels | _PartsOfStates, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
+def _of_one_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
     margin = 2 * max((n for _, n in terms), default=0)  # K from -margin + odd on: pairs across K = 0 are at hand
     states = _signed_coefficients(levels, rows, odd, margin)
     k: Floats = odd - margin + 2 * np.arange(states.shape[1], dtype=np.float64)
@@ -306,7 +234,7 @@ def _pair_weights(states: Floats, j: Floats, k: Floats, n: int) -> Floats:
     return weights * np.where(low > -n, 2.0, np.where(low == -n, 1.0, 0.0))
 
 
-def _signed_coefficients(levels: Levels | _PartsOfStates, rows: Rows, odd: int, margin: int) -> Floats:
+def _signed_coefficients(levels: Levels, rows: Rows, odd: int, margin: int) -> Floats:
     """a_K of states over K = odd - margin, ..., zero beyond each J: (a_K = v_K/√2, a_0 = v_0, a_{-K} = s a_K)."""
     starts = np.array([b.start for b in levels.blocks])
     block_of = np.searchsorted(starts, rows, side="right") - 1

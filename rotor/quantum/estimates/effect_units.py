@@ -1,7 +1,7 @@
 """The unit matrices of an effect's parameters over the blocks in which labelled levels lie, with spins and states or without.
 
 The levels are solved once as the core solves them; the blocks that have a label are then made anew over the functions of the
-basis, one matrix for each parameter (`unit_blocks`).
+basis, linear in their parameters (`linear_stacks`).
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import CoupledBlock, parameter_matrix
+from rotor.quantum.basis.state_elements import WangElements, linear_blocks_of, vertices_of, wang_elements
+from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.state_units import WangElements, by_overlaps, wang_elements
-from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
-from rotor.quantum.estimates.unit_matrices import (
-    Elements,
+from rotor.quantum.label_tracking import (
+    Follows,
+    LabelledBlocks,
+    NamedBlock,
     NamedFunctions,
     Namer,
     Naming,
-    UnitBlock,
-    WeightedElements,
-    elements_of,
-    unit_block,
+    tracked_blocks,
 )
+from rotor.quantum.labelled_states import by_overlaps
 from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.linear_stacks import Elements, LinearBlock, WeightedElements, elements_of, linear_block
 from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
 from rotor.quantum.spins.lines import Declared, ParameterOperator
-from rotor.quantum.spins.operators import AxialState, Basis, Scalar
+from rotor.quantum.spins.operators import AxialState, Basis
 from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel, RotorBlock
 from rotor.quantum.spins.three_equivalent import labels_of_functions
@@ -53,7 +53,7 @@ def unit_levels(
     values_mhz: Floats,
     functions: Functions | None = None,
     naming: Naming | None = None,
-) -> UnitBlocks:
+) -> LabelledBlocks:
     """The blocks in which the rows of levels lie, for other values of the parameters.
 
     Parameters
@@ -62,7 +62,7 @@ def unit_levels(
     levels : Levels
         Solved with vectors, at values near those of the parameters.
     rows : (n,) array
-        Rows of levels, in the order in which `UnitBlocks.levels` gives them.
+        Rows of levels, in the order in which `LabelledBlocks.levels` gives them.
     names : sequence of str
         Parameters of the effects of the levels, in the order of the values.
     values_mhz : (parameters,) array
@@ -76,7 +76,7 @@ def unit_levels(
 
     Returns
     -------
-    UnitBlocks
+    LabelledBlocks
 
     Raises
     ------
@@ -90,7 +90,7 @@ def unit_levels(
     numbers = distinct(of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
     makers = _Makers(top, levels, names, blocks, functions, naming)
-    units = [makers.unit(block) for block in blocks]
+    units = [makers.unit(number, block) for number, block in enumerate(blocks)]
     inside = [np.flatnonzero(of_row == number) for number in numbers]
 
     def find(place: int, found: Ints) -> tuple[Ints, Ints]:
@@ -129,7 +129,7 @@ def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
 
 
 class _Makers:
-    """Unit matrices of solved blocks of any kind, with what they share."""
+    """Linear blocks of solved blocks of any kind, with what they share."""
 
     def __init__(
         self,
@@ -140,65 +140,47 @@ class _Makers:
         functions: Functions | None,
         naming: Naming | None,
     ) -> None:
-        self._functions, self._naming = functions, naming
-        self._top, self._effects, self._names = top, levels.effects, tuple(names)
-        self._representation = str(levels.representation)
+        self._functions, self._naming, self._representation = functions, naming, str(levels.representation)
         self._spins: _SpinUnits | None = None
+        self._states: list[LinearBlock] = []
         if isinstance(blocks[0], SpinBlock):
-            self._spins = _SpinUnits(top, levels.effects, self._names, blocks, apart=functions is None)
+            self._spins = _SpinUnits(top, levels.effects, tuple(names), blocks, apart=functions is None)
+        else:
+            self._states = linear_blocks_of(top, levels, names, blocks)
 
-    def unit(self, block: Any) -> UnitBlock:
-        """The unit matrices of one block."""
+    def unit(self, number: int, block: Any) -> NamedBlock:
+        """One block, and how its states get their names."""
         if isinstance(block, SpinBlock):
             assert self._spins is not None
             if self._functions:
-                return _turned(self._spins.matrices(block), *self._functions(block))
+                size = block.parts[-1].place.stop
+                return _turned(linear_block(size, self._spins.matrices(block)), *self._functions(block))
             return self._spins.unit(block)
-        return self._coupled(block) if isinstance(block, CoupledBlock) else self._single(block)
-
-    def _single(self, block: SolvedBlock) -> UnitBlock:
-        dense: dict[int, Floats] = {}
-        for place, name in enumerate(self._names):
-            for effect in self._effects:
-                operators = effect.operators(self._top).get(name)
-                if operators:
-                    found = Scalar(tuple(operators.items())).elements(block.basis, block.basis, self._representation)
-                    if found is not None:
-                        dense[place] = dense[place] + found if place in dense else found
-        units = {place: elements_of(matrix) for place, matrix in dense.items()}
-        if self._naming:
-            return _named(units, self._naming([(0, block.basis)], self._representation))
-        return unit_block(units, np.zeros(block.basis.size, dtype=np.int64), _by_rank)
-
-    def _coupled(self, block: CoupledBlock) -> UnitBlock:
-        units: Units = {}
-        for place, name in enumerate(self._names):
-            found = parameter_matrix(self._top, self._effects, self._representation, block, name)
-            if found.any():
-                units[place] = elements_of(found)
+        linear = self._states[number]
         if self._functions:
-            return _turned(units, *self._functions(block))
-        named = self._naming or by_overlaps
-        return _named(units, named([(part.v, part.basis) for part in block.parts], self._representation))
+            return _turned(linear, *self._functions(block))
+        if self._naming:
+            return NamedBlock(linear, self._naming(vertices_of(block), self._representation))
+        if isinstance(block, SolvedBlock):
+            return NamedBlock(linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY))
+        return NamedBlock(linear, by_overlaps(vertices_of(block), self._representation))
 
 
-def _named(units: Units, named: NamedFunctions) -> UnitBlock:
-    return unit_block(units, named.sub_blocks, named.namer, follows=named.follows)
-
-
-def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:
+def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
     """The block over other functions, each of a state by itself: the sub-blocks are their v, the parity of Ka and the pattern."""
     turned = {}
-    for place, (places, values) in units.items():
+    matrices = block.factors @ block.mix
+    for place, parameter in enumerate(block.parameters.tolist()):
         lower = np.zeros(functions.shape)
-        lower.ravel()[places] = values
-        turned[place] = elements_of(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
+        lower[block.rows, block.columns] = matrices[:, place]
+        turned[parameter] = elements_of(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return np.asarray(names[assigned(vectors**2, np.ones(len(names), dtype=np.int64))])
 
     members = np.column_stack([names[:, 0], names[:, 1] % 2, names[:, 3:]])
-    return unit_block(turned, np.unique(members, axis=0, return_inverse=True)[1].reshape(-1), namer)
+    sub_blocks = np.unique(members, axis=0, return_inverse=True)[1].reshape(-1)
+    return NamedBlock(linear_block(len(names), turned), NamedFunctions(sub_blocks, namer, Follows.MOSTLY))
 
 
 def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -239,13 +221,17 @@ class _SpinUnits:
                 units[place] = elements_of(_of_allowed(matrix, block.allowed) if block.allowed else matrix)
         return units
 
-    def unit(self, block: SpinBlock) -> UnitBlock:
+    def unit(self, block: SpinBlock) -> NamedBlock:
         """The unit matrices of one block of an F, the functions of the basis in place of the states of the rotation."""
         parts, units = tuple(_in_functions(part) for part in block.parts), self.matrices(block)
         if block.allowed:
-            return unit_block(units, block.allowed.sub_block, _namer_of_allowed(block.allowed))
+            allowed = block.allowed
+            linear = linear_block(len(allowed.sub_block), units)
+            return NamedBlock(linear, NamedFunctions(allowed.sub_block, _namer_of_allowed(allowed), Follows.MOSTLY))
         more = self._rotation.of_parts(parts) if self._rotation else None
-        return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns), more)
+        size = parts[-1].place.stop
+        named = NamedFunctions(_sub_blocks(parts, size), _namer(parts, block.patterns), Follows.MOSTLY)
+        return NamedBlock(linear_block(size, units, more), named)
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
         out: Floats | None = None

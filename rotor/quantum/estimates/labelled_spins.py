@@ -13,7 +13,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
-from rotor.quantum.estimates.unit_blocks import UnitBlocks
+from rotor.quantum.label_tracking import LabelledBlocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.scheme import scheme_of
@@ -30,7 +30,7 @@ class FoundLevels(NamedTuple):
     """Labels by their places among all, and the blocks in which they lie."""
 
     rows: Ints
-    blocks: UnitBlocks | ContractedLevels
+    blocks: LabelledBlocks | ContractedLevels
 
 
 def found_with_spins(

@@ -27,9 +27,9 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import found_with_spins
-from rotor.quantum.estimates.state_units import state_units
-from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
+from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
+from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.levels import levels_of_f
@@ -71,7 +71,7 @@ class _Solved(NamedTuple):
 
     rows: Ints
     columns: Ints
-    blocks: UnitBlocks | ContractedLevels
+    blocks: LabelledBlocks | ContractedLevels
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,8 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
 
 def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
     """The parts of all groups that are solved block by block as one, so that blocks of one size are worked on together."""
-    some = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, UnitBlocks)]
-    others = [part for part in parts if not isinstance(part.blocks, UnitBlocks)]
+    some = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, LabelledBlocks)]
+    others = [part for part in parts if not isinstance(part.blocks, LabelledBlocks)]
     if not some:
         return others
     rows = np.concatenate([rows for _, rows, _ in some])
@@ -200,7 +200,7 @@ def _of_states(
     columns, start = _columns_of(group, names, values)
     asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
     naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
-    blocks = state_units(group.top, (group.effect,), own, asked, start, naming)
+    blocks = labelled_states(group.top, (group.effect,), own, asked, start, naming)
     found = np.sort(blocks.found)
     if not len(found):
         return []

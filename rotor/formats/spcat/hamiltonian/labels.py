@@ -29,7 +29,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
 from rotor.quantum.coupled import CoupledBlock
-from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming
+from rotor.quantum.label_tracking import Follows, NamedFunctions, Naming
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned

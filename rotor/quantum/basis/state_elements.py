@@ -1,28 +1,26 @@
-"""The unit matrices of several states' parameters over the connected Wang blocks in which labels lie, without spins.
+"""Elements of Hamiltonians of states without spins over connected Wang blocks, linear in their parameters.
 
-Labels are J, v, Ka, Kc. Nothing is solved to find them: which block a label lies in follows from J, v and the parities of Ka and Kc,
-and which state it is from the names that its block has at the start. The elements of ½[Jz^2q, J₊^2n + J₋^2n]₊ in the Wang blocks of
-every J are made at once, in whole arrays; every state has the same, times X^p and the factors of its parameters. Only blocks with a
-label are made. `effect_units` does the same for levels that have been solved, with spins too.
+The elements of ½[Jz^2q, J₊^2n + J₋^2n]₊ in the Wang blocks of every J are made at once, in whole arrays; every state has the same, times
+X^p and the factors of its parameters. Couplings of states, and operators of J that no powers describe, are a unit matrix each. Fits
+(`labelled_states`) and derivatives of levels take their blocks from here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_functions, names_of_states, parts_of
-from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
-from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming, UnitBlock, members_of, numbered
+from rotor.arrays import Floats, Ints
+from rotor.quantum.coupled import NOTHING, CoupledBlock, Part, parts_of
+from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.label_blocks import unit_diagonals
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.linear_stacks import LinearBlock, numbered
 from rotor.quantum.states import OperatorOfJ, State
-from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
+from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
-from rotor.quantum.wang.rotation import representation_of
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -49,7 +47,7 @@ class _Link(NamedTuple):
     operator: OperatorOfJ
 
 
-class _Terms(NamedTuple):
+class StateTerms(NamedTuple):
     """What parameters, by their places, multiply.
 
     powers : (q, n) of the unit matrices of every state, the first (0, 0); that of state v has the number first[v] + its place here
@@ -66,7 +64,7 @@ class _Terms(NamedTuple):
     links: tuple[_Link, ...]
 
     @classmethod
-    def of(cls, top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], representation: str) -> _Terms:
+    def of(cls, top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], representation: str) -> StateTerms:
         place = {name: i for i, name in enumerate(names)}
         own = [state for effect in effects for state in (State(0, effect.operators(top)), *effect.states(top))]
         found = {(q, n) for state in own for operators in state.terms.values() for _, q, n in operators}
@@ -76,10 +74,13 @@ class _Terms(NamedTuple):
             (first[state.v] + powers.index((q, n)), place[name], p, factor)
             for state in own
             for name, operators in state.terms.items()
+            if name in place
             for (p, q, n), factor in operators.items()
         ]
         links = list[_Link]()
         for name, bra, ket, operator in _links(top, effects, representation):
+            if name not in place:
+                continue
             links.append(_Link(len(first) * len(powers) + len(links), bra, ket, operator))
             terms.append((links[-1].unit, place[name], 0, 1.0))
         rows, columns, p = np.array([term[:3] for term in terms], dtype=np.int64).reshape(-1, 3).T
@@ -111,80 +112,6 @@ def _of_effect(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
         return made
 
     return operator
-
-
-def state_units(
-    top: Top,
-    effects: Sequence[QuantumEffect],
-    names: Sequence[str],
-    labels: Ints,
-    values_mhz: Floats,
-    naming: Naming | None = None,
-) -> UnitBlocks:
-    """The blocks in which labels lie, for any values of the parameters.
-
-    Parameters
-    ----------
-    top : Top
-        Kind and representation count.
-    effects : sequence of QuantumEffect
-        What the Hamiltonian consists of: operators, states and couplings, no spins.
-    names : sequence of str
-        Parameters of the effects, in the order of the values.
-    labels : (n, 4) array
-        J, v, Ka, Kc.
-    values_mhz : (parameters,) array
-        At which states are named.
-    naming : callable, optional
-        How the states of connected Wang blocks get their names; by overlaps, see `names_of_states`, where it is None.
-
-    Returns
-    -------
-    UnitBlocks
-        `found` has the places of the labels that are levels.
-
-    Raises
-    ------
-    ValueError
-        For a Hamiltonian that is not finite, or not invariant under time reversal.
-    """
-    representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
-    terms = _Terms.of(top, effects, names, representation)
-    of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
-    whole = {j: wang_blocks(j, representation) for j in of_j}
-    vertices = {
-        j: [(v, cut) for v in sorted(terms.first) for block in whole[j] if (cut := _within(block, limits.get(v)))]
-        for j in of_j
-    }
-    elements = wang_elements({block for some in vertices.values() for _, block in some}, terms.powers)
-
-    blocks, inside, joining = list[UnitBlock](), list[Ints](), _Joining(terms.links, representation)
-    for j, rows in sorted(of_j.items(), reverse=True):
-        mix, links = terms.mix(j, len(names)), joining.elements(vertices[j], j)
-        asked = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
-        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in links]):
-            own = {(vertices[j][i][0], vertices[j][i][1].species) for i in members}
-            if own & asked:
-                parts = parts_of([vertices[j][i] for i in members])
-                place = dict(zip(members, parts, strict=True))
-                found = [_shifted(elements[part.basis], part, terms.first[part.v]) for part in parts]
-                found += [_between(one, place[i], place[k]) for i, k, one in links if i in place]
-                blocks.append(
-                    _block(found, mix, parts[-1].place.stop, named([vertices[j][i] for i in members], representation))
-                )
-                inside.append(rows)
-
-    def find(number: int, made: Ints) -> tuple[Ints, Ints]:
-        state_of = {tuple(name): state for state, name in enumerate(made.tolist())}
-        rows = inside[number]
-        states = np.array([state_of.get(tuple(name), -1) for name in labels[rows, 1:].tolist()], dtype=np.int64)
-        return rows[states >= 0], states[states >= 0]
-
-    return tracked_blocks(blocks, len(labels), find, values_mhz)
-
-
-def _within(block: WangBlock, limits: tuple[int, int] | None) -> WangBlock | None:
-    return limited(block, *limits) if limits else block
 
 
 def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, WangElements]:
@@ -270,28 +197,73 @@ def _between(elements: WangElements, up: Part, low: Part) -> WangElements:
     return WangElements(rows[lower], columns[lower], elements.units[lower], elements.values[lower])
 
 
-def _block(found: Sequence[WangElements], mix: Floats, size: int, named: NamedFunctions) -> UnitBlock:
-    rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
-    places, of_place = numbered(rows * size + columns, size * size)
-    used, of_unit = numbered(units, len(mix))
-    factors = np.zeros((len(places), len(used)))
-    np.add.at(factors, (of_place, of_unit), values)
-    of_used = mix[used]
-    parameters = np.flatnonzero(of_used.any(axis=0))
-    members = members_of(named.sub_blocks)
-    return UnitBlock(
-        size, *np.divmod(places, size), factors, of_used[:, parameters], parameters, members, named.namer, named.follows
-    )
+class StateElements:
+    """Linear blocks over Wang blocks of states: `vertices` by J, each a state v and one of its Wang blocks."""
+
+    def __init__(
+        self,
+        top: Top,
+        effects: Sequence[QuantumEffect],
+        names: Sequence[str],
+        representation: str,
+        vertices: Mapping[int, Sequence[Vertex]],
+    ) -> None:
+        """names: parameters of the effects, in the order of their values."""
+        self.terms, self._count = StateTerms.of(top, effects, names, representation), len(names)
+        self._vertices, self._joining = vertices, _Joining(self.terms.links, representation)
+        self._elements = wang_elements({block for some in vertices.values() for _, block in some}, self.terms.powers)
+
+    def of_j(self, j: int) -> ElementsOfJ:
+        """Those of one J; the highest J come first."""
+        links = self._joining.elements(self._vertices[j], j)
+        return ElementsOfJ(self._vertices[j], links, self.terms.mix(j, self._count), self.terms.first, self._elements)
 
 
-def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:
-    """Names of states by their overlaps with those of each Wang block by itself."""
-    parts = parts_of(blocks)
-    sub_blocks = np.repeat(np.arange(len(parts)), [part.basis.size for part in parts])
+class ElementsOfJ(NamedTuple):
+    """Elements between the Wang blocks of one J: links by numbers of vertices; mix (units, parameters)."""
 
-    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        if len(parts) == 1:
-            return names_of_functions(parts, representation)
-        return names_of_states(parts, matrix, vectors, representation)[0]  # of the matrix the lower triangle is read
+    vertices: Sequence[Vertex]
+    links: list[tuple[int, int, WangElements]]
+    mix: Floats
+    first: dict[int, int]
+    of_wang: dict[WangBlock, WangElements]
 
-    return NamedFunctions(sub_blocks, namer, Follows.MOSTLY)
+    def block(self, members: Sequence[int]) -> LinearBlock:
+        """The block of some vertices, one behind the other."""
+        parts = parts_of([self.vertices[i] for i in members])
+        place = dict(zip(members, parts, strict=True))
+        found = [_shifted(self.of_wang[part.basis], part, self.first[part.v]) for part in parts]
+        found += [_between(one, place[i], place[k]) for i, k, one in self.links if i in place and k in place]
+        rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
+        size = parts[-1].place.stop
+        places, of_place = numbered(rows * size + columns, size * size)
+        used, of_unit = numbered(units, len(self.mix))
+        factors = np.zeros((len(places), len(used)))
+        np.add.at(factors, (of_place, of_unit), values)
+        mix = self.mix[used]
+        parameters = np.flatnonzero(mix.any(axis=0))
+        return LinearBlock(size, *np.divmod(places, size), factors, mix[:, parameters], parameters)
+
+
+def vertices_of(block: SolvedBlock | CoupledBlock) -> list[Vertex]:
+    """The states and Wang blocks of a solved block."""
+    return [(0, block.basis)] if isinstance(block, SolvedBlock) else [(part.v, part.basis) for part in block.parts]
+
+
+def linear_blocks_of(
+    top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[SolvedBlock | CoupledBlock]
+) -> list[LinearBlock]:
+    """The linear blocks of solved blocks of levels, over the functions that their vectors have."""
+    by_j: dict[int, list[int]] = {}
+    for number, block in enumerate(blocks):
+        by_j.setdefault(vertices_of(block)[0][1].j, []).append(number)
+    vertices = {j: [vertex for i in numbers for vertex in vertices_of(blocks[i])] for j, numbers in by_j.items()}
+    elements = StateElements(top, levels.effects, names, str(levels.representation), vertices)
+    out: dict[int, LinearBlock] = {}
+    for j in sorted(by_j, reverse=True):
+        here, start = elements.of_j(j), 0
+        for number in by_j[j]:
+            stop = start + len(vertices_of(blocks[number]))
+            out[number] = here.block(range(start, stop))
+            start = stop
+    return [out[number] for number in range(len(blocks))]

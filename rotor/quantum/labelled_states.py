@@ -1,0 +1,102 @@
+"""Labelled levels of states without spins, for parameters that change: linear blocks of connected Wang blocks.
+
+Labels are J, v, Ka, Kc. Nothing is solved to find them: which block a label lies in follows from J, v and the parities of Ka and Kc,
+and which state it is from the names that its block has at the start. Only blocks with a label are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints, distinct
+from rotor.quantum.basis.state_elements import StateElements, Vertex
+from rotor.quantum.coupled import connected_parts, names_of_functions, names_of_states, parts_of
+from rotor.quantum.effect import QuantumEffect, k_limits_of
+from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
+from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
+from rotor.quantum.wang.rotation import representation_of
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+def labelled_states(
+    top: Top,
+    effects: Sequence[QuantumEffect],
+    names: Sequence[str],
+    labels: Ints,
+    values_mhz: Floats,
+    naming: Naming | None = None,
+) -> LabelledBlocks:
+    """The blocks in which labels lie, for any values of the parameters.
+
+    Parameters
+    ----------
+    top : Top
+        Kind and representation count.
+    effects : sequence of QuantumEffect
+        What the Hamiltonian consists of: operators, states and couplings, no spins.
+    names : sequence of str
+        Parameters of the effects, in the order of the values.
+    labels : (n, 4) array
+        J, v, Ka, Kc.
+    values_mhz : (parameters,) array
+        At which states are named.
+    naming : callable, optional
+        How the states of connected Wang blocks get their names; by overlaps, see `names_of_states`, where it is None.
+
+    Returns
+    -------
+    LabelledBlocks
+        `found` has the places of the labels that are levels.
+
+    Raises
+    ------
+    ValueError
+        For a Hamiltonian that is not finite, or not invariant under time reversal.
+    """
+    representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
+    of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
+    states = sorted({0, *(state.v for effect in effects for state in effect.states(top))})
+    whole = {j: wang_blocks(j, representation) for j in of_j}
+    vertices = {
+        j: [(v, cut) for v in states for block in whole[j] if (cut := _within(block, limits.get(v)))] for j in of_j
+    }
+    elements = StateElements(top, effects, names, representation, vertices)
+    blocks, inside = list[NamedBlock](), list[Ints]()
+    for j, rows in sorted(of_j.items(), reverse=True):
+        here = elements.of_j(j)
+        asked = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
+        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
+            own = [vertices[j][i] for i in members]
+            if {(v, block.species) for v, block in own} & asked:
+                blocks.append(NamedBlock(here.block(members), named(own, representation)))
+                inside.append(rows)
+
+    def find(number: int, made: Ints) -> tuple[Ints, Ints]:
+        state_of = {tuple(name): state for state, name in enumerate(made.tolist())}
+        rows = inside[number]
+        states = np.array([state_of.get(tuple(name), -1) for name in labels[rows, 1:].tolist()], dtype=np.int64)
+        return rows[states >= 0], states[states >= 0]
+
+    return tracked_blocks(blocks, len(labels), find, values_mhz)
+
+
+def _within(block: WangBlock, limits: tuple[int, int] | None) -> WangBlock | None:
+    return limited(block, *limits) if limits else block
+
+
+def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:
+    """Names of states by their overlaps with those of each Wang block by itself."""
+    parts = parts_of(blocks)
+    sub_blocks = np.repeat(np.arange(len(parts)), [part.basis.size for part in parts])
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        if len(parts) == 1:
+            return names_of_functions(parts, representation)
+        return names_of_states(parts, matrix, vectors, representation)[0]  # of the matrix the lower triangle is read
+
+    return NamedFunctions(sub_blocks, namer, Follows.MOSTLY)

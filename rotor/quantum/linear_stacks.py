@@ -1,0 +1,207 @@
+"""Blocks of a Hamiltonian that is linear in its parameters, H_b = Σ c_i O_i,b, of like size side by side.
+
+The O_i,b over the functions of a block are taken as their elements that are not zero, the same places for all parameters. Parameters
+that multiply one matrix times a number each (B, D_J and H_J at one J) share its elements, O_i = Σ_u M_ui U_u. Blocks of like size stand in
+one array, padded, so that new constants cost some products of arrays, one diagonalisation a block, and
+
+    ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r* v_c
+
+more products for the states that are asked for. `blocks` finds the blocks of an operator algebra, `basis.state_elements` and
+`estimates.effect_units` write those of states and spins, `label_tracking` follows named states while constants change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints, Workspace
+
+_AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
+_LIKE = 1.5  # sizes of blocks that stand side by side
+
+
+class LinearBlock(NamedTuple):
+    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, units), and what the parameters
+    `parameters` have of each unit, mix (units, parameters)."""
+
+    size: int
+    rows: Ints
+    columns: Ints
+    factors: NDArray[Any]
+    mix: Floats
+    parameters: Ints
+
+
+class SolvedStack(NamedTuple):
+    """Blocks side by side: all matrices (lower triangles, less `zero` on the diagonal) one behind the other, energies (blocks, size), NaN
+    beyond a block, vectors (blocks, size, size), 0 beyond a block."""
+
+    matrices: Floats
+    energies: Floats
+    vectors: Floats
+
+
+class LinearStack(NamedTuple):
+    """Blocks of like size, in order of size, side by side, padded with elements that are 0.
+
+    size, sizes : of the largest block, of each
+    runs : of blocks of one size the first, the one behind the last, and the size
+    offsets (blocks + 1,) : where each matrix begins, all of them one behind the other
+    places (blocks, elements) : in all matrices, the place behind them where padded
+    diagonal : the places of all diagonals
+    rows, columns (blocks, elements) : as of the blocks, counted through all of them, `size` for each
+    half, factors, mix, parameters : half is 1 on the diagonal, else 1/2, and factors are those of the blocks over it; padded parameters
+    are the one behind all, whose value is 0
+    """
+
+    size: int
+    sizes: Ints
+    runs: tuple[tuple[int, int, int], ...]
+    offsets: Ints
+    places: Ints
+    diagonal: Ints
+    rows: Ints
+    columns: Ints
+    half: Floats
+    factors: Floats
+    mix: Floats
+    parameters: Ints
+
+    @classmethod
+    def of(cls, blocks: Sequence[LinearBlock]) -> LinearStack:
+        sizes = np.array([block.size for block in blocks])
+        count, size, offsets = len(blocks), int(sizes[-1]), np.cumsum([0, *(sizes**2).tolist()])
+        most, units = max(len(b.rows) for b in blocks), max(b.factors.shape[1] for b in blocks)
+        acting = max(len(b.parameters) for b in blocks)
+        places, half = np.full((count, most), offsets[-1]), np.ones((count, most))
+        rows, columns = np.zeros((2, count, most), dtype=np.int64)
+        factors, mix = np.zeros((count, most, units)), np.zeros((count, units, acting))
+        parameters = np.full((count, acting), -1)
+        for b, block in enumerate(blocks):
+            n = len(block.rows)
+            places[b, :n] = offsets[b] + block.rows * block.size + block.columns
+            rows[b, :n], columns[b, :n] = block.rows, block.columns
+            half[b, :n][block.rows != block.columns] = 0.5
+            factors[b, :n, : block.factors.shape[1]] = block.factors / half[b, :n, None]
+            mix[b, : block.mix.shape[0], : block.mix.shape[1]] = block.mix
+            parameters[b, : len(block.parameters)] = block.parameters
+        diagonal = np.concatenate([start + np.arange(n) * (n + 1) for start, n in zip(offsets, sizes, strict=False)])
+        first = size * np.arange(count)[:, None]
+        bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), count]
+        runs = tuple((i, k, int(sizes[i])) for i, k in pairwise(bounds))
+        return cls(
+            size, sizes, runs, offsets, places, diagonal, rows + first, columns + first, half, factors, mix, parameters,
+        )  # fmt: skip
+
+    def solved(self, values_mhz: Floats, space: Workspace) -> SolvedStack:
+        """A number is taken off each diagonal for the sake of digits, and added to the energies."""
+        count, size = self.rows.shape[0], self.size
+        values = np.append(values_mhz, 0.0)[self.parameters]
+        elements = (self.factors @ (self.mix @ values[:, :, None]))[:, :, 0]
+        elements *= self.half
+        whole = space.array("matrices", int(self.offsets[-1]) + 1)
+        whole.fill(0.0)
+        whole[self.places] = elements
+        if not np.isfinite(whole.sum()):
+            raise ValueError("a block of the Hamiltonian is not finite with these constants")
+        zero = whole[self.offsets[:-1]]
+        whole[self.diagonal] -= np.repeat(zero, self.sizes)
+        energies = np.full((count, size), np.nan)
+        vectors = space.array("vectors", count, size, size)
+        vectors[:, self.runs[0][2] :, :] = vectors[:, :, self.runs[0][2] :] = 0.0
+        for first, stop, n in self.runs:
+            some = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
+            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(some)
+        energies += zero[:, None]
+        return SolvedStack(whole, energies, vectors)
+
+    def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
+        """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
+        (count, most), size, elements = states.shape, self.size, self.rows.shape[1]
+        places = (size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]) + states[:, None, :]
+        chosen = vectors.ravel().take(places, out=space.array("chosen", count, size, most), mode="clip")
+        by_function = chosen.reshape(count * size, most)
+        weights = by_function.take(self.rows, axis=0, out=space.array("weights", count, elements, most), mode="clip")
+        weights *= by_function.take(self.columns, axis=0, out=space.array("others", count, elements, most), mode="clip")
+        return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
+
+
+def stack_numbers(blocks: Sequence[LinearBlock]) -> list[Ints]:
+    """Positions of the blocks that are worked on together: of like size, of like numbers of elements, of bounded memory."""
+    order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
+    out, some, least, most = list[Ints](), list[int](), 0, 0
+    for i in order:
+        block = blocks[i]
+        most = max(most, len(block.rows) * max(block.factors.shape[1], block.size))
+        if some and (block.size > _LIKE * least or (len(some) + 1) * most > _AT_ONCE):
+            out.append(np.array(some))
+            some, most = [], len(block.rows) * max(block.factors.shape[1], block.size)
+        least = block.size if not some else least
+        some.append(i)
+    return [*out, np.array(some)] if some else out
+
+
+class Elements(NamedTuple):
+    """Elements of a matrix that are not zero, of its lower triangle: places row * size + column, rising, and values."""
+
+    places: Ints
+    values: Floats
+
+
+def elements_of(matrix: Floats) -> Elements:
+    """Of a dense matrix (size, size).
+
+    >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
+    [0, 3]
+    """
+    places = np.flatnonzero(matrix)
+    rows, columns = np.divmod(places, matrix.shape[1])
+    places = places[rows >= columns]
+    return Elements(places, matrix.ravel()[places])
+
+
+class WeightedElements(NamedTuple):
+    """Elements of many matrices at once: places as of `Elements`, in any order, and factors (elements, parameters), which add up."""
+
+    places: Ints
+    factors: Floats
+
+
+def linear_block(size: int, units: dict[int, Elements], more: WeightedElements | None = None) -> LinearBlock:
+    """From the unit matrix of every parameter that acts in the block. `more`: elements of other parameters.
+
+    >>> block = linear_block(2, {3: Elements(np.array([0, 2]), np.array([1.0, 0.5]))})
+    >>> block.rows.tolist(), block.columns.tolist(), block.factors.ravel().tolist(), block.parameters.tolist()
+    ([0, 1, 1], [0, 0, 1], [1.0, 0.5, 0.0], [3])
+    """
+    given = [np.arange(size) * (size + 1), *(one.places for one in units.values()), *([more.places] if more else [])]
+    places, of_place = numbered(np.concatenate(given), size * size)
+    bounds = np.cumsum([0, *map(len, given)]).tolist()
+    count = more.factors.shape[1] if more else 1 + max(units, default=-1)
+    factors = np.zeros((len(places), count))
+    if more:
+        np.add.at(factors, of_place[bounds[-2] :], more.factors)
+    for column, start, stop in zip(units, bounds[1:], bounds[2:], strict=False):
+        factors[of_place[start:stop], column] = units[column].values
+    numbers = np.flatnonzero(factors.any(axis=0))
+    rows, columns = np.divmod(places, size)
+    return LinearBlock(size, rows, columns, factors[:, numbers], np.eye(len(numbers)), numbers)
+
+
+def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:
+    """The different ones of whole numbers from 0 to `count`, rising, and the place of each value among them.
+
+    >>> [found.tolist() for found in numbered(np.array([3, 1, 3]), 4)]
+    [[1, 3], [1, 0, 1]]
+    """
+    there = np.zeros(count, dtype=bool)
+    there[values] = True
+    found = np.flatnonzero(there)
+    place = np.empty(count, dtype=np.int64)
+    place[found] = np.arange(len(found))
+    return found, place[values]
