@@ -13,8 +13,9 @@ from rotor import units
 from rotor.quantum.basis.labelled import Basis, product, rotation_labels
 from rotor.quantum.basis.real import RealFunctions, real_functions, rotation_reversal
 from rotor.quantum.blocks import LinearBlocks, linear_blocks
-from rotor.quantum.contraction import Space, contracted, coupled, in_field, spin_space
+from rotor.quantum.contraction import Space, contracted, coupled, spin_space
 from rotor.quantum.effects.watson import operators_by_name
+from rotor.quantum.in_field import in_field
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, ket_bra, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine

@@ -220,7 +220,7 @@ class CoupledSpace:
                 if a != b:
                     pieces.append((start[b] + c, start[a] + r, i, matrix[r, c].conj()))
         return blocks_of_elements(
-            names, space.labels(), with_real_phases(_elements(count, len(names), pieces)).elements
+            names, space.labels(), with_real_phases(flat_elements(count, len(names), pieces)).elements
         )
 
     def solve(self, coefficients: Mapping[str, float], lowest: int | None = None) -> Space:
@@ -231,7 +231,7 @@ class CoupledSpace:
         return Space(tuple(sector for sector, _ in states), tensors)
 
 
-def _elements(count: int, terms: int, pieces: Iterable[tuple[Ints, Ints, int, NDArray[Any]]]) -> Elements:
+def flat_elements(count: int, terms: int, pieces: Iterable[tuple[Ints, Ints, int, NDArray[Any]]]) -> Elements:
     """Elements of pieces (rows, columns, number of the term, values)."""
     rows, columns, term, values = zip(*pieces, strict=True)
     number = np.repeat(term, [len(piece) for piece in rows])
@@ -414,42 +414,3 @@ def _moved(
         moved = states[up][1][rows].conj().T @ (entry.matrix() @ states[low][1][columns])
         blocks[up, low] = blocks[up, low] + moved if (up, low) in blocks else moved
     return blocks
-
-
-def in_field(space: Space, twice_m: int, components: Mapping[str, str]) -> LinearBlocks:
-    """A space in static fields along z: linear blocks of one M, a field strength being a coefficient.
-
-    Parameters
-    ----------
-    space : Space
-        Solved without fields.
-    twice_m : int
-        Twice the projection M.
-    components : mapping of str to str
-        Name of each term, and the tensor whose component along the field it is.
-
-    Returns
-    -------
-    LinearBlocks
-        Of the terms "energy" and `components`; H = energy + Σ field · T_0, signs as the tensors have them.
-    """
-    start, count = space.starts(), len(space)
-    projects = np.repeat([s.twice_j >= abs(twice_m) for s in space.sectors], np.diff(start))
-    diagonal = np.arange(count)
-    pieces: list[tuple[Ints, Ints, int, NDArray[Any]]] = [
-        (diagonal, diagonal, 0, np.concatenate([sector.energies for sector in space.sectors]))
-    ]
-    for number, name in enumerate(components.values(), 1):
-        tensor = space.tensors[name]
-        pairs = [pair for pair in tensor.blocks if min(space.sectors[p].twice_j for p in pair) >= abs(twice_m)]
-        if not pairs:
-            continue
-        up, low = (np.array([space.sectors[pair[side]].twice_j for pair in pairs]) for side in (0, 1))
-        m = twice_m / 2
-        factors = np.where((up - twice_m) // 2 % 2, -1.0, 1.0) * three_j(up / 2, tensor.rank, low / 2, -m, 0, m)
-        for (a, b), factor in zip(pairs, factors.tolist(), strict=True):
-            matrix = factor * tensor.blocks[a, b]
-            r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(tensor.blocks[a, b]).max(initial=0.0))
-            pieces.append((start[a] + r, start[b] + c, number, matrix[r, c]))
-    elements = with_real_phases(_elements(count, 1 + len(components), pieces)).elements
-    return blocks_of_elements(["energy", *components], space.labels(), elements, projects)
