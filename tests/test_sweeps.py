@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
+import duckdb
 import numpy as np
 import pytest
 
@@ -512,3 +515,30 @@ def test_what_is_not_written_is_not_computed(monkeypatch, folder):
     monkeypatch.setattr(LevelsAnswer, "facts", failing)
     result = run_sweep(levels(sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(parquet="all.parquet")))
     assert [made.get("error") for made in result.records] == [None, None]
+
+
+def test_a_csv_of_all_points_has_a_column_of_the_molecule(folder):
+    """A CSV without a swept key in its name was refused for a list of molecules."""
+    Path("list.csv").write_text("smiles,name\nC=O,formaldehyde\nC#N,cyanide\n")
+    scene = levels(molecule="list.csv", outputs=LevelsOutputs(csv="all.csv", parquet="all.parquet"))
+    first = run_sweep(scene, record="r")
+    assert [Path(name).name for name in first.files] == ["all.parquet", "all.csv"]
+    rows = list(csv.DictReader(Path("all.csv").read_text().splitlines()))
+    assert Counter(row["molecule"] for row in rows) == {"formaldehyde": 9, "cyanide": 3}
+    with duckdb.connect() as engine:
+        energies = engine.execute("SELECT energy_mhz FROM 'all.parquet'").fetchall()
+    assert [float(row["energy_mhz"]) for row in rows] == [energy for (energy,) in energies]
+
+
+def test_a_csv_of_all_points_goes_on(folder):
+    scene = levels(sweep={"molecule": ["CO", "HCl"]}, outputs=LevelsOutputs(csv="all.csv"))
+    assert run_sweep(scene, record="r").computed == 2
+    before = Path("all.csv").read_text()
+    more = levels(sweep={"molecule": ["HCl", "CO", "HF"]}, outputs=LevelsOutputs(csv="all.csv"))
+    again = run_sweep(more, record="r")
+    assert again.computed == 1
+    rows = list(csv.DictReader(Path("all.csv").read_text().splitlines()))
+    assert [row["molecule"] for row in rows] == 3 * ["HCl"] + 3 * ["CO"] + 3 * ["HF"]
+    assert set(before.splitlines()) <= set(Path("all.csv").read_text().splitlines())  # text by text
+    assert run_sweep(scene, record="r").computed == 0
+    assert Path("all.csv").read_text() == before

@@ -1,4 +1,4 @@
-"""A Parquet file with the rows of all points, each row with the values of its point.
+"""A Parquet or CSV file with the rows of all points, each row with the values of its point.
 
 Rows of a finished point wait in a file of their own in the folder NAME.points; at the end they are joined with what the file
 has already, in the order of the points. The column `point` says to which point of the record a row belongs, so that points which
@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,10 +42,18 @@ def point_columns(values: Mapping[str, Any], table: Table) -> dict[str, Any]:
 
 
 class CombinedFile:
-    """The file of all points: what it has, where rows of finished points wait, and how they are joined."""
+    """The file of all points: what it has, where rows of finished points wait, and how they are joined.
 
-    def __init__(self, target: Path) -> None:
-        self.target, self.folder = target, Path(f"{target}.points")
+    targets: the same rows in one or several files; what is done stands in the first.
+    """
+
+    def __init__(self, targets: Sequence[Path]) -> None:
+        self.targets, self.folder = tuple(targets), Path(f"{targets[0]}.points")
+
+    @classmethod
+    def of(cls, names: Sequence[str], out: str | os.PathLike[str]) -> CombinedFile | None:
+        """The files of these names in a folder; None without any."""
+        return cls([Path(out) / name for name in names]) if names else None
 
     def keys(self) -> set[str]:
         """The points whose rows are there, in the file or waiting; none of a file that is no table of points."""
@@ -57,12 +65,13 @@ class CombinedFile:
         return {path.stem: path for path in self.folder.glob("*") if path.suffix in suffixes}
 
     def _joined(self) -> set[str]:
-        if not self.target.is_file():
+        first = self.targets[0]
+        if not first.is_file():
             return set()
         import duckdb
 
-        with duckdb.connect() as engine, suppress(duckdb.Error):  # no Parquet, or without the column: written anew
-            rows = engine.execute("SELECT DISTINCT point FROM read_parquet($1)", [str(self.target)]).fetchall()
+        with duckdb.connect() as engine, suppress(duckdb.Error):  # not such a file, or without the column: written anew
+            rows = engine.execute(f"SELECT DISTINCT point FROM {_table_of(first)}").fetchall()
             return {str(key) for (key,) in rows}
         return set()
 
@@ -86,7 +95,7 @@ class CombinedFile:
         os.replace(unfinished, path)
 
     def join(self, keys: Sequence[str], provenance: str) -> None:
-        """Write the file: the rows of the points with these keys, in their order; the folder is removed."""
+        """Write the files: the rows of the points with these keys, in their order; the folder is removed."""
         import duckdb
 
         from rotor.formats.atomic_write import atomic_path
@@ -94,27 +103,27 @@ class CombinedFile:
 
         waiting = self._waiting()
         before = self._joined() - waiting.keys()
-        with duckdb.connect() as engine, atomic_path(self.target) as unfinished:
+        with ExitStack() as stack:
+            engine = stack.enter_context(duckdb.connect())
+            unfinished = [stack.enter_context(atomic_path(target)) for target in self.targets]
             engine.execute("SET memory_limit = $1", [f"{MEMORY_MB}MB"])
             engine.execute("SET temp_directory = $1", [str(self.folder / "sort")])
             _register_order(engine, keys)
             sources = [str(path) for path in self._large_files(waiting.values())]
-            parts = [_rows(sources, "true")] if sources else []
+            parts = [_rows(sources)] if sources else []
             if before:
-                parts.append(_rows([str(self.target)], f"point NOT IN ({', '.join(map(quoted, ('', *waiting)))})"))
+                others = ", ".join(map(quoted, ("", *waiting)))
+                parts.append(f"SELECT * FROM {_table_of(self.targets[0])} WHERE point NOT IN ({others})")
+            chosen = "SELECT key AS point FROM places LIMIT 0"  # no point has rows
             if parts:
-                chosen = " UNION ALL BY NAME ".join(parts)
-                run(
-                    engine,
-                    f"COPY (SELECT t.* EXCLUDE (file_row_number) FROM ({chosen}) t JOIN places ON t.point = places.key "
-                    f"ORDER BY places.number, t.file_row_number) TO {quoted(str(unfinished))} "
-                    f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(provenance)}}})",
-                    self.target,
-                )
-            else:  # no point has rows
-                engine.execute(
-                    f"COPY (SELECT key AS point FROM places LIMIT 0) TO {quoted(str(unfinished))} (FORMAT parquet)"
-                )
+                joined = " UNION ALL BY NAME ".join(parts)
+                chosen = f"SELECT t.* EXCLUDE (file_row_number) FROM ({joined}) t JOIN places ON t.point = places.key"
+                chosen += " ORDER BY places.number, t.file_row_number"
+            for target, path in zip(self.targets, unfinished, strict=True):
+                options = "(FORMAT csv, HEADER, DELIMITER ',')"
+                if not _is_csv(target):
+                    options = f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(provenance)}}})"
+                run(engine, f"COPY ({chosen}) TO {quoted(str(path))} {options}", target)
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _large_files(self, paths: Iterable[Path]) -> list[Path]:
@@ -150,11 +159,25 @@ def _concatenated(batch: list[dict[str, Any]]) -> dict[str, Any]:
     return {name: np.concatenate([columns[name] for columns in batch]) for name in batch[0]}
 
 
-def _rows(files: Sequence[str], condition: str) -> str:
+def _rows(files: Sequence[str]) -> str:
     from rotor.formats.tables import quoted
 
     listed = ", ".join(map(quoted, files))
-    return f"SELECT * FROM read_parquet([{listed}], union_by_name = true, file_row_number = true) WHERE {condition}"
+    return f"SELECT * FROM read_parquet([{listed}], union_by_name = true, file_row_number = true)"
+
+
+def _is_csv(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
+
+
+def _table_of(path: Path) -> str:
+    """A finished file as a table with the numbers of its rows; texts of a CSV stay as they stand."""
+    from rotor.formats.tables import quoted
+
+    if not _is_csv(path):
+        return f"read_parquet({quoted(str(path))}, file_row_number = true)"
+    rows = f"read_csv({quoted(str(path))}, header = true, all_varchar = true, delim = ',')"
+    return f"(SELECT *, row_number() OVER () AS file_row_number FROM {rows})"
 
 
 def _register_order(engine: DuckDBPyConnection, keys: Sequence[str]) -> None:

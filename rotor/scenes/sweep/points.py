@@ -26,6 +26,7 @@ from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
 _PLACE = re.compile(r"\{([^{}]*)\}")
+JOINED = ("parquet", "csv")  # outputs that have the rows of all points where their names have no swept key
 _MOLECULE = ("molecule", "molecule.source")  # swept names whose values may be lists of molecules
 
 
@@ -64,11 +65,11 @@ class Point:
 
 @dataclass(frozen=True)
 class Points:
-    """All points of a sweep, made in order. combined: the Parquet file for the rows of all points, where there is one."""
+    """All points of a sweep, made in order. combined: the files for the rows of all points, by their output."""
 
     axes: tuple[Axis, ...]
     base: Mapping[str, Any]
-    combined: str | None
+    combined: Mapping[str, str]
 
     def __len__(self) -> int:
         return math.prod(len(axis.values) for axis in self.axes)
@@ -108,7 +109,7 @@ class Points:
                 keys = " and ".join(f"{{{axis.key}}}" for axis in self.axes)
                 raise ValueError(
                     f"outputs: {twice.pop()}: several points write this file; put {keys} into its name (the rows of all "
-                    "points go into one file that is named as parquet)"
+                    "points go into one file that is named as parquet or csv)"
                 )
             seen |= names
 
@@ -188,13 +189,12 @@ def _axis(name: str, values: list[Any], folder: str | os.PathLike[str]) -> Axis:
     return Axis(name, tuple(sources), tuple(numbered(shown)) if texts else tuple(shown))
 
 
-def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> str | None:
-    """The name of the Parquet file of all points, taken out of the outputs of each; None where each point has its own."""
-    name = outputs.get("parquet")
-    if not isinstance(name, str) or _PLACE.search(name) or math.prod(len(axis.values) for axis in axes) == 1:
-        return None
-    del outputs["parquet"]
-    return name
+def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> dict[str, str]:
+    """The names of the files of all points, taken out of the outputs of each; none where each point has its own."""
+    if math.prod(len(axis.values) for axis in axes) == 1:
+        return {}
+    names = [name for name in JOINED if isinstance(outputs.get(name), str) and not _PLACE.search(outputs[name])]
+    return {name: outputs.pop(name) for name in names}
 
 
 def _output_names(outputs: Mapping[str, Any], kind: str) -> Iterator[str]:
@@ -255,12 +255,12 @@ def check_first(every: Points, out: str | os.PathLike[str]) -> None:
     """Check what all points share: the swept names, the folders and suffixes of the files that are written."""
     first = next(iter(every))
     output_paths(first.scene, out)
-    if every.combined is not None:
-        target = Path(out) / every.combined
-        if not target.name.lower().endswith(".parquet"):
-            raise ValueError(f"outputs.parquet: {every.combined}: the name must end in .parquet")
+    for name, text in every.combined.items():
+        target = Path(out) / text
+        if not target.name.lower().endswith(f".{name}"):
+            raise ValueError(f"outputs.{name}: {text}: the name must end in .{name}")
         if not target.parent.is_dir():
-            raise ValueError(f"outputs.parquet: {target}: there is no folder {target.parent}; make it first")
+            raise ValueError(f"outputs.{name}: {target}: there is no folder {target.parent}; make it first")
 
 
 def cell(value: Any) -> Any:

@@ -17,11 +17,11 @@ from rotor.table import Table
 @dataclass(frozen=True, repr=False)
 class SweepResult(Table):
     """A sweep that was run: a row for each point. computed: how many points were run now; the others were done before. combined: the
-    file with the rows of all points."""
+    files with the rows of all points."""
 
     records: tuple[Mapping[str, Any], ...]
     computed: int
-    combined: Path | None = None
+    combined: tuple[Path, ...] = ()
 
     @property
     def failed(self) -> tuple[Mapping[str, Any], ...]:
@@ -42,6 +42,6 @@ class SweepResult(Table):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """All files of all points, and the file of all points."""
+        """All files of all points, and the files of all points."""
         single = [file for record in self.records for file in record.get("files", ())]
-        return (*single, *([] if self.combined is None else [str(self.combined)]))
+        return (*single, *map(str, self.combined))

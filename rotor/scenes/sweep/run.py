@@ -36,7 +36,7 @@ class Job:
     content: Mapping[str, Any]
     folder: str
     out: str
-    combined: str | None
+    combined: tuple[str, ...]
 
 
 def run_sweep(
@@ -58,8 +58,8 @@ def run_sweep(
     Parameters
     ----------
     scene : Scene
-        With a sweep, or with a list of molecules as its molecule. Rows of all points go into one file where outputs.parquet is
-        a name without a swept key in braces.
+        With a sweep, or with a list of molecules as its molecule. Rows of all points go into one file where outputs.parquet or
+        outputs.csv is a name without a swept key in braces.
     folder, out : path
         From which the files that are read, and those that are written, are counted.
     record : path, optional
@@ -85,10 +85,10 @@ def run_sweep(
     """
     every = points(scene, folder)
     check_first(every, out)
-    joined = None if every.combined is None else CombinedFile(Path(out) / every.combined)
+    joined = CombinedFile.of(tuple(every.combined.values()), out)
     finished = 0
     with ExitStack() as stack:
-        for path in (record, None if joined is None else joined.target):
+        for path in (record, *(() if joined is None else joined.targets)):
             if path is not None:
                 stack.enter_context(locked_file(path))
         done = dict(read_records(record))
@@ -105,7 +105,14 @@ def run_sweep(
                     finished += 1
                     progress(finished, len(every))
                 else:
-                    yield Job(key, point.values, point.content, os.fspath(folder), os.fspath(out), every.combined)
+                    yield Job(
+                        key,
+                        point.values,
+                        point.content,
+                        os.fspath(folder),
+                        os.fspath(out),
+                        tuple(every.combined.values()),
+                    )
 
         if joined is not None:
             joined.open_folder()
@@ -118,7 +125,7 @@ def run_sweep(
             progress(finished, len(every))
         if joined is not None:
             joined.join([key for key in keys if "error" not in done[key]], scene_text(scene))
-    combined = None if joined is None else joined.target.resolve()
+    combined = () if joined is None else tuple(target.resolve() for target in joined.targets)
     return SweepResult(tuple(done[key] for key in keys), computed, combined)
 
 
@@ -174,8 +181,9 @@ def run_point(job: Job) -> Record:
         scene = scene_of(job.content, f"sweep {text_of(job.values)}")
         result = run_scene(scene, folder=job.folder, out=job.out)
         files = [str(path.resolve()) for path in result.files]
-        if job.combined is not None:
-            CombinedFile(Path(job.out) / job.combined).write_part(job.key, job.values, result.table)
+        joined = CombinedFile.of(job.combined, job.out)
+        if joined is not None:
+            joined.write_part(job.key, job.values, result.table)
         results = point_results(scene.kind, result.answer, len(result.table))
     except (ValueError, NoResultError) as error:
         return _failed(job, str(error), time.perf_counter() - start)
