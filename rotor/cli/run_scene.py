@@ -141,11 +141,13 @@ def _folder(options: Options) -> Path:
 
 def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
     from rotor.checks import RunStopped
+    from rotor.reports.progress import elapsed_time
     from rotor.scenes.kind import NoResultError
     from rotor.scenes.run import run_scene
 
     try:
-        result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
+        with elapsed_time("computing"):
+            result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
     except (RunStopped, NoResultError) as error:
         raise ComputationError(str(error)) from error
     for remark in _notes(result):

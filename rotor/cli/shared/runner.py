@@ -11,6 +11,7 @@ from rotor.cli.shared import process
 from rotor.cli.shared.command import refuse_overwriting
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
+from rotor.reports.progress import elapsed_time
 from rotor.reports.screen import show_facts
 from rotor.requests.fill import Given
 from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     import typer
+
+
+OWN_PROGRESS = ("fluid", "fit")  # verbs that show every step or iteration from the first one on
 
 
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
@@ -42,7 +46,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     with working(verb, typed) as executor:
         with answering() if verb.sound else naming(verb):
             work = Work(executor, shown, outputs, note, True, head)
-            answer = answer_of(verb, request, work)
+            with nullcontext() if verb.name in OWN_PROGRESS else elapsed_time("computing"):
+                answer = answer_of(verb, request, work)
         report = report_of(verb, answer, head, given, view, executor)
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):

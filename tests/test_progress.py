@@ -1,0 +1,95 @@
+"""How far a command is: on a terminal, and nothing in a pipe."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+
+from rotor.reports import progress
+from rotor.reports.progress import elapsed_time, progress_bar
+from rotor.scenes.scene import LevelsScene
+from rotor.scenes.scene_file import write_scene
+from rotor.scenes.sections import LevelsObservables
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def on_terminal(monkeypatch) -> Terminal:
+    """Standard error as a terminal; set inside a test, since the capture of pytest sets its own before."""
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "SHOW_AFTER_S", 0.05)
+    return stream
+
+
+def test_long_work_shows_its_time_and_leaves_an_empty_line(monkeypatch):
+    terminal = on_terminal(monkeypatch)
+    with elapsed_time("computing"):
+        time.sleep(0.3)
+    assert re.match(r"\rcomputing: 0 s ", terminal.getvalue())
+    assert terminal.getvalue().endswith("\r\x1b[2K")
+
+
+def test_short_work_shows_nothing(monkeypatch):
+    terminal = on_terminal(monkeypatch)
+    monkeypatch.setattr(progress, "SHOW_AFTER_S", 5.0)
+    with elapsed_time("computing"):
+        time.sleep(0.1)
+    assert terminal.getvalue() == ""
+
+
+def test_a_bar_takes_the_place_of_the_time(monkeypatch):
+    terminal = on_terminal(monkeypatch)
+    monkeypatch.setenv("TERM", "xterm")
+    with elapsed_time("computing"), progress_bar("pieces") as advance:
+        advance(1, 2)
+        time.sleep(0.3)
+    assert "computing" not in terminal.getvalue()
+    assert "1/2" in terminal.getvalue()
+    assert progress._Shown.bars == 0
+
+
+def test_a_pipe_shows_nothing(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "SHOW_AFTER_S", 0.02)
+    with elapsed_time("computing"), progress_bar("pieces") as advance:
+        advance(1, 2)
+        time.sleep(0.1)
+    assert stream.getvalue() == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_sweep_shows_points_and_the_time_left_on_a_terminal(folder):
+    import pty
+
+    write_scene(
+        LevelsScene(molecule="CO", observables=LevelsObservables(jmax=2), sweep={"observables.jmax": [*range(60)]}),
+        "s.toml",
+    )
+    reading, writing = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    command = [sys.executable, "-m", "rotor", "run", "s.toml"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=writing, env=environment, check=False)
+    os.close(writing)
+    shown = b""
+    try:
+        while piece := os.read(reading, 65536):
+            shown += piece
+    except OSError:  # the other end is closed
+        pass
+    os.close(reading)
+    assert done.returncode == 0
+    text = re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", shown.decode())
+    assert re.search(r"\d+/60 points", text)
+    assert "left" in text
+    assert "60 points: 60 computed now in" in text
