@@ -50,7 +50,7 @@ def test_short_work_shows_nothing(monkeypatch):
 def test_a_bar_takes_the_place_of_the_time(monkeypatch):
     terminal = on_terminal(monkeypatch)
     monkeypatch.setenv("TERM", "xterm")
-    with elapsed_time("computing"), progress_bar("pieces") as advance:
+    with progress_bar("pieces") as advance, elapsed_time("computing"):
         advance(1, 2)
         time.sleep(0.3)
     assert "computing" not in terminal.getvalue()
