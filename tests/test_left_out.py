@@ -53,6 +53,17 @@ def test_the_pressure_width(name, kelvin, half_width):
     assert 1 / 3 < estimated / (2 * half_width) < 3  # the factor that is claimed
 
 
+def test_widths_are_those_of_the_conditions_of_the_scene():
+    """Without a pressure no width is claimed; Doppler's is that inside the range."""
+    alone = left_out.pressure_width(rotor.read("OCS"), 2.0, None)
+    assert alone.size is None
+    assert f"{left_out.pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
+    scene = SpectrumScene(molecule="H2CO", conditions=SpectrumConditions(temperature="30 K", range="100:105GHz"))
+    widths = {one.name: one for one in plan_of(scene).left_out}
+    assert "at 105000 MHz" in widths["Doppler width"].basis
+    assert widths["pressure width"].size is None
+
+
 def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
     def names(**observables) -> set[str]:
         gas = SpectrumConditions(range="115.2:115.4GHz")

@@ -124,13 +124,18 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     unit = unit_of(scene)
     error = max(error_of(scene.kind, answer, unit), choice.error)
     if error > asked:
-        raise ValueError(
-            f"accuracy: {asked:g} {unit}".rstrip()
-            + f" cannot be given: the error here is {error:.2g} ({choice.how}); ask for less"
-        )
+        raise out_of_reach(asked, error, unit, choice.how)
     if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):
         refuse_total(_with_error(answer.errors, choice), asked, unit)
     return Reached(asked, error, unit, choice.how)
+
+
+def out_of_reach(asked: float, error: float, unit: str, how: str) -> ValueError:
+    """The refusal of an accuracy that the settings, or double precision, do not reach."""
+    return ValueError(
+        f"accuracy: {asked:g} {unit}".rstrip()
+        + f" cannot be given: the error here is {error:.2g} ({how}); ask for less"
+    )
 
 
 def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:

@@ -130,8 +130,13 @@ def of_classical_gas(top: Top, temperature_k: float) -> list[LeftOut]:
     )
 
 
-def pressure_width(top: Top, temperature_k: float, pressure_bar: float) -> LeftOut | None:
+MILLIBAR = 1e-3  # bar
+
+
+def pressure_width(top: Top, temperature_k: float, pressure_bar: float | None) -> LeftOut | None:
     """The width that collisions of these molecules among each other give a line; None of a top without a mass.
+
+    Without a pressure it is not estimated: it may be that of a cell, of a jet or of interstellar gas. Then the width at 1 mbar is named.
 
     Neglected: resonance of the levels, higher multipoles, J. The factor ½ of the dipoles is one of order one, with which CO and OCS
     come out within a factor of 3 of the measured ones.
@@ -144,17 +149,17 @@ def pressure_width(top: Top, temperature_k: float, pressure_bar: float) -> LeftO
     if top.mass_u is None:
         return None
     kt = units.BOLTZMANN_J_PER_K * temperature_k
-    density = pressure_bar * 1e5 / kt
+    density = (MILLIBAR if pressure_bar is None else pressure_bar) * 1e5 / kt
     speed = math.sqrt(16 * kt / (math.pi * top.mass_u * units.ATOMIC_MASS_KG))  # √(8kT/πm_red), m_red half the mass
     dipole2 = sum(mu**2 for mu in top.dipole_abc_debye or ())
     dipole2 *= units.DEBYE_C_M**2 / (4 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M)  # J m³
     area = math.pi * COLLISION_M**2 + math.pi * dipole2 / (2 * HBAR_J_S * speed)
-    return LeftOut(
-        "pressure width",
-        2 * density * speed * area / (2 * math.pi) / 1e6,
-        "MHz",
-        f"full width at half maximum at {1e3 * pressure_bar:g} mbar of these molecules, {temperature_k:g} K",
-    )
+    width = 2 * density * speed * area / (2 * math.pi) / 1e6
+    if pressure_bar is None:
+        basis = f"no pressure is given; {width:.2g} MHz for each mbar of these molecules at {temperature_k:g} K"
+        return LeftOut("pressure width", None, "MHz", basis)
+    basis = f"full width at half maximum at {1e3 * pressure_bar:g} mbar of these molecules, {temperature_k:g} K"
+    return LeftOut("pressure width", width, "MHz", basis)
 
 
 def of_fluid(bodies: Bodies, force: Floats, torque: Floats, temperature_k: float, step_fs: float) -> list[LeftOut]:

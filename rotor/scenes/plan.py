@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.requests.fill import Given
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
-from rotor.scenes.kind import kind_of
+from rotor.scenes.kind import NoResultError, kind_of
 from rotor.scenes.numerics import load, numerics_of
 from rotor.scenes.plan_parts import (
     LONG_SEARCH,
@@ -28,6 +28,7 @@ from rotor.scenes.plan_parts import (
     peak_mb,
     timed,
 )
+from rotor.scenes.run import choice_of, output_paths, refuse_as_run
 from rotor.scenes.scene import Scene
 from rotor.verbs.verb import Work, verb_of
 
@@ -37,12 +38,12 @@ if TYPE_CHECKING:
 SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
 SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fluid
 SHORT_GAS, SHORT_STEPS = (500, 2000), (5, 20)  # likewise
-MILLIBAR = 1e-3  # of a gas whose pressure is not given
+SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory of a scene that is run for its plan
 BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
 
 
-def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
-    """The plan of a scene.
+def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.PathLike[str] = ".") -> Plan:
+    """The plan of a scene. One that takes a second or less is run too, so that whatever it would be refused for is known.
 
     Parameters
     ----------
@@ -50,6 +51,8 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
         Without a sweep.
     folder : path
         From which the files that the scene reads are counted.
+    out : path
+        From which the files that it writes are counted; none is written.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     Raises
     ------
     ValueError
-        Whatever the scene itself would be refused for.
+        Whatever the scene itself would be refused for, in the same words; of one that takes long, what is known before it is run.
 
     Examples
     --------
@@ -68,28 +71,42 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     """
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
+    output_paths(scene, out)
     kind = kind_of(scene)
     request = kind.request(scene, folder)
     with kind.naming():
-        return _plan(scene, request)
+        plan, choice = _plan(scene, request)
+        if plan.seconds <= SHORT_RUN and plan.memory_mb <= SMALL_MB:
+            plan = _with_outcome(plan, scene, request, choice)
+    return plan
 
 
-def _plan(scene: Scene, request: Any) -> Plan:
+def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None) -> Plan:
+    """The plan, with a warning where the run reaches no result; ValueError as the run."""
+    try:
+        refuse_as_run(scene, request, choice)
+    except NoResultError as reason:
+        return replace(plan, parts=(*plan.parts, ("warning", f"no result: {reason}")))
+    return plan
+
+
+def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
+    """The plan, and the settings for the accuracy of the scene; None where it asks for none, or where the run alone finds them."""
     if getattr(scene, "accuracy", None) is None:
-        return plan_of_request(scene.kind, request)
+        return plan_of_request(scene.kind, request), None
     if hasattr(request, "tolerance") and scene.kind == "tumble":
         from rotor.scenes.plan_of_motion import plan_with_accuracy
 
         return plan_with_accuracy(scene, request)
-    from rotor.scenes.accuracy import chosen
-
-    found: list[Choice] = []
-    search = timed(lambda: found.append(chosen(scene, request)), LONG_SEARCH)
-    plan, parts = plan_of_request(scene.kind, found[-1].request), [("accuracy", found[-1].how)]
+    found: list[Choice | None] = []
+    search = timed(lambda: found.append(choice_of(scene, request)), LONG_SEARCH)
+    choice = found[-1]
+    assert choice is not None  # the scene has an accuracy
+    plan, parts = plan_of_request(scene.kind, choice.request), [("accuracy", choice.how)]
     if numerics_of(scene.kind).levels:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
-        parts.append(("rounding", f"{_checked_rounding(scene, found[-1].request):.1e} MHz of the highest energy"))
-    return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search)
+        parts.append(("rounding", f"{_checked_rounding(scene, choice):.1e} MHz of the highest energy"))
+    return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search), choice
 
 
 def plan_of_request(kind: str, request: Any) -> Plan:
@@ -113,23 +130,21 @@ def plan_of_request(kind: str, request: Any) -> Plan:
     )
 
 
-def _checked_rounding(scene: Scene, request: Any) -> float:
+def _checked_rounding(scene: Scene, choice: Choice) -> float:
     """Rounding of the rotational energies of the highest J in MHz; ValueError where it is clearly more than the accuracy asked for.
 
     A run leaves out levels beyond the reach of the distortion constants, so that its rounding may be a little less.
     """
     from rotor.quantum.request import LevelsRequest, answer_levels
-    from rotor.scenes.accuracy import asked_of, rounding_mhz
+    from rotor.scenes.accuracy import asked_of, out_of_reach, rounding_mhz
 
-    j, asked = _highest_j(scene.kind, request), asked_of(scene)
+    request, asked = choice.request, asked_of(scene)
+    j = _highest_j(scene.kind, request)
     assert asked is not None
     levels = answer_levels(LevelsRequest(request.top, jmin=j, jmax=j)).table.levels
     rounding = rounding_mhz(levels)
     if rounding > 2.0 * asked:
-        raise ValueError(
-            f"accuracy: {asked:g} MHz cannot be given: rounding of energies at J = {j} is {rounding:.2g} MHz; ask for "
-            f"{2 * rounding:.1g} MHz or more, or for lower J"
-        )
+        raise out_of_reach(asked, rounding, "MHz", choice.how)
     return rounding
 
 
@@ -212,9 +227,11 @@ def plan_of_spectrum(request: Any) -> Plan:
     lines = allowed_lines(top, jmax)  # after the calibration, which refuses a J that no list has
     _, b, c = top.rotational_constants_mhz
     absent = left_out.of_levels(top, j, request.effects)
-    pressure = request.layer.pressure_bar if request.layer else MILLIBAR
+    pressure = request.layer.pressure_bar if request.layer else None
+    lowest, highest = request.range_mhz or (0.0, math.inf)
+    frequency = min(max((b + c) * (j + 1), lowest), highest)  # of the lines that are most populated, inside the range
     widths = [
-        left_out.doppler(top, (b + c) * (j + 1), kelvin) if request.shape == "sticks" else None,
+        left_out.doppler(top, frequency, kelvin) if request.shape == "sticks" else None,
         left_out.pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
     ]
     absent = left_out.largest_first([*absent, *(one for one in widths if one is not None)])

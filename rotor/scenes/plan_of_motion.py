@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rotor.scenes.choice import Choice
 from rotor.scenes.left_out import LeftOut
 from rotor.scenes.motion_steps import beginning, expected_steps, first_share, some_steps, steps_of
 from rotor.scenes.plan_parts import LONG_SEARCH, Plan, peak_mb, timed
@@ -35,8 +36,8 @@ def plan_of_motion(request: Any) -> Plan:
     )
 
 
-def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> Plan:
-    """The plan of a driven motion with the tolerance that its run takes.
+def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> tuple[Plan, Choice | None]:
+    """The plan of a driven motion with the tolerance that its run takes, and that choice where the whole motion was searched.
 
     Of a long motion that is found by its first part; the run then makes a motion a hundred times finer beside it, for the error.
     """
@@ -50,9 +51,10 @@ def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> Plan:
     plan = _driven(replace(request, tolerance=planned.tolerance), planned.steps, planned.error)
     parts = (*plan.parts, ("accuracy", planned.how))
     if planned.steps is not None:
-        return replace(plan, parts=parts, seconds=search + plan.seconds)
+        choice = Choice(replace(request, tolerance=planned.tolerance), planned.how, planned.error or 0.0)
+        return replace(plan, parts=parts, seconds=search + plan.seconds), choice
     finer = 10.0 ** (FINER / ORDER)  # times as many steps
-    return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds)
+    return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds), None
 
 
 def _driven(request: DrivenRequest, known_steps: int | None = None, known_error: float | None = None) -> Plan:

@@ -11,6 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from rotor.formats.atomic_write import resolved
 from rotor.scenes.kind import Kind, Where, Writer, kind_of
 from rotor.scenes.scene import Scene, SceneResult, within
@@ -94,13 +96,8 @@ def _run(
 ) -> SceneResult:
     kind = kind_of(scene)
     request = kind.request(scene, folder)
-    start, choice = time.perf_counter(), None
-    if getattr(scene, "accuracy", None) is not None:
-        from rotor.scenes.accuracy import chosen
-
-        with kind.naming():
-            choice = chosen(scene, request)
-        request = choice.request
+    start, choice = time.perf_counter(), choice_of(scene, request)
+    request = request if choice is None else choice.request
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start
     found = None if choice is None else _reached(scene, answer, choice)
@@ -108,6 +105,25 @@ def _run(
     _write(scene, kind, answer, table, targets, found)
     files = tuple(path for paths in targets.values() for path in paths)
     return SceneResult(scene, request, answer, table, files, seconds, found)
+
+
+def choice_of(scene: Scene, request: Any) -> Choice | None:
+    """The settings that the accuracy of a scene asks for; None where it asks for none."""
+    if getattr(scene, "accuracy", None) is None:
+        return None
+    from rotor.scenes.accuracy import chosen
+
+    with kind_of(scene).naming():
+        return chosen(scene, request)
+
+
+def refuse_as_run(scene: Scene, request: Any, choice: Choice | None) -> None:
+    """Whatever a run of the scene would raise, without its files; choice: the settings for its accuracy."""
+    kind = kind_of(scene)
+    bare = msgspec.structs.replace(scene, outputs=type(scene.outputs)())  # type: ignore[attr-defined]
+    answer = kind.answer(request if choice is None else choice.request, bare, ".", None)
+    if choice is not None:
+        _reached(scene, answer, choice)
 
 
 def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:
