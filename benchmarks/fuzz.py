@@ -292,7 +292,7 @@ def run_case(number: int, files: dict[str, bytes], templates: tuple[str, ...]) -
         given = _names(folder)
         os.chdir(folder)
         try:
-            outcome = _run(words)
+            outcome = run_words(words)[0]
         finally:
             os.chdir(before)
         new = _names(folder) - given
@@ -312,14 +312,15 @@ def _names(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def _run(words: list[str]) -> Outcome:
+def run_words(words: list[str], bound_s: float = HANG_S + 1) -> tuple[Outcome, str]:
+    """A command line in this process, and what it prints; stopped after a processor time."""
     from rotor.cli import run
 
     stdout, stderr, started = io.TextIOWrapper(io.BytesIO()), io.StringIO(), time.process_time()
     code: int | None = None
     stdin, sys.stdin = sys.stdin, io.TextIOWrapper(io.BytesIO(b"2\n\nC 0 0 0\nO 0 0 1.128\n"))
     try:
-        with _alarm(), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+        with _alarm(bound_s), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
             code = run(words)
     except Hang:
         stderr.write("hang")
@@ -327,18 +328,23 @@ def _run(words: list[str]) -> Outcome:
         stderr.write(f"escaped, this is a defect: {type(error).__name__}: {error}")
     finally:
         sys.stdin = stdin
-    return Outcome(words, code, stderr.getvalue(), time.process_time() - started)
+    seconds = time.process_time() - started
+    with contextlib.suppress(ValueError):  # a command may have closed its output
+        stdout.flush()
+        stdout.seek(0)
+    printed = "" if stdout.closed else stdout.buffer.getvalue().decode("utf-8", "replace")  # type: ignore[attr-defined]
+    return Outcome(words, code, stderr.getvalue(), seconds), printed
 
 
 @contextlib.contextmanager
-def _alarm() -> Iterator[None]:
-    """Inside, Hang is raised after a little more than the time of a hang; a library that does not come back ends the process later."""
+def _alarm(seconds: float) -> Iterator[None]:
+    """Inside, Hang is raised after a processor time; a library that does not come back ends the process later."""
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise Hang
 
     signal.signal(signal.SIGPROF, ring)
-    signal.setitimer(signal.ITIMER_PROF, HANG_S + 1)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     faulthandler.dump_traceback_later(5 * HANG_S, exit=True)
     try:
         yield
