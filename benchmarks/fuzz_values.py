@@ -9,7 +9,8 @@ SPFIT in tests/oracles. Case k changes numbers inside their ranges (factors near
 molecules, adds an option or a key that another seed of the verb has; one case in twelve is one of fuzz.py (hostile text). Counted as
 defects: a traceback, "this is a defect", an exit code other than 0, 1, 2, a process that dies, files left by a refused command, nan or
 inf in the results of exit code 0, JSON that does not parse, more than 20 s of processor time. A line of JSON per piece of 1000 cases
-goes to the state file, from which a stopped run resumes; its first line has the exit code and the seconds of every seed, which weigh the draws.
+goes to the state file, from which a stopped run resumes; its first line has the exit code and the seconds of every seed, by which seeds
+are drawn.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -242,9 +244,8 @@ def run_case(number: int, folder: Path, weighted: Weighted, hostile: dict[str, b
     finally:
         os.chdir(here)
     new = sorted({str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} - before)
-    sweep = (
-        words[:1] == ["run"] and b"[sweep]" in (folder / words[-1]).read_bytes() if words[-1:] == ["s.toml"] else False
-    )
+    scene = folder / "s.toml"
+    sweep = words[:2] == ["run", "s.toml"] and scene.exists() and b"[sweep]" in scene.read_bytes()
     rows_stay = sweep or words[:1] in (["fluid"], ["catalogue"]) or any(name.endswith(".fit") for name in new)
     outcome.left = [
         name for name in new if Path(name).name.startswith(".rotor") or (outcome.code != 0 and not rows_stay)
@@ -308,11 +309,15 @@ def in_child(work: Callable[..., Iterator[Answer]], *arguments: Any) -> list[Ans
         path = Path(name, "answers")
         child = os.fork()
         if child == 0:
-            with path.open("w", encoding="utf-8") as file, contextlib.suppress(KeyboardInterrupt):
-                for answer in work(*arguments):
-                    file.write(json.dumps(answer) + "\n")
-                    file.flush()
-            os._exit(0)
+            try:
+                with path.open("w", encoding="utf-8") as file:
+                    for answer in work(*arguments):
+                        file.write(json.dumps(answer) + "\n")
+                        file.flush()
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(0)  # nothing of the parent is cleaned up here
         os.waitpid(child, 0)
         return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
 

@@ -118,7 +118,9 @@ class Source:
                 name = () if place.function else (child.name,)
                 here = Place(child, place.around + name, place.function or inside, place.compiled or compiled)
                 for default in getattr(getattr(child, "args", None), "defaults", ()):
-                    yield from self.nodes(default, Place(child, (*place.around, child.name), False, here.compiled))
+                    outside = Place(child, (*place.around, child.name), False, here.compiled)
+                    yield default, outside
+                    yield from self.nodes(default, outside)
             elif isinstance(child, ast.stmt):
                 here = Place(child, place.around, place.function, place.compiled)
             yield child, here
@@ -220,20 +222,28 @@ def sample(root: Path, count: int, seed: int) -> list[Mutant]:
     for source in sources.values():
         for mutant in source.mutants():
             pools[mutant.operator].append(mutant)
-    rng, drawn, lines = random.Random(seed), [], set()
+    rng = random.Random(seed)
+    drawn: list[Mutant] = []
+    lines: set[tuple[str, int]] = set()
     for pool in pools.values():
         rng.shuffle(pool)
-    while len(drawn) < count:
+    while len(drawn) < count and any(pools.values()):
         for pool in pools.values():
-            mutant = next(
-                one
-                for one in iter(pool.pop, None)
-                if (one.file, one.line) not in lines and _is_other(one, sources[one.file])
-            )
-            lines.add((mutant.file, mutant.line))
-            drawn.append(mutant)
+            mutant = _next(pool, lines, sources)
+            if mutant is not None:
+                lines.add((mutant.file, mutant.line))
+                drawn.append(mutant)
     rng.shuffle(drawn)  # a run that is cut off is a fair sample, too
     return drawn[:count]
+
+
+def _next(pool: list[Mutant], lines: set[tuple[str, int]], sources: dict[str, Source]) -> Mutant | None:
+    """The next mutant of an operator on another line than those drawn."""
+    while pool:
+        mutant = pool.pop()
+        if (mutant.file, mutant.line) not in lines and _is_other(mutant, sources[mutant.file]):
+            return mutant
+    return None
 
 
 def _is_other(mutant: Mutant, source: Source) -> bool:

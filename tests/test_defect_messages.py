@@ -111,3 +111,27 @@ def test_steps_are_expected_by_a_short_part(moments):
     np.testing.assert_allclose(
         expected_steps(request), steps_of(request, 1.0), rtol=0.3
     )  # of a motion not quite regular
+
+
+@pytest.mark.parametrize("range_", [("--range", "0:1GHz"), ()])
+def test_a_spectrum_in_a_field_needs_two_levels(call, range_):
+    """J = 0 alone has no line; without a range the edges of the spectrum were sought among none."""
+    words = ["stark", "OCS", "--field", "20kV/cm", "--states", "J<=0", "--linewidth", "50MHz", "--spectrum", "o.csv"]
+    code, _, err = call(*words, *range_)
+    assert (code, err) == (2, "error: --states: no line joins two of the states up to J = 0; take a higher J\n")
+    assert not Path("o.csv").exists()
+
+
+@pytest.mark.parametrize("case", ["ocs", "hcn_quad", "two_state_coriolis"])  # named constants, spins, states
+@pytest.mark.parametrize("temperature", ["0", "-3", "0.0"])
+@pytest.mark.parametrize("basis", [(), ("--full-basis",), ("--as-spcat",)])
+def test_an_int_file_has_a_temperature_above_0(call, case, temperature, basis):
+    oracle = Path(__file__).parent / "oracles" / case
+    Path("a.var").write_bytes((oracle / f"{case}.var").read_bytes())
+    title, request, *rest = (oracle / f"{case}.int").read_text().split("\n")
+    request = " ".join([*request.split()[:8], temperature])
+    Path("a.int").write_text("\n".join([title, request, *rest]))
+    code, _, err = call("spectrum", "a.int", *basis, "--cat", "x.cat")
+    assert code == 2
+    assert "TEMP" in err
+    assert not Path("x.cat").exists()

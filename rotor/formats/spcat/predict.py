@@ -156,6 +156,8 @@ def predict(
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    if not (math.isfinite(request.temperature_k) and request.temperature_k > 0):
+        raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
     further = (*note_of_qrot(request, as_spcat), *_not_written(request))
     if as_spcat and 0 < request.qrot < 1:
         request = replace(request, qrot=1.0)

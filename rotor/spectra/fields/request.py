@@ -146,6 +146,10 @@ def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | No
     deviation = request.spread * abs(mean)
     width = 4 * deviation or 1e-3 * abs(mean) or 1e-3
     lines = _lines_at(request, np.linspace(mean - width, mean + width, FIELDS_OF_SPREAD), executor)
+    if not len(lines):
+        raise ValueError(
+            f"j_highest: no line joins two of the states up to J = {request.stark.j_highest}; take a higher J"
+        )
     first, last = request.range_mhz or _around(lines, request.linewidth_mhz)
     points = max(SPECTRUM_POINTS, int(8 * (last - first) / request.linewidth_mhz) + 1)
     if points > MOST_POINTS:
