@@ -17,7 +17,7 @@ from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.fits import lines_from, refitted
 from rotor.viewer.loomis_wood import centres_of
 from rotor.viewer.peak_fit import fit_peak
-from rotor.viewer.prediction import Predictions, changed, species_of_source, with_hyperfine
+from rotor.viewer.prediction import MOST_J, Predictions, changed, species_of_source, with_hyperfine
 from rotor.viewer.records import (
     COLOURS,
     Line,
@@ -318,9 +318,13 @@ def add_species(state: State, message: Message, context: Context) -> tuple[str, 
     record, remark = species_of_source(
         context.predictions.stored(source.strip()), (number - 1) % COLOURS, temperature, context.predictions.top
     )
-    context.predictions.lines(record)
+    reached = context.predictions.lines(record).lines.jmax
     if remark:
         context.notes.append(remark)
+    if reached >= MOST_J:
+        context.notes.append(
+            f"{record.name}: lines up to J = {MOST_J}; at {temperature:g} K weaker ones of higher J exist"
+        )
     return f"add {record.name}", {species_key(number): record}
 
 

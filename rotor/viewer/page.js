@@ -40,9 +40,10 @@ function h(tag, attributes = {}, ...children) {
 const fixed = (value, digits) => (value == null || !isFinite(value) ? "–" : value.toFixed(digits));
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 const quantum = (q, name, halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`) : name === "species" ? "AE"[q] ?? `${q}` : `${q}`);
-const HEAD = { j: "J", ka: "Kₐ", kc: "K꜀", k: "K", n: "N", f: "F", f1: "F₁", v: "v", i_tot: "I" };
+const HEAD = { j: "J", ka: "Ka", kc: "Kc", k: "K", n: "N", f: "F", f1: "F1", v: "v", i_tot: "I" };
 const digitsOf = (error, value) => (error > 0 ? clamp(Math.ceil(-Math.log10(error)) + 1, 0, 12) : value && Math.abs(value) < 1 ? 9 : 4);
 const short = (value) => (value >= 1e-4 && value < 1e5 ? value.toFixed(clamp(1 - Math.floor(Math.log10(value)), 0, 9)) : value.toExponential(1));
+const percent = (part) => (part >= 0.1 ? (100 * part).toFixed(0) : (100 * part).toPrecision(2));
 const frame = () => new Promise((done) => requestAnimationFrame(done));
 
 function ints(text) { // "3 0 3", "3,0,3"
@@ -320,7 +321,7 @@ class SpectrumWindow extends Plot {
     const line = this.near(at), digits = clamp(Math.ceil(-Math.log10((this.last - this.first) / this.box.width)), 0, 6);
     const here = `${at.x.toFixed(digits)} MHz`;
     if (!line) return here;
-    return `${this.app.species[line.species]?.name ?? ""}  ${this.app.text(line)}\n${line.frequency_mhz.toFixed(4)} MHz, ${(100 * line.height).toPrecision(3)} % of the strongest`;
+    return `${this.app.species[line.species]?.name ?? ""}  ${this.app.text(line)}\n${line.frequency_mhz.toFixed(4)} MHz, ${percent(line.height)} % of the strongest`;
   }
 }
 
@@ -378,7 +379,7 @@ class LoomisWood extends Plot {
   constructor(app, place) {
     super(app, place, { label: "Loomis-Wood rows of a series" });
     const f = this.figure;
-    this.half = Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = []; this.busy = false;
+    this.half = app.transport.data?.loomis_wood.half_width_mhz ?? Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = []; this.busy = false;
     f.xaxis.axis_label = "distance from the expected line (MHz)";
     f.yaxis.visible = false; f.ygrid.visible = false;
     this.traces = this.source({ xs: [], ys: [] });
@@ -519,7 +520,7 @@ export class App {
     this.residualPlace = h("div", { class: "plot" }); this.woodPlace = h("div", { class: "plot", style: "visibility:hidden" });
     this.residualTab = button("Residuals", "l", () => this.showPane("residuals"), { role: "tab" });
     this.woodTab = button("Loomis-Wood", "l", () => this.showPane("wood"), { role: "tab" });
-    this.woodTools = h("span", { class: "group", style: "visibility:hidden" },
+    this.woodTools = h("span", { class: "group", hidden: true },
       h("label", {}, "± MHz ", h("input", { type: "number", min: "0.001", step: "any", style: "width:6em", "data-field": "half", onchange: (event) => { this.wood.half = Math.abs(Number(event.target.value)) || 1; this.wood.load(); } })),
       h("label", {}, "height ", h("input", { type: "range", min: "-1", max: "2", step: "0.1", value: "0", oninput: (event) => { this.wood.scale = 10 ** Number(event.target.value); this.wood.draw(); } })),
       live && button("Assign all rows", "a peak within a fifth of the half width of each expected line", () => this.do({ do: "assign_series", tolerance_mhz: this.wood.half / 5 })));
@@ -598,11 +599,12 @@ export class App {
     w.cursor.location = frequency; w.cursor.visible = true;
     w.go(frequency - wide / 2, frequency + wide / 2);
   }
-  showTab(name) { this.tab = name; this.panels(); if (name === "Levels") this.loadLevels(); }
+  showTab(name) { this.tab = name; this.panels(); if (window.innerWidth <= 900) this.panel.parentElement.scrollIntoView({ block: "nearest" }); if (name === "Levels") this.loadLevels(); }
   showPane(name, load = true) {
     this.pane = name;
     const wood = name === "wood";
-    this.woodPlace.style.visibility = this.woodTools.style.visibility = wood ? "visible" : "hidden";
+    this.woodPlace.style.visibility = wood ? "visible" : "hidden";
+    this.woodTools.hidden = !wood;
     this.residualPlace.style.visibility = wood ? "hidden" : "visible";
     this.residualTab.setAttribute("aria-selected", String(!wood)); this.woodTab.setAttribute("aria-selected", String(wood));
     this.root.classList.toggle("wood", wood);
@@ -666,8 +668,11 @@ export class App {
     if (line) { this.wish = line; this.say(`${this.name(line)} ${this.text(line)}, ${line.frequency_mhz.toFixed(4)} MHz; f fits the peak there`); }
   }
   stepAssigned(direction) {
-    const line = this.step(direction, Object.entries(this.lines).map(([number, one]) => ({ ...one, number })));
-    if (line) this.selectLine(line.number);
+    const rows = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz).map(([number]) => Number(number));
+    if (!rows.length) { this.say("No line is assigned", true); return; }
+    const middle = (this.active.first + this.active.last) / 2, away = (number) => Math.abs(this.lines[number].frequency_mhz - middle);
+    const nearest = rows.reduce((best, number) => (away(number) < away(best) ? number : best));
+    this.selectLine(this.line == null ? nearest : rows[clamp(rows.indexOf(this.line) + direction, 0, rows.length - 1)], true);
   }
   numbers() { return [...this.picked].map(Number); }
   reject() { const lines = this.numbers(); if (lines.length) this.do({ do: "reject", lines, rejected: !this.lines[lines[0]].rejected }); else this.say("Select a line first", true); }
@@ -711,13 +716,13 @@ export class App {
   swatch(number) { return h("span", { class: "swatch", style: `background:${PALETTE[this.theme][(this.species[number]?.colour ?? 0) % 7]}` }); }
   panelAssign() {
     const o = this.offered, live = this.transport.live;
-    if (!Object.keys(this.species).length) return [h("p", {}, "No molecule yet. Add one by name, file or SMILES."), live && this.adder()].filter(Boolean);
+    if (!Object.keys(this.species).length) return [h("p", {}, "No molecule yet. Add one by name, file or SMILES, or let rotor assign look for unknown ones."), live && this.adder(), live && this.searcher()].filter(Boolean);
     if (!o) return [h("h3", {}, "Assign a peak"), h("ol", {}, h("li", {}, "Shift and drag over a peak, or click a predicted stick (keys: n, then f)."), h("li", {}, "Mark the lines that it is; several make a blend."), h("li", {}, "Enter.")),
       this.fitSummary()];
     const head = o.peak ? h("dl", { class: "facts" }, [["centre", `${o.peak.frequency_mhz.toFixed(4)} ± ${fixed(o.peak.error_mhz, 5)} MHz`], ["width", `${fixed(o.peak.width_mhz, 4)} ± ${fixed(o.peak.width_error_mhz, 4)} MHz`], ["height", `${o.peak.height.toPrecision(4)} ± ${o.peak.height_error.toPrecision(2)}`]].map(([a, b]) => [h("dt", {}, a), h("dd", {}, b)])) : h("p", { class: "wrong" }, o.why);
     const rows = o.candidates.slice(0, 60).map((c, i) => h("tr", { class: o.marked.has(i) ? "marked" : "" },
       h("td", {}, h("input", { type: "checkbox", "data-field": `c${i}`, "aria-label": this.text(c), checked: o.marked.has(i), onchange: (event) => { event.target.checked ? o.marked.add(i) : o.marked.delete(i); this.panels(); } })),
-      h("td", {}, this.swatch(c.species), this.text(c), c.assigned ? " ✓" : ""), h("td", { class: "number" }, fixed(c.off_mhz, 3)), h("td", { class: "number" }, (100 * c.height).toPrecision(2))));
+      h("td", {}, this.swatch(c.species), this.text(c), c.assigned ? " ✓" : ""), h("td", { class: "number" }, fixed(c.off_mhz, 3)), h("td", { class: "number" }, percent(c.height))));
     return [h("h3", {}, "Peak"), head, h("h3", {}, "It may be"),
       o.candidates.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"), h("th", { class: "number" }, "off (MHz)"), h("th", { class: "number" }, "%"))), h("tbody", {}, rows)) : h("p", {}, "No predicted line near it."),
       h("p", {}, h("button", { type: "button", class: "main", disabled: !o.peak || !o.marked.size, onclick: () => this.assign() }, o.marked.size > 1 ? `Assign as a blend of ${o.marked.size}` : "Assign"), " ", h("button", { type: "button", onclick: () => { this.offered = null; this.panels(); } }, "Cancel")),
@@ -764,6 +769,11 @@ export class App {
     const input = h("input", { "data-field": "add", placeholder: "name, file or SMILES:…", "aria-label": "Molecule" });
     return h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); if (input.value.trim()) this.do({ do: "add_species", source: input.value.trim() }); } }, input, h("button", {}, "Add molecule"));
   }
+  searcher() { // rotor assign over the whole spectrum
+    const seconds = h("input", { type: "number", min: "1", max: "600", value: "20", style: "width:4.5em", "data-field": "seconds", "aria-label": "Seconds of the search" });
+    const start = async (event) => { event.preventDefault(); this.say("rotor assign searches the spectrum…"); await this.do({ do: "search", seconds: Number(seconds.value) }); };
+    return h("form", { class: "row", onsubmit: start }, h("button", {}, "Search unknown molecules"), h("label", {}, "for ", seconds, " s"));
+  }
   slider(number, name, value, span, message, digits) { // a number with a slider about it: moves the prediction while dragged
     const send = (next, final) => {
       const content = message(next);
@@ -782,7 +792,7 @@ export class App {
     const live = this.transport.live;
     const parts = Object.entries(this.species).map(([number, one]) => this.speciesPart(number, one));
     const emission = h("label", {}, h("input", { type: "checkbox", "data-field": "emission", checked: this.settings.emission, onchange: (event) => this.do({ do: "settings", emission: event.target.checked }) }), "emission model over the spectrum (column, velocity, width)");
-    return [...parts, live && this.adder(), live && h("p", {}, emission)].filter(Boolean);
+    return [...parts, live && this.adder(), live && this.searcher(), live && h("p", {}, emission)].filter(Boolean);
   }
   speciesPart(number, one) {
     const reach = this.spans[number] ?? 1e-3, lines = Object.values(this.lines).filter((line) => line.species === Number(number)).length;
@@ -800,6 +810,7 @@ export class App {
       h("div", { class: "row" }, h("label", {}, h("input", { type: "checkbox", "data-field": `${number}.visible`, checked: one.visible, onchange: (event) => this.do({ do: "species", species: Number(number), visible: event.target.checked }) }), "shown"),
         h("label", {}, "colour ", h("select", { "data-field": `${number}.colour`, onchange: (event) => this.do({ do: "species", species: Number(number), colour: Number(event.target.value) }) }, ["blue", "orange", "green", "purple", "ochre", "teal", "grey"].map((name, i) => h("option", { value: i, selected: i === one.colour }, name)))),
         h("label", {}, "slider ± ", h("select", { "data-field": `${number}.reach`, onchange: (event) => { this.spans[number] = Number(event.target.value); this.panels(); } }, [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1].map((r) => h("option", { value: r, selected: r === reach }, `${Number((r * 100).toPrecision(1))} %`)))),
+        h("label", { title: "lines split by nuclear spins, where the source has their constants" }, h("input", { type: "checkbox", "data-field": `${number}.hyperfine`, checked: one.hyperfine, onchange: (event) => { const box = event.target; this.do({ do: "species", species: Number(number), hyperfine: box.checked }).then((answer) => { if (!answer) box.checked = one.hyperfine; }); } }), "spins"),
         h("button", { type: "button", onclick: () => this.do({ do: "remove_species", species: Number(number) }) }, "Remove")),
       h("table", { class: "constants" }, h("thead", {}, h("tr", {}, h("th", { class: "narrow" }, "free"), h("th", { class: "name" }, ""), h("th", {}, "MHz"), h("th", { class: "number" }, "error, moved"))), h("tbody", {}, rows)),
       h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); if (add.value.trim()) this.do({ do: "free", species: Number(number), free: [...one.free, add.value.trim()] }); } }, add, h("button", {}, "Free it")),

@@ -25,7 +25,9 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.labelled import MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS
-from rotor.spectra.lines import Lines, line_list
+from rotor.spectra.intensity import jmax_for_cut
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
+from rotor.thermodynamics import partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 from rotor.viewer.records import Species
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from rotor.observed.species import SpeciesLines
 
 T = TypeVar("T")
+MOST_J = 250  # of levels, so that a page does not wait for minutes
 REMEMBERED = 12  # line lists
 WEAKEST = 1e-8  # of the strongest line, below which a line is not shown
 ASSUMED_DEBYE = 1.0  # of a molecule whose dipole is not known: along every axis that symmetry allows
@@ -252,14 +255,15 @@ class Predictions:
     def _predicted(self, model: Model) -> Predicted:
         record = model.record
         key = (record.source or record.name, record.temperature_k, len(record.constants))
+        if key not in self._jmax:
+            self._jmax[key] = _highest_j(model)
         lines = line_list(
             model.top,
             temperature_k=record.temperature_k,
             range_mhz=self.band_mhz,
-            jmax=self._jmax.get(key),
+            jmax=self._jmax[key],
             effects=model.effects,
         )
-        self._jmax.setdefault(key, lines.jmax)
         intensity = lines.intensity_nm2_mhz
         strong = intensity >= WEAKEST * intensity.max(initial=0.0)
         return Predicted(model, lines.where(strong), intensity[strong])
@@ -272,6 +276,17 @@ class Predictions:
         if key not in self._emitters:
             self._emitters[key] = species_of_lines(self.lines(record).lines, record.name)
         return self._emitters[key]
+
+
+def _highest_j(model: Model) -> int:
+    """The J beyond which no line reaches the cut of `line_list`, at most `MOST_J`."""
+    top, temperature = model.top, model.record.temperature_k
+    assert top.dipole_abc_debye is not None
+    q = partition_function(top, temperature, effects=model.effects).q
+    try:
+        return min(jmax_for_cut(top, top.dipole_abc_debye, temperature, q, DEFAULT_MIN_LGINT), MOST_J)
+    except ValueError:  # far above what is computed while a page waits
+        return MOST_J
 
 
 def _is_file(path: Path) -> bool:

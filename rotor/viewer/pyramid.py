@@ -53,6 +53,8 @@ class Pyramid:
         high = self.intensity if level == 0 else self.highs[level - 1]
         first = np.asarray(starts) // size
         last = -(-np.asarray(stops) // size)
+        low, high = low[first[0] : last[-1]], high[first[0] : last[-1]]
+        first, last = first - first[0], last - first[0]
         # reduceat of pairs (first, last): every second result is that of a range
         bounds = np.stack([first, np.minimum(last, len(low))], axis=1).reshape(-1)
         low, high = np.append(low, np.inf), np.append(high, -np.inf)  # so that the end is a place too
