@@ -103,3 +103,48 @@ def test_a_label_that_no_level_has_is_named():
     labels, _, _ = levels_in(lines)
     with pytest.raises(MissingLevelsError, match="species = 2"):
         model_of(constants, np.vstack([labels, [[1, 0, 1, 2, 0]]]))
+
+
+def principal_axes(**changes):
+    values = {"F0": 158e3, "delta": 0.6, "V3": 3.0e6} | {k: v for k, v in changes.items() if k in ("F0", "delta", "V3")}
+    abc = {"A": 9100.0, "B": 4300.0, "C": 3000.0, "DeltaJ": 1e-3, "DeltaK": 2e-2}
+    abc |= {k: v for k, v in changes.items() if k in abc}
+    constants = rotor.Constants(**abc, reduction="A", representation="Ir")
+    internal = InternalRotationConstants(values, "PAM", vt_max=0)
+    return rotor.Top.from_constants(constants, dipole_abc_debye=(1.4, 0.9, 0), internal_rotation=internal)
+
+
+def lines_of(top, jmax):
+    seen = rotor.api.line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=(5e3, 1e5))
+    quanta = {
+        name: np.where(column == "E", 1, 0) if name == "species" else column
+        for name, column in seen.levels.quanta.items()
+    }
+    upper, lower = (np.column_stack([quanta[name][rows] for name in NAMES]) for rows in (seen.upper, seen.lower))
+    return assignments(NAMES, upper, lower, seen.frequency_mhz, 0.01)
+
+
+def test_derivatives_by_constants_of_principal_axes_are_those_of_finite_differences():
+    constants = TopConstants(principal_axes())
+    labels, _, _ = levels_in(lines_of(constants.top, 4))
+    model = model_of(constants, labels)
+    values = np.array(list(constants.values.values()))
+    _, slopes = model.levels(values)
+    for i, (name, value) in enumerate(constants.values.items()):
+        step = value * (1e-5 if name in ("F0", "delta", "V3") else 1e-3)
+        changed = [np.where(np.arange(len(values)) == i, value + sign * step, values) for sign in (1, -1)]
+        upper, lower = (model.levels(c)[0] for c in changed)
+        expected = (upper - lower) / (2 * step)
+        noise = 2e-8 / step  # rounding of eigenvalues of matrices with elements up to 1e8 MHz
+        assert np.allclose(slopes[:, i], expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max() + noise), name
+
+
+def test_constants_of_principal_axes_are_found_again():
+    true = principal_axes()
+    lines = lines_of(true, 5)
+    start = TopConstants(principal_axes(A=9102.0, B=4300.4, delta=0.602, V3=3.02e6))
+    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C", "delta", "V3", "F0"]))
+    assert fit.converged
+    expected = dict(true.constants.values) | dict(true.internal_rotation.values)
+    for name, value in zip(fit.parameters.names, fit.values, strict=True):
+        assert value == pytest.approx(expected[name], rel=1e-7)  # lines without noise

@@ -3,6 +3,10 @@
 Blocks are those of `rotor.quantum.internal_rotation`, made once for the J in which a line has a level; each iteration solves them at other
 values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F and ∂E/∂ρ follow by the chain rule. The torsional
 functions that are the basis belong to the constants of the start; they are made anew where F, ρ or V3 move by more than a hundredth.
+
+Constants of principal axes (PAM) become F, ρ and the angle of ρ, by which everything else turns: blocks are made anew at each point, and
+
+    dE/dc = ∂E/∂c + ∂E/∂F ∂F/∂c + ∂E/∂ρ ∂ρ/∂c + ⟨∂H/∂angle⟩ ∂angle/∂c,        c = A, B, C, F0, delta.
 """
 
 from __future__ import annotations
@@ -14,8 +18,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.species import SpeciesBlocks
+from rotor.quantum.internal_rotation.model import RamModel, jacobian_of_principal_axes, model_of_principal_axes
+from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 
 MOVED = 0.01  # relative change of a torsional constant from which the torsional functions are made anew
@@ -29,6 +33,11 @@ class LabelledSpecies:
     sigma: int
     places: Ints
     keys: Ints
+
+    @property
+    def vt_max(self) -> int:
+        """The highest v_t of a label."""
+        return int(self.keys[:, 1].max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,19 +53,41 @@ class TorsionLevels(LevelModel):
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises MissingLevelsError for labels that no level has."""
-        model = RamModel(dict(zip(self.names, np.asarray(values_mhz).tolist(), strict=True)))
+        named = dict(zip(self.names, np.asarray(values_mhz).tolist(), strict=True))
+        if "F0" in named:
+            return self._of_principal_axes(named)
+        model = RamModel(named)
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
         for part in self.species:
-            j, vt = part.keys[:, 0], part.keys[:, 1]
-            found = self._blocks_of(part, model).solve(model.coefficients, int(vt.max()), self.by_energy)
-            quanta = found.quanta
-            rows = _rows(np.column_stack([quanta[name] for name in ("j", "vt", "ka", "kc")]), part.keys)
-            if (rows < 0).any():
-                raise MissingLevelsError(
-                    f"there is no level of J = {j[rows < 0][0]} with this label", part.places[rows < 0]
-                )
+            found = self._blocks_of(part, model).solve(model.coefficients, part.vt_max, self.by_energy)
+            rows = _rows_of(found, part)
             energies[part.places] = found.energies[rows]
             slopes[part.places] = found.solved.slopes(found.rows[rows]) @ model.jacobian
+        return energies, slopes
+
+    def _of_principal_axes(self, named: dict[str, float]) -> tuple[Floats, Floats]:
+        """Energies and derivatives of constants in principal axes."""
+        model = model_of_principal_axes(named)
+        known = list(model.values)
+        turned = jacobian_of_principal_axes(named)
+        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
+        for part in self.species:
+            blocks = self._new_blocks(part, model)
+            found = blocks.solve_once(model.coefficients, part.vt_max, self.by_energy)
+            rows = _rows_of(found, part)
+            energies[part.places] = found.energies[rows]
+            direct = found.slopes(found.rows[rows]) @ model.jacobian
+            by_angle = found.solved.slopes_of(
+                blocks.functions.elements([model.slope_by_angle(part.sigma)]), found.rows[rows]
+            )
+            total = np.zeros((len(rows), len(self.names)))
+            for i, name in enumerate(self.names):
+                if name in known:
+                    total[:, i] = direct[:, known.index(name)]
+            derived = np.column_stack([direct[:, known.index("F")], direct[:, known.index("rho")], by_angle[:, 0]])
+            chained = [self.names.index(name) for name in (*"ABC", "F0", "delta")]
+            total[:, chained] += derived @ turned
+            slopes[part.places] = total
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
@@ -68,12 +99,13 @@ class TorsionLevels(LevelModel):
         torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
         known = self._blocks.get(part.sigma)
         if known is None or (np.abs(torsion - known[0]) > MOVED * np.abs(known[0])).any():
-            j = part.keys[:, 0]
-            blocks = model.blocks(
-                part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, needed=np.unique(j)
-            )
-            self._blocks[part.sigma] = torsion, blocks
+            self._blocks[part.sigma] = torsion, self._new_blocks(part, model)
         return self._blocks[part.sigma][1]
+
+    def _new_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
+        """The blocks of the J in which a label lies."""
+        j = part.keys[:, 0]
+        return model.blocks(part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, needed=np.unique(j))
 
 
 def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
@@ -85,10 +117,6 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     assert internal is not None
     if internal.tops == 2:
         raise ValueError("fits with internal rotation of two tops are not computed")
-    if internal.frame != "RAM":
-        raise ValueError(
-            f"fits of constants in the frame {internal.frame}: convert them to the rho-axis frame (RAM) first"
-        )
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j", "vt", "ka", "kc")])
     sigma = columns["species"]
@@ -109,6 +137,18 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
         internal.names == "energy",
         tuple(part for part in parts if len(part.places)),
     )
+
+
+def _rows_of(found: SpeciesLevels, part: LabelledSpecies) -> Ints:
+    """Places of the labelled levels among those of a species; MissingLevelsError for labels that no level has."""
+    quanta = found.quanta
+    rows = _rows(np.column_stack([quanta[name] for name in ("j", "vt", "ka", "kc")]), part.keys)
+    if (rows < 0).any():
+        missing = rows < 0
+        raise MissingLevelsError(
+            f"there is no level of J = {part.keys[missing][0, 0]} with this label", part.places[missing]
+        )
+    return rows
 
 
 def _exist(keys: Ints) -> NDArray[np.bool_]:

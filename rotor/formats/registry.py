@@ -76,6 +76,7 @@ FORMATS = (
         "rotor.formats.lamda:refuse_lamda",
         recognises="rotor.formats.lamda:is_lamda_file",
     ),
+    Format("input and output of XIAM", (".xi", ".xo", ".xo.gz"), "rotor.formats.xiam:read_xiam"),
     Format("molecule file", (".toml",), "rotor.formats.read_write:read_top_file"),
     Format(
         "comma-separated values",

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Product
-from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
-from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.internal_rotation.two_tops import TwoTops, two_tops
 from rotor.quantum.levels import Levels, MomentBlock
@@ -252,10 +251,7 @@ def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
         return two_tops(top.constants.values, constants.values)
     if constants.frame == "RAM":
         return RamModel({**top.constants.values, **constants.values})
-    others = {name: value for name, value in constants.values.items() if name not in ("F0", "delta")}
-    rotor = rho_axis(top.rotational_constants_mhz, constants.values["F0"], axis_of_angles(constants.values["delta"]))
-    angle = float(np.arctan2(rotor.rho_abc[1], rotor.rho_abc[0]))
-    return RamModel({**top.constants.values, "F": rotor.f, "rho": rotor.rho, **others}, angle=angle)
+    return model_of_principal_axes({**top.constants.values, **constants.values})
 
 
 def species_blocks(model: TurningTops, name: str, jmin: int, jmax: int, count: int) -> SpeciesBlocks:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.internal_rotation.contracted import Terms, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.contracted import Product, Terms, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesBlocks
 from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
@@ -19,6 +20,7 @@ from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
 
 COMPLEX = ("Dbc", "Dac")  # terms of a molecule without a plane of symmetry through the rho axis
+ANGLE_STEP = 1e-3  # radian, of a function of sines and cosines of up to six times the angle: 1e-5 of its slope
 DEFAULT_COUNT = 9  # n_v: 1 Hz for v_t = 0 at J = 25 of methanols and methyl formate
 
 
@@ -65,6 +67,18 @@ class RamModel:
         return {name: products_of(name, sigma, Axes(self.angle)) for name in self.linear_names} | torsional_products(
             sigma
         )
+
+    def slope_by_angle(self, sigma: int) -> list[Product]:
+        """∂H/∂angle at fixed F and ρ as products, by central differences: A, B, C and all named terms turn about c."""
+        products = []
+        for step in (ANGLE_STEP, -ANGLE_STEP):
+            for name in self.linear_names:
+                factor = self.values[name] / (2 * step)
+                products += [
+                    Product(factor * product.rotation, product.torsion)
+                    for product in products_of(name, sigma, Axes(self.angle + step))
+                ]
+        return products
 
     @property
     def coefficients(self) -> Floats:
@@ -126,3 +140,28 @@ class RamModel:
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
         chosen: NDArray[np.bool_] | None = None if needed is None else np.isin(functions.labels["J"], needed)
         return SpeciesBlocks(functions, self.terms(sigma), chosen)
+
+
+def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:
+    """The model of A, B, C, distortion, F0, delta, V3 ... in principal axes (PAM).
+
+    >>> model = model_of_principal_axes({"A": 9e3, "B": 5e3, "C": 4e3, "F0": 157e3, "delta": 0.5, "V3": 1e7})
+    >>> round(model.values["F"], 3), round(model.values["rho"], 8), round(model.angle, 8)
+    (165519.071, 0.05257323, 0.29466597)
+    """
+    others = {name: value for name, value in values.items() if name not in ("F0", "delta")}
+    abc = [values[name] for name in "ABC"]
+    top = rho_axis(abc, values["F0"], axis_of_angles(values["delta"]))
+    return RamModel({**others, "F": top.f, "rho": top.rho}, angle=float(np.arctan2(top.rho_abc[1], top.rho_abc[0])))
+
+
+def jacobian_of_principal_axes(values: Mapping[str, float]) -> Floats:
+    """∂(F, ρ, angle)/∂(A, B, C, F0, delta), (3, 5), by central differences of their closed forms."""
+    names = (*"ABC", "F0", "delta")
+    jacobian = np.zeros((3, 5))
+    for i, name in enumerate(names):
+        step = 1e-5 if name == "delta" else 1e-5 * values[name]
+        up, down = (model_of_principal_axes({**values, name: values[name] + sign * step}) for sign in (1, -1))
+        ends = [np.array([model.values["F"], model.values["rho"], model.angle]) for model in (up, down)]
+        jacobian[:, i] = (ends[0] - ends[1]) / (2 * step)
+    return jacobian

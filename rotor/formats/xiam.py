@@ -1,0 +1,152 @@
+"""Input (.xi) and output (.xo) of XIAM: constants in principal axes, with one or two tops.
+
+XIAM has z, x, y = a, b, c and gigahertz (H. Hartwig and H. Dreizler, Z. Naturforsch. 51a (1996) 923; its manual xiam-v25.txt, Version 2.5):
+
+    BJ = ½(B + C),    BK = A - ½(B + C),    B- = ½(B - C),    V1n = V3,    V2n = V6,
+
+F0, delta and epsil (radians) of a top; mu_x, mu_y, mu_z in debye. Watson's reduction is A where `reduc` is 0 and S where it is 1. A
+constant with an index in brackets belongs to one set of constants B; the first is read, and those of one top of two end in _1 and _2.
+Lines that begin with a backslash print what XIAM derives; of these delta is read, F, rho and beta follow here anew.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor.formats.packed import load
+from rotor.tops.constants import Constants
+from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.tops.top import Top
+
+MHZ_PER_GHZ = 1e3
+NAMES = {
+    "A": ("DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK", "PhiJ", "PhiJK", "PhiKJ", "PhiK", "phiJ", "phiJK", "phiK"),
+    "S": ("DJ", "DJK", "DK", "d1", "d2", "HJ", "HJK", "HKJ", "HK", "h1", "h2", "h3"),
+}  # ours by reduction, in the order of XIAM's
+DISTORTION = ("DJ", "DJK", "DK", "dj", "dk", "H_J", "HJK", "HKJ", "H_K", "h_j", "hjk", "h_k")
+ROTATION = ("BJ", "BK", "B-")
+DIPOLE = ("mu_z", "mu_x", "mu_y")  # along a, b, c
+OF_TOP = {"F0": "F0", "delta": "delta", "epsil": "epsilon", "V1n": "V3", "V2n": "V6"}
+DERIVED = ("F", "rho", "beta", "gamma")
+QUADRUPOLE = ("chi_zz", "chi_-", "chi_xy", "chi_xz", "chi_yz")
+_CONSTANT = re.compile(
+    r"\s*\\?(?P<name>[A-Za-z][\w\-]*)(?:\((?P<set>\d+)\))?\s+(?P<value>[-+]?[\d.]+(?:[EDed][-+]?\d+)?)(?=\s|$)"
+)
+_SETTING = {"reduc": "reduc", "reduct": "reduc", "ntop": "ntop", "nfold": "nfold"}
+
+
+def read_xiam(path: str | os.PathLike[str]) -> Top:
+    """The top of an input or output file of XIAM.
+
+    Parameters
+    ----------
+    path : path
+        A .xi or .xo file.
+
+    Returns
+    -------
+    Top
+        With constants of internal rotation in the frame PAM, and a note of quadrupole constants, which are not read.
+
+    Raises
+    ------
+    ValueError
+        With the file, for constants that are missing or that have no counterpart here.
+    """
+    text = load(path)[0].decode("utf-8", errors="replace")
+    settings, values = _content(text)
+    try:
+        return _top(Path(path).stem, settings, values)
+    except ValueError as reason:
+        raise ValueError(f"{os.fspath(path)}: {reason}") from None
+
+
+def _content(text: str) -> tuple[dict[str, int], dict[str, float]]:
+    """Settings and constants of the first set; of an output what stands before its lines."""
+    settings: dict[str, int] = {}
+    values: dict[str, float] = {}
+    if "Using Watson S Reduction" in text:
+        settings["reduc"] = 1
+    known = {*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE}
+    for line in text.split("-- B ")[0].splitlines():
+        words = line.split()
+        for name, number in pairwise(words):
+            if name in _SETTING and number.isdigit():
+                settings[_SETTING[name]] = int(number)
+        match = _CONSTANT.match(line)
+        if match is None or match["set"] not in (None, "1"):
+            continue
+        plain = re.sub(r"_[12]$", "", match["name"])
+        if plain in known or plain.startswith(("Dpi2", "Dc3", "F12", "Vss", "Vcc", "mk")):
+            values.setdefault(match["name"], float(match["value"].upper().replace("D", "E")))
+    return settings, values
+
+
+def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
+    missing = [key for key in ROTATION if key not in values]
+    if missing:
+        raise ValueError(f"{', '.join(missing)} missing; expected the constants of an input or output of XIAM")
+    reduction = {0: "A", 1: "S"}.get(settings.get("reduc", 0))
+    if reduction is None:
+        raise ValueError(f"reduc {settings['reduc']}: read are Watson's A (0) and S (1)")
+    tops = settings.get("ntop", 1)
+    if tops not in (1, 2) or settings.get("nfold", 3) != 3:
+        raise ValueError(f"{tops} tops of fold {settings.get('nfold', 3)}: read are one or two threefold tops")
+    strange = [
+        key for key, value in values.items()
+        if value and re.sub(r"_[12]$", "", key) not in (*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE)
+    ]  # fmt: skip
+    if strange:
+        raise ValueError(f"{', '.join(strange)}: such terms are not computed here; leave them out and fit anew")
+    bj, bk, minus = (values[key] * MHZ_PER_GHZ for key in ROTATION)
+    numbers: dict[str, Any] = {"A": bj + bk, "B": bj + minus, "C": bj - minus}
+    numbers |= {
+        ours: values[theirs] * MHZ_PER_GHZ
+        for ours, theirs in zip(NAMES[reduction], DISTORTION, strict=True)
+        if values.get(theirs)
+    }
+    constants = Constants(**numbers, reduction=reduction, representation="Ir")
+    internal = InternalRotationConstants(
+        _one_top(values) if tops == 1 else _two_tops(values), "PAM", vt_max=0, source="file of XIAM"
+    )
+    dipole = tuple(values.get(key, 0.0) for key in DIPOLE)
+    top = Top.from_constants(constants, dipole_abc_debye=dipole, internal_rotation=internal)
+    notes = tuple(
+        f"{name}: quadrupole constants of XIAM are not read, its file does not name the nucleus: give --spin-constants"
+        for _ in range(any(values.get(key) for key in QUADRUPOLE))
+    )
+    return replace(top, name=name, notes=(*top.notes, *notes))
+
+
+def _one_top(values: dict[str, float]) -> dict[str, float]:
+    """F0, delta and barriers of one top with its axis in the plane ab."""
+    found = _of_top(values, "")
+    turn = found.pop("epsilon", 0.0)
+    if abs(np.sin(turn)) > 1e-6:
+        raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the plane ab; such a top is not computed")
+    return found | {"delta": float(np.cos(turn)) * found["delta"]}
+
+
+def _two_tops(values: dict[str, float]) -> dict[str, float]:
+    return {f"{name}_{top}": value for top in (1, 2) for name, value in _of_top(values, f"_{top}").items()}
+
+
+def _of_top(values: dict[str, float], suffix: str) -> dict[str, float]:
+    """F0, delta, epsilon, V3 and V6 of one top, MHz and radians."""
+    found = {}
+    for theirs, ours in OF_TOP.items():
+        value = values.get(f"{theirs}{suffix}", values.get(f"{theirs}_1") if not suffix else None)
+        if value is not None:
+            found[ours] = value if ours in ("delta", "epsilon") else value * MHZ_PER_GHZ
+    missing = [key for key in ("F0", "delta", "V1n") if OF_TOP[key] not in found]
+    if missing:
+        names = ", ".join(f"{key}{suffix}" for key in missing)
+        raise ValueError(f"{names} missing; expected F0, delta and V1n of each top (adj 25 of XIAM)")
+    return found

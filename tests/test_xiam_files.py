@@ -1,0 +1,114 @@
+"""XIAM's input and output: constants as it has them, splittings and rigid lines as it prints them."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+import rotor
+
+# constants of kncrabtree/blackchirp @71a1a6e, tests/testdata/test_aprint32_small.xi (MTBE), its layout
+INPUT = """mtbe
+
+ntop 1
+ncycl 200
+reduc 1
+temp 7
+
+ BJ(1)         2.731574558 { 0.000000082}
+ BJ(2)         2.733474508 { 0.000000356}
+ BK(1)         1.651265676 { 0.000000122}
+ B-(1)         0.000818278 { 0.000000092}
+ DJ(1)         0.323517E-6 { 0.000574E-6}
+ dj(1)        -5.111316E-9 { 0.416810E-9}
+ mu_x          1.242000000 {     fixed  }
+ mu_z          0.107000000 {     fixed  }
+\\F(1)        160.922724227 {     derived}
+ V1n          23855.231617 {    6.708321}
+ V2n         -11471.086948 {    3.757949}
+ F0          156.758300542 { 0.038903118}
+ delta(1)      0.460684017 { 0.000399552}
+"""
+
+
+@pytest.fixture
+def mtbe(tmp_path):
+    path = tmp_path / "mtbe.xi"
+    path.write_text(INPUT)
+    return path
+
+
+def test_an_input_gives_constants_of_the_first_set_in_principal_axes(mtbe):
+    top = rotor.read(mtbe)
+    assert top.constants.values["A"] == pytest.approx(4382.840234)
+    assert top.constants.values["B"] == pytest.approx(2732.392836)
+    assert top.constants.values["C"] == pytest.approx(2730.75628)
+    assert top.constants.values["DJ"] == pytest.approx(0.323517e-3)
+    assert top.constants.values["d1"] == pytest.approx(-5.111316e-6)
+    assert top.constants.reduction == "S"
+    assert dict(top.internal_rotation.values) == pytest.approx(
+        {"F0": 156758.300542, "delta": 0.460684017, "V3": 23855231.617, "V6": -11471086.948}
+    )
+    assert top.internal_rotation.frame == "PAM"
+    assert np.array(top.dipole_abc_debye).tolist() == [0.107, 1.242, 0.0]
+    assert len(rotor.api.solve_levels(top, 2)) == 18
+
+
+def test_an_axis_on_the_other_side_of_a_has_a_delta_below_zero(mtbe):
+    mtbe.write_text(INPUT + " epsil  3.14159265359\n")
+    assert rotor.read(mtbe).internal_rotation.values["delta"] == pytest.approx(-0.460684017)
+
+
+def test_two_tops(tmp_path):
+    path = tmp_path / "two.xi"
+    tops = " F0_1 158.\n delta_1 0.5\n V1n_1 9000.\n F0_2 160.\n delta_2 2.4\n epsil_2 0.1\n V1n_2 7000.\n"
+    path.write_text("two\n\nntop 2\n BJ 2.7\n BK 1.6\n B- 0.4\n" + tops)
+    values = rotor.read(path).internal_rotation.values
+    assert values == {
+        "F0_1": 158e3,
+        "delta_1": 0.5,
+        "V3_1": 9e6,
+        "F0_2": 160e3,
+        "delta_2": 2.4,
+        "epsilon_2": 0.1,
+        "V3_2": 7e6,
+    }
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (" BK(1) ", " XX(1) ", "BK missing"),
+        (" F0 ", " XX ", "F0 missing"),
+        ("reduc 1", "reduc 2", "reduc 2"),
+        ("ntop 1", "ntop 3", "3 tops"),
+        ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the plane"),
+        ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J"),
+    ],
+)
+def test_what_is_not_read_is_named_with_the_file(mtbe, old, new, text):
+    mtbe.write_text(INPUT.replace(old, new))
+    with pytest.raises(ValueError, match=text) as error:
+        rotor.read(mtbe)
+    assert "mtbe.xi" in str(error.value)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(
+    ("name", "count", "khz"), [("test_aprint32_small.xo", 60, 0.6), ("pred_ints3_problematic.xo.gz", 450, 0.6)]
+)
+def test_rigid_lines_of_an_output_are_those_of_its_constants(shared, name, count, khz):
+    """Printed to 1 kHz: rms of the rounding 0.3 kHz."""
+    path = shared / "reference" / "internal_rotation" / "xiam" / name
+    top = rotor.read(path)
+    text = (gzip.decompress(path.read_bytes()) if name.endswith("gz") else path.read_bytes()).decode()
+    rigid = rotor.api.solve_levels(rotor.Top.from_constants(top.constants), 20)
+    missed = []
+    for line in text.split("-- B 2")[0].splitlines():
+        words = line.split()
+        if len(words) > 7 and words[6] == "rigid":
+            labels = [int(word) for word in words[:6]]
+            high, low = (rigid.find(j=j, ka=ka, kc=kc) for j, ka, kc in (labels[:3], labels[3:]))
+            missed.append(rigid.energy_mhz[high] - rigid.energy_mhz[low] - 1e3 * float(words[7]))
+    assert len(missed) > count
+    assert np.sqrt(np.mean(np.square(missed))) * 1e3 < khz
