@@ -111,6 +111,40 @@ def test_two_species() -> None:
     assert found.species[1].kind == "a"
 
 
+LIGHT = {"A": 6746.8, "B": 4959.3, "C": 3354.3, "DJ": 7.4e-3, "DJK": 1.3e-2, "DK": 3.4e-2, "d1": -2.6e-3, "d2": -5e-5}
+
+
+def light_and_heavy(height: float = 100.0) -> PeakList:
+    """A light c-type top whose distortion moves lines by some MHz, an a-type species, foreign peaks."""
+    rng = np.random.default_rng(11)
+    f, i = lines_of(LIGHT, (0.0, 0.0, 1.0), height)
+    g, j = lines_of(SECOND, (1.0, 0.0, 0.0), 60.0)
+    f = np.concatenate([f, g, rng.uniform(*BAND, 20)])
+    i = np.concatenate([i, j, rng.random(20) ** (-1 / 0.8)])
+    return peak_list(f + 0.004 * rng.normal(size=len(f)), i, 0.004, band_mhz=BAND)
+
+
+def test_a_light_top_is_found_though_its_lines_are_far_from_rigid() -> None:
+    """And it is looked for though the request is for one species: several of the strongest peaks are left without it."""
+    found = answer_assign(AssignRequest(light_and_heavy(), seconds=120))
+    assert is_right(found, 0, LIGHT)
+    assert is_right(found, 1, SECOND)
+
+
+def test_lines_split_by_different_amounts() -> None:
+    """The constants are those of the centres, though single components fit within some 0.1 MHz (these were called certain)."""
+    rng = np.random.default_rng(12)
+    f, i = lines_of(SECOND | {"A": 4301.0, "B": 2002.7, "C": 1550.5}, (0.9, 0.0, 1.0), 100.0)
+    apart, share = 0.8 * rng.uniform(0.0, 1.0, len(f)), rng.uniform(0.4, 0.6, len(f))
+    split, heights = np.concatenate([f - apart, f + apart]), np.concatenate([i * share, i * (1 - share)])
+    strong = heights > 2.0
+    peaks = peak_list(split[strong] + 0.004 * rng.normal(size=strong.sum()), heights[strong], 0.004, band_mhz=BAND)
+    found = answer_assign(AssignRequest(peaks, seconds=120))
+    assert found.species[0].split
+    assert is_right(found, 0, SECOND | {"A": 4301.0, "B": 2002.7, "C": 1550.5})
+    assert [one.word for one in found.species[1:]].count("certain") == 0  # the other components are no second species
+
+
 def test_a_guess_is_enough_where_the_search_is_narrow() -> None:
     guess = tuple(TRUTH[name] * factor for name, factor in zip("ABC", (1.02, 0.98, 1.015), strict=True))
     found = answer_assign(AssignRequest(spectrum(seed=8), guess_mhz=guess, temperature_k=2.0, seconds=120))

@@ -130,13 +130,14 @@ def strongest_lines(
 @njit(cache=True, nogil=True, fastmath=True)
 def sweep(
     difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
-    near: NDArray[np.float32], low: float, high: float, bin_width: float, tolerance: float, ratio: float,
+    near: NDArray[np.float32], low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
     bounds: Floats, need: int, out: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Roots of a family: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
 
     difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (n, κ), companion_jj (n,) alike
-    near : distance from each bin's centre to the nearest peak. bounds (6,) : of A, B, C. out (m, 5) : hits, misses, A, B, C
+    near : distance from each bin's centre to the nearest peak; a hit is nearer than the larger of `tolerance` and `softness` B.
+    bounds (6,) : of A, B, C. out (m, 5) : hits, misses, A, B, C
     """
     n, points, found, roots = len(seeds), len(kappa), 0, 0
     determinant = jj[0] * difference[1] - jj[1] * difference[0]
@@ -179,20 +180,21 @@ def sweep(
                                 s, d = before_sum + w * (mean - before_sum), before_half + w * (half - before_half)
                                 hits, misses = 0, 0
                                 roots += 1
+                                at = kappa[k - 1] + w * (kappa[k] - kappa[k - 1])
+                                reach = max(tolerance, softness * (s + at * d))
                                 for q in range(total):
                                     f = companion_jj[q] * s + d * (
                                         companions[q, k - 1] + w * (companions[q, k] - companions[q, k - 1])
                                     )
                                     if f < low or f >= high:
                                         continue
-                                    if near[int((f - low) / bin_width)] < tolerance:
+                                    if near[int((f - low) / bin_width)] < reach:
                                         hits += 1
                                     else:
                                         misses += 1
                                         if misses >= 3 and misses > hits + 1:
                                             break
                                 if hits >= need and hits >= misses and found < len(out):
-                                    at = kappa[k - 1] + w * (kappa[k] - kappa[k - 1])
                                     out[found, 0], out[found, 1] = hits, misses
                                     out[found, 2], out[found, 3], out[found, 4] = s + d, s + at * d, s - d
                                     found += 1
@@ -294,10 +296,13 @@ def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
 @njit(cache=True, nogil=True)
 def quick_ratios(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
-    tops: Floats, kinds: Ints, temperatures: Floats, windows: Floats, sigma_mhz: float,
+    tops: Floats, kinds: Ints, temperatures: Floats, windows: Floats, sigma_mhz: float, softness: float,
     peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int, apart: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """ln of the likelihood ratio of each rigid top (tops,), lines of one type or of all, and the temperature it is best at."""
+    """ln of the likelihood ratio of each rigid top (tops,), lines of one type or of all, and the temperature it is best at.
+
+    The standard error of a line is the larger of `sigma_mhz` and `softness` B.
+    """
     out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
@@ -313,7 +318,7 @@ def quick_ratios(
             strongest = _apart(np.argsort(-expected), f[of_type], most, apart)
             chosen = of_type[strongest]
             ratios, _ = best_scales(
-                f[chosen], expected[strongest], kind[row[chosen]], np.full(len(chosen), sigma_mhz),
+                f[chosen], expected[strongest], kind[row[chosen]], np.full(len(chosen), max(sigma_mhz, softness * tops[t, 1])),
                 peaks, log_peaks, log_density, log_threshold, spread, detected, most, 8,
             )  # fmt: skip
             if ratios.sum() > out[t]:

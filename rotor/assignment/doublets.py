@@ -13,8 +13,10 @@ WIDEST_MHZ = 3.0
 UNLIKE = 2.5  # ratio of the intensities of two peaks that are not a doublet
 
 
-def with_centres(peaks: PeakList) -> tuple[PeakList, Ints]:
+def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
     """The peaks and the centres of all doublets among them, and (n, 2) the peaks behind each; equal for a single peak.
+
+    alone : of the single peaks only those that are in no doublet.
 
     A centre has the summed intensity. Of two components with unequal shares it is not the centre of gravity, so that its standard error
     gets a hundredth of the splitting.
@@ -28,6 +30,9 @@ def with_centres(peaks: PeakList) -> tuple[PeakList, Ints]:
         paired = (f[second] - f[first] < WIDEST_MHZ) & (ratio < UNLIKE) & (ratio > 1 / UNLIKE)
         members.append(np.column_stack([first[paired], second[paired]]))
     both = np.concatenate(members)
+    if alone:
+        doublets = both[len(f) :]
+        both = np.concatenate([np.delete(both[: len(f)], np.unique(doublets), axis=0), doublets])
     split = both[:, 0] != both[:, 1]
     centre = f[both].mean(axis=1)
     order = np.argsort(centre, kind="stable")

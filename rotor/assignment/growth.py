@@ -134,23 +134,26 @@ def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
 
 
 def regrown(field: Field, species: Grown) -> Grown:
-    """The species grown again from its constants with errors that are taken to be larger, where that gives more evidence.
+    """The species grown again from its constants with larger errors, where that gives more evidence.
 
     Lines that were taken too early and hold others off are given up that way.
     """
-    best, start = species, species.start
-    if start is None:
-        return species
+    return max([species, *grown_anew(field, species)], key=lambda rival: rival.evidence)
+
+
+def grown_anew(field: Field, species: Grown) -> list[Grown]:
+    """A species grown from its constants with errors larger by the factors `LARGER`; the field may hold other peaks."""
+    if species.start is None:
+        return []
     _, sizes = quartic_prior(field, species.constants)
     prior = np.diag(1 / np.concatenate([0.05 * species.constants[:3], sizes]) ** 2)
+    sigma0 = max(3 * species.rms_mhz, SMALLEST_MHZ)
+    begin = species.start._replace(temperature_k=species.temperature_k)
+    grown = []
     for factor in LARGER:
-        covariance = np.linalg.inv(np.linalg.inv(species.covariance) / factor**2 + prior)
-        begin = start._replace(temperature_k=species.temperature_k)
-        sigma0 = max(3 * species.rms_mhz, SMALLEST_MHZ)
-        again = _grown(field, species.constants, np.asarray(covariance, dtype=np.float64), prior, sigma0, begin, ROUNDS)
-        if again is not None and again.evidence > best.evidence:
-            best = again
-    return best
+        covariance = np.asarray(np.linalg.inv(np.linalg.inv(species.covariance) / factor**2 + prior), dtype=np.float64)
+        grown.append(_grown(field, species.constants, covariance, prior, sigma0, begin, ROUNDS))
+    return [species for species in grown if species is not None]
 
 
 def _grown(

@@ -20,6 +20,7 @@ from rotor.fitting.parameters import parameters
 from rotor.tops.constants import Constants
 
 REJECTED = 5.0  # standard errors beyond which a line does not count
+SCATTERED = 3.0  # scatter of lines over the errors of their peaks, from which the scatter counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,22 @@ def assigned_lines(grown: Grown, peaks: PeakList, table: RigidTable) -> Assignme
     """The lines of a species with labels; lines of one peak are a blend."""
     rows = grown.rows
     _, blend = np.unique(grown.peak, return_inverse=True)
-    error = np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)
+    error = np.hypot(np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ), excess_scatter(grown, peaks))
     return assignments(
         ("j", "ka", "kc"), table.quanta[table.upper[rows]], table.quanta[table.lower[rows]], peaks.frequency_mhz[grown.peak],
         error, weight=grown.share, blend=blend, source=peaks.source or "the spectrum",
     )  # fmt: skip
+
+
+def excess_scatter(grown: Grown, peaks: PeakList) -> float:
+    """Scatter (MHz) of the lines beyond the errors of their peaks; 0 where it is less than `SCATTERED` times these.
+
+    Lines of a splitting that is not resolved as doublets scatter alike about the constants; without this they were rejected as
+    outliers until a few lines were left that fit by chance.
+    """
+    known = float(np.median(np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)))
+    scatter = 1.4826 * float(np.median(np.abs(grown.residual)))
+    return float(np.sqrt(scatter**2 - known**2)) if scatter > SCATTERED * known else 0.0
 
 
 def refine(grown: Grown, peaks: PeakList, table: RigidTable) -> Refined:

@@ -14,15 +14,16 @@ from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.doublets import with_centres
 from rotor.assignment.evidence import probability, probability_of_isotopologue, word
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
-from rotor.assignment.growth import Grown
+from rotor.assignment.growth import Grown, grown_anew
 from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologue
 from rotor.assignment.peaks import PeakList, spurs
-from rotor.assignment.refinement import refine
+from rotor.assignment.refinement import excess_scatter, refine
 from rotor.assignment.rigid_table import JMAX, rigid_table
 from rotor.assignment.search import Field
 from rotor.assignment.species import (
     FIRST_STAGES,
     NEXT_STAGES,
+    STRONG_STAGES,
     Clock,
     compiled,
     explained,
@@ -38,7 +39,9 @@ COLDEST_K, HOTTEST_K = 0.7, 12.0
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
 GUESS_ERROR = 0.033  # of a guess: 3 % and a little
 SAMPLES_OF_GUESS = 300
-STRONG, MANY = 20, 5  # so many of the strongest peaks without a species: a stronger one may be there
+STRONG, MANY = 20, 6  # so many of the strongest peaks without a species: a stronger one may be there
+HIGH, FEW_HIGH = 0.4, 3  # and so many peaks higher than this share of the strongest species
+MOST_EXTRA = 3  # species beyond those of the request
 
 
 @dataclass(frozen=True)
@@ -177,8 +180,8 @@ class _Search:
         self.clock = Clock(self.request.seconds)
 
     def main_species(self) -> None:
-        """Species with structure of their own: as many as asked for, and stronger ones."""
-        extra = 2
+        """Species with structure of their own: as many as the request says, and stronger ones."""
+        extra = MOST_EXTRA
         while len(self.species) < self.request.species or (extra and self._stronger_may_be_left()):
             extra -= len(self.species) >= self.request.species
             if not self._one_more():
@@ -186,14 +189,19 @@ class _Search:
 
     def _one_more(self) -> bool:
         """Whether a further species was found, split lines as their centres where single ones show none."""
-        stages = FIRST_STAGES if not self.species else NEXT_STAGES
+        stages = FIRST_STAGES if not self.species else STRONG_STAGES if self._strong_left() >= MANY else NEXT_STAGES
         rows = np.flatnonzero(self.left)
         if len(rows) < 5:
             return False
         peaks = self.request.peaks.where(self.left)
         rivals = self._rivals(peaks, stages)
         if rivals:
-            self._add(peaks, np.column_stack([rows, rows]), rivals)
+            centres, members = with_centres(peaks, alone=True)
+            doublets = self._as_doublets(centres, rivals) if excess_scatter(rivals[0], peaks) else []
+            if doublets:
+                self._add(centres, rows[members], doublets)
+            else:
+                self._add(peaks, np.column_stack([rows, rows]), rivals)
             return True
         if not self.species and self.request.species == 1 and len(peaks) > 2000:
             return False
@@ -202,6 +210,12 @@ class _Search:
         if rivals:
             self._add(centres, rows[members], rivals)
         return bool(rivals)
+
+    def _as_doublets(self, centres: PeakList, rivals: list[Grown]) -> list[Grown]:
+        """The species grown on centres of doublets, where its lines scatter less about these."""
+        seen = Field(centres, self.table, self.request.bounds, self.request.temperatures)
+        anew = [again for again in grown_anew(seen, rivals[0]) if again.rms_mhz < rivals[0].rms_mhz / 2]
+        return sorted((again for again in anew if again.evidence > 0), key=lambda again: -again.evidence)[:1]
 
     def _rivals(self, peaks: PeakList, stages: Any) -> list[Grown]:
         seen = Field(peaks, self.table, self.request.bounds, self.request.temperatures)
@@ -223,10 +237,17 @@ class _Search:
         mask = explained(seen, best)
         self.left[members[mask].ravel()] = False
 
-    def _stronger_may_be_left(self) -> bool:
-        """Whether several of the strongest peaks belong to nothing yet."""
+    def _strong_left(self) -> int:
+        """Number of the strongest peaks that belong to no species yet."""
         order = np.argsort(np.where(self.of_clock, 0.0, -self.request.peaks.intensity))[:STRONG]
-        return int(self.left[order].sum()) >= MANY
+        return int(self.left[order].sum())
+
+    def _stronger_may_be_left(self) -> bool:
+        """Whether the peaks that are left may hold a stronger species: several strong ones are left, or the strongest of all."""
+        if self._strong_left() >= MANY or not self.species:
+            return True
+        high = np.sort(self.request.peaks.intensity[self.left])[-FEW_HIGH:] / max(one.strength for one in self.species)
+        return bool(len(high) == FEW_HIGH and (high[0] > HIGH or high[-1] > 1.0))
 
     def isotopologues(self) -> None:
         """Isotopologues of the strongest species."""

@@ -25,6 +25,7 @@ NEAR_MHZ = 0.5  # a peak this near to a predicted line counts as a hit: what dis
 CHANCE = 0.025  # share of the band near a peak: so many of the strongest peaks are matched
 RATIO = np.log(10.0)  # of the intensities of a family's lines
 ROUGH_MHZ = 0.25  # standard error of rigid lines when roots are ranked
+SOFTNESS = 2e-4  # standard error of a rigid line over B, where this is larger: shifts by distortion go with E² B/ω², E of some kT
 SPREAD = 0.6  # of ln intensity about the model: response of the instrument, saturation
 DETECTED = 0.95  # probability that a line above the threshold is in the list
 SAME = 3e-4  # relative difference of constants of roots that are the same
@@ -89,7 +90,7 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     found, _ = _kernels.sweep(
         np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa,
         np.ascontiguousarray((energies[:, further] - energies[:, below]).T), field.jj[further] - field.jj[below],
-        field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, RATIO,
+        field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
         field.bounds.array, need, out,
     )  # fmt: skip
     return out[:found]
@@ -120,7 +121,7 @@ def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Float
     table, peaks = field.table, field.peaks
     found: tuple[Floats, Floats] = _kernels.quick_ratios(
         table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
-        field.temperatures, peaks.windows, ROUGH_MHZ, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
+        field.temperatures, peaks.windows, ROUGH_MHZ, SOFTNESS, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
         peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ,
     )  # fmt: skip
     return found

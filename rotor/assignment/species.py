@@ -44,6 +44,10 @@ class Stage:
 
 
 FIRST_STAGES = (Stage(60, 0, 150), Stage(60, 150, 600), Stage(110, 0, 220), Stage(60, 600, 1200))
+STRONG_STAGES = (
+    Stage(60, 0, 120),
+    Stage(60, 120, 420),
+)  # of a further species, while several of the strongest peaks are left
 NEXT_STAGES = (Stage(60, 0, 120),)
 SCARCE = 45  # peaks up to which all families are tried: a family costs as the third power of their number
 
@@ -234,7 +238,8 @@ def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
     strong = level > seen.peaks.log_threshold - 2.0
     f, height = lines.frequency[strong], level[strong]
     peaks = seen.peaks
-    first, last = np.searchsorted(peaks.frequency_mhz, f - PEAK_MHZ), np.searchsorted(peaks.frequency_mhz, f + PEAK_MHZ)
+    reach = max(PEAK_MHZ, 2 * grown.rms_mhz)
+    first, last = np.searchsorted(peaks.frequency_mhz, f - reach), np.searchsorted(peaks.frequency_mhz, f + reach)
     for n in np.flatnonzero(last > first).tolist():
         near = slice(first[n], last[n])
         out[near] |= peaks.log_intensity[near] < height[n] + 1.5
