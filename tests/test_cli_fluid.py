@@ -1,6 +1,7 @@
 """`rotor fluid` on the command line: the contract of docs/command_line.md."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,46 @@ def test_other_models_and_a_file_without_velocities(call, folder):
     atoms.write("bare.xyz")
     code, out, _ = call("fluid", "bare.xyz", "--model", "trappe-n2", "--cutoff", "6", "--steps", "2", "--json", "-")
     assert code == 0
-    assert json.loads(out)["start"] == "bare.xyz; velocities drawn at 298.15 K"
+    facts = json.loads(out)
+    assert facts["start"] == "bare.xyz; velocities drawn at 298.15 K"
+    assert "is not equilibrated" in facts["notes"][-1]
+    assert facts["averaged_share"] == 0.5
+
+
+def test_a_box_of_a_file_is_equilibrated_where_requested(call, folder):
+    assert call(*VAPOUR, "--steps", "2", "--trajectory", "box.extxyz")[0] == 0
+    run = "fluid", "box.extxyz", "--cutoff", "4", "--step", "1fs", "--steps", "2"
+    before = Path("box.extxyz").read_bytes()
+    code, out, _ = call(*run, "--equilibration", "50 fs", "--json", "-", "--save-scene", "s.toml")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["start"].startswith("box.extxyz; velocities those of the box; equilibrated for 0.05 ps under langevin")
+    assert (facts["equilibration_ps"], facts["averaged_share"]) == (pytest.approx(0.05), 1.0)
+    assert not facts["notes"]
+    assert Path("box.extxyz").read_bytes() == before
+    again = json.loads(call("run", "s.toml", "--json", "-")[1])
+    assert [mean["mean"] for mean in again["means"]] == [mean["mean"] for mean in facts["means"]]
+    as_it_is = json.loads(call(*run, "--json", "-")[1])
+    assert as_it_is["equilibration_ps"] is None
+    code, out, _ = call("plan", "s.toml")
+    assert code == 0
+    assert re.search(r"equilibration +0\.05 ps", out)
+    assert re.search(r"equilibration steps +50", out)
+
+
+def test_a_plan_counts_the_equilibration_of_a_box_that_is_made(call, folder):
+    Path("s.toml").write_text(
+        'schema = 1\nkind = "fluid"\n[conditions]\nmolecules = 27\ndensity = 0.3\nsteps = 100\n[numerics]\ncutoff = 4\nstep = 2\n'
+    )
+    code, out, err = call("plan", "s.toml")
+    assert code == 0, err
+    text = " ".join(out.split())
+    assert "equilibration 10 ps at least, until stationary, 100 ps at most; seconds count the least" in text
+    assert "equilibration steps 5,000" in text
+    with_it = float(re.search(r"seconds ([\d.e+-]+)", text)[1])
+    Path("s.toml").write_text(Path("s.toml").read_text().replace("steps = 100", "steps = 100\nequilibration = 0"))
+    without = float(re.search(r"seconds +([\d.e+-]+)", call("plan", "s.toml")[1])[1])
+    assert with_it > 10 * without
 
 
 @pytest.mark.parametrize(
@@ -84,7 +124,7 @@ def test_other_models_and_a_file_without_velocities(call, folder):
         (("water", "--molecules", "8", "--model", "argon"), "--model argon is no model of water"),
         (("benzene", "--molecules", "8"), "a box is made of one model"),
         (("water", "--density", "1"), "--density: expected with --molecules"),
-        (("water", "--equilibration", "1ps"), "--equilibration: expected with --molecules"),
+        (("water", "--equilibration", "-1ps"), "--equilibration: -1ps: expected a finite number of 0 ps or more"),
         (
             ("water", "--molecules", "8", "--relaxation", "9fs", "--ensemble", "langevin"),
             "with --ensemble nose-hoover; langevin has",

@@ -56,6 +56,11 @@ class Equilibration:
         return f"equilibrated for {self.time_ps:.4g} ps under langevin ({FRICTION_PER_PS:g}/ps), {judged}"
 
 
+def equilibration_range(time_ps: float | None) -> tuple[float, float]:
+    """The shortest and the longest time (ps) of an equilibration of this length; None until the box is stationary."""
+    return (SHORTEST_PS, LONGEST_PS) if time_ps is None else (time_ps, time_ps)
+
+
 def equilibrate(
     atoms: Atoms, settings: Settings, time_ps: float | None = None, progress: Progress = lambda *_: None
 ) -> Equilibration:

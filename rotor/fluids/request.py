@@ -59,6 +59,7 @@ class FluidRequest:
 
     settings: model, ensemble and length of the run. box: an ase.Atoms with its cell, or a `NewBox` to make. engine: rotor,
     openmm or lammps. threads: of the built-in potential or of the engine. box_source: where a box that was read is from.
+    box_equilibration_ps: of a box that was read, as `NewBox.equilibration_ps`; by default it starts as it is.
     """
 
     box: Atoms | NewBox
@@ -72,13 +73,21 @@ class FluidRequest:
     )
     threads: int = declared(1, Whole(1), "Threads of the built-in potential, or of the engine", "numerics.threads")
     box_source: str = "given"
+    box_equilibration_ps: float | None = 0.0
 
     def __post_init__(self) -> None:
+        if self.box_equilibration_ps:
+            require_positive("box_equilibration_ps", self.box_equilibration_ps, "ps")
         require_whole("threads", self.threads, 1)
         require_one_of("engine", self.engine, ("rotor", *ENGINES))
         models = models_of(self.settings.model)
         if isinstance(self.box, NewBox) and len(models) > 1:
             raise ValueError(f"model {self.settings.model!r}: a box is made of one model; give a box of the mixture")
+
+    @property
+    def equilibration_ps(self) -> float | None:
+        """How long the thermostat acts before the run; None until the box is stationary, 0 not at all."""
+        return self.box.equilibration_ps if isinstance(self.box, NewBox) else self.box_equilibration_ps
 
     @property
     def start(self) -> str:
@@ -124,8 +133,18 @@ class FluidAnswer(TextOf):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the count of degrees of freedom depends on."""
-        return tuple(self._count[1].notes)
+        """What the count of degrees of freedom depends on, and means of a box that no thermostat has brought to its temperature."""
+        return (*self._count[1].notes, *self._start_notes)
+
+    @property
+    def _start_notes(self) -> tuple[str, ...]:
+        moves = self.request.settings.steps > 0 and not isinstance(self.request.box, NewBox)
+        if not moves or self.equilibration is not None or "velocities drawn" not in self.start:
+            return ()
+        return (
+            "the box of a file without velocities is not equilibrated: its temperatures drift before means are taken; an equilibration "
+            "(--equilibration auto) brings it to its temperature first",
+        )
 
     @property
     def density_g_cm3(self) -> float | None:
@@ -214,9 +233,10 @@ def answer_fluid(
     speeds = "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{request.start}; velocities {speeds}"
     equilibration = None
-    if isinstance(request.box, NewBox) and not resume and request.box.equilibration_ps != 0:
+    if not resume and request.equilibration_ps != 0:
+        atoms = atoms if isinstance(request.box, NewBox) else _with_calculator(atoms, settings, request.threads)
         with progress_bar(0, progress) as shown:
-            equilibration = equilibrate(atoms, settings, request.box.equilibration_ps, shown)
+            equilibration = equilibrate(atoms, settings, request.equilibration_ps, shown)
         start += f"; {equilibration.text}"
     if not own:
         from rotor.fluids.engines.follow import follow_engine
@@ -249,6 +269,13 @@ def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:
     if relaxed:
         relax(atoms, shapes=shapes_of([model]))
     return atoms
+
+
+def _with_calculator(atoms: Atoms, settings: Settings, threads: int) -> Atoms:
+    """A box that was read, with the built-in potential where it has no calculator; a copy, since equilibration moves it."""
+    copied: Atoms = atoms.copy()
+    copied.calc = atoms.calc or calculator_of(settings, threads)
+    return copied
 
 
 def _species(bodies: Bodies) -> list[dict[str, Any]]:

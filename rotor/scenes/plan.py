@@ -375,19 +375,26 @@ def plan_of_align(request: Any) -> Plan:
 
 def plan_of_fluid(request: Any) -> Plan:
     """The plan of a fluid request."""
+    from rotor.fluids.equilibration import equilibration_range
     from rotor.fluids.request import NewBox, answer_fluid, box_of
 
     settings = request.settings
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
     made = request if not isinstance(request.box, NewBox) else replace(request, box=box_of(request))
+    made = replace(made, box_equilibration_ps=0.0)
+    least_ps, most_ps = equilibration_range(request.equilibration_ps)
+    before = round(1e3 * least_ps / settings.step_fs)
 
     def short(steps: int) -> Any:
         return answer_fluid(
             replace(made, box=made.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
         )
 
-    seconds = extrapolated(short, float, SHORT_STEPS, settings.steps)
+    seconds = extrapolated(short, float, SHORT_STEPS, before + settings.steps)
+    until = (
+        "" if most_ps == least_ps else f" at least, until stationary, {most_ps:g} ps at most; seconds count the least"
+    )
     return Plan(
         kind="fluid",
         effects=("Lennard-Jones and charges of rigid sites", settings.electrostatics),
@@ -395,8 +402,9 @@ def plan_of_fluid(request: Any) -> Plan:
         parts=(
             ("method", f"splitting of rigid bodies, {settings.step_fs:g} fs a step, {settings.ensemble}"),
             ("forces", f"cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}, even liquid beyond it"),
+            *([("equilibration", f"{least_ps:g} ps{until}")] if before else []),
         ),
-        counts={"atoms": len(made.box), "steps": settings.steps},
+        counts={"atoms": len(made.box), "steps": settings.steps} | ({"equilibration steps": before} if before else {}),
         seconds=seconds,
         memory_mb=peak_mb(lambda: short(min(SETTLING_STEPS, settings.steps))),
         left_out=tuple(_left_out_of_fluid(short(min(SETTLING_STEPS, settings.steps)).atoms, settings)),

@@ -64,7 +64,7 @@ class BoxInput:
         common=True, example=0.997,
     )  # fmt: skip
     equilibration: float | None = declared(
-        None, Quantity("ps", least=0, metavar="T"), "Thermostat before the run (ps), 0 for none; by default until stationary",
+        None, Quantity("ps", least=0, metavar="T"), "Thermostat before the run (ps), 0 for none; auto: until stationary",
         "conditions.equilibration", none="auto", example="20 ps",
     )  # fmt: skip
     box: str | None = declared(
@@ -89,14 +89,15 @@ class Box(SubjectKind):
         settings = Settings(**read_fields(Settings, given))
         self._refuse_unused(asked, settings, given)
         if given.style == "key":
-            return self._of_scene(asked, place)
+            return self._of_scene(asked, place, _of_file(asked, given))
         if asked.source is None:
             raise ValueError("SOURCE is missing; --help shows what the command takes")
         if asked.molecules is not None:
             return Subject({"box": _new_box(asked, settings), "box_source": "given"}, (), asked.source, place.note)
         if not Path(asked.source).is_file():
             raise ValueError(f"{asked.source}: no such file; with --molecules N a box is made of 'water' or of a model")
-        return Subject({"box": _read(asked.source), "box_source": asked.source}, (), asked.source, place.note)
+        values = {"box": _read(asked.source), "box_source": asked.source, **_of_file(asked, given)}
+        return Subject(values, (), asked.source, place.note)
 
     def _refuse_unused(self, asked: BoxInput, settings: Settings, given: Given) -> None:
         """ValueError for what was typed and changes nothing: of another ensemble, of other charges, of a box that is made."""
@@ -110,13 +111,11 @@ class Box(SubjectKind):
             if given.has(known[name]) and chosen != needed:
                 option, other = known[name].called(given.style), known[choice].called(given.style)
                 raise ValueError(f"{option}: expected with {other} {needed}; {chosen} has no use for it")
-        why = {"density": "has the density of its cell", "equilibration": "starts as it is"}
-        for key, reason in why.items():
-            if asked.molecules is None and getattr(asked, key) is not None:
-                option, other = (known[f"conditions.{n}"].called(given.style) for n in (key, "molecules"))
-                raise ValueError(f"{option}: expected with {other}; the box of a file {reason}")
+        if asked.molecules is None and asked.density is not None:
+            option, other = (known[f"conditions.{n}"].called(given.style) for n in ("density", "molecules"))
+            raise ValueError(f"{option}: expected with {other}; the box of a file has the density of its cell")
 
-    def _of_scene(self, asked: BoxInput, place: Place) -> Subject:
+    def _of_scene(self, asked: BoxInput, place: Place, of_file: dict[str, Any]) -> Subject:
         if (asked.molecules is None) == (asked.box is None):
             raise ValueError("conditions: give either molecules, to make a box of, or a box")
         if asked.molecules is not None:
@@ -127,7 +126,7 @@ class Box(SubjectKind):
         if not Path(path).is_file():
             raise ValueError(f"conditions.box: {path}: no such file")
         try:
-            return Subject({"box": _read(path), "box_source": str(asked.box)}, (), path, place.note)
+            return Subject({"box": _read(path), "box_source": str(asked.box), **of_file}, (), path, place.note)
         except ValueError as error:
             raise ValueError(f"conditions.box: {error}") from None
 
@@ -136,7 +135,16 @@ class Box(SubjectKind):
         if isinstance(request.box, NewBox):
             made = BoxInput(None, request.box.molecules, request.box.density_g_cm3, request.box.equilibration_ps)
             return written_fields(made)
-        return {"conditions.box": beside(request.box_source, folder)}
+        files = {"conditions.box": beside(request.box_source, folder)}
+        if request.box_equilibration_ps == 0:
+            return files
+        return files | written_fields(BoxInput(equilibration=request.box_equilibration_ps))
+
+
+def _of_file(asked: BoxInput, given: Given) -> dict[str, Any]:
+    """The equilibration of a box that is read: none, unless it is requested."""
+    field = all_fields(BoxInput)["conditions.equilibration"]
+    return {"box_equilibration_ps": asked.equilibration} if given.has(field) else {}
 
 
 def _read(path: str) -> Atoms:
