@@ -7,6 +7,10 @@
 | align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
+| spectrum | intensities, "0.1 %" | nothing: Q is summed to 1e-8 | of the sum Q, and rounding |
+| emission | brightness, "1 mK" | the largest least depth, in decades | lines left out, Q |
+| fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades | the next step |
+| torsion | levels | nothing: exact | functions, terms of the series |
 | gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
 
 It is the numerical error with the constants as given. Their own uncertainty, and orders of distortion that they do not have, are
@@ -49,9 +53,11 @@ def asked_of(scene: Scene) -> float | None:
         text, scale = text[:-1], 0.01
     if numerics.unit == "rad":
         text = text.removesuffix("rad").strip()
-    if scale != 1.0 and not numerics.percent:
+    if scale != 1.0 and numerics.relative:
+        scale = 1.0  # in percent
+    elif scale != 1.0 and not numerics.percent:
         raise ValueError(f"accuracy: {given!r}: expected {numerics.unit}, not a percentage")
-    unit = numerics.unit if numerics.unit == "MHz" else ""
+    unit = numerics.unit if numerics.unit in ("MHz", "K") and unit_of(scene) != "%" else ""
     value = scale * quantity("accuracy", text, unit)
     if not value > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
@@ -72,9 +78,9 @@ def unit_of(scene: Scene) -> str:
     ['K', '%', '']
     """
     numerics = numerics_of(scene.kind)
-    if not numerics.units:
-        return numerics.unit
     text = str(accuracy_text(scene)).strip()
+    if not numerics.units:
+        return "%" if numerics.relative and text.endswith("%") else numerics.unit
     return "" if _of_curves(scene, text) else "%" if text.endswith("%") else "K"
 
 
@@ -114,7 +120,7 @@ def chosen(scene: Scene, request: Any) -> Choice:
     """
     asked = asked_of(scene)
     assert asked is not None
-    return choose(scene, request, asked)
+    return choose(scene, request, asked, unit_of(scene))
 
 
 def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
@@ -223,6 +229,14 @@ def rounding_mhz(levels: Any) -> float:
 def error_of_list(answer: Any, unit: str) -> float:
     """The error of the lines of an answer."""
     return _levels_error(answer.lines.top, answer.lines.levels)
+
+
+def error_of_intensities(answer: Any) -> float:
+    """The error of the intensities of lines in percent: of Q, and of strengths whose vectors are rounded."""
+    lines = answer.lines
+    return 100.0 * (
+        float(lines.partition.relative_error) + ROUNDING * max(1, int(lines.levels.rotational.max(initial=0)))
+    )
 
 
 def error_of_levels(answer: Any, unit: str) -> float:

@@ -24,6 +24,7 @@ class Numerics:
     unit: of an accuracy. units: of which each is the accuracy of something else, instead. percent: whether it may be a percentage.
     choose: of (scene, request, accuracy), the settings; by default those of the knob whose value bounds the error. error: of
     (answer, unit); by default the numerical error of the budget. sweeps: of a request, what is swept beside the knobs of its fields.
+    relative: of an answer, the error in percent of what an accuracy in percent is of, beside the unit; choose_relative: its settings.
     plan: of a request. levels: an answer has levels of which the rounding is checked.
     """
 
@@ -32,6 +33,8 @@ class Numerics:
     percent: bool = False
     choose: str = ""
     error: str = ""
+    relative: str = ""
+    choose_relative: str = ""
     sweeps: str = ""
     plan: str = ""
     levels: bool = False
@@ -39,7 +42,7 @@ class Numerics:
 
 _TABLE = {
     "spectrum": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_list", sweeps="knobs.of_levels:spectrum",
-                         plan="plan:plan_of_spectrum", levels=True),
+                         relative="accuracy:error_of_intensities", plan="plan:plan_of_spectrum", levels=True),
     "levels": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_levels", sweeps="knobs.of_levels:levels",
                        plan="plan:plan_of_levels", levels=True),
     "raman": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_list", sweeps="knobs.of_levels:raman",
@@ -54,8 +57,10 @@ _TABLE = {
                     sweeps="knobs.of_motion:gas", plan="plan:plan_of_gas"),
     "fluid": Numerics(units=("K", "%"), choose="accuracy_sampled:choose_step", error="accuracy_sampled:error_of_fluid",
                       sweeps="knobs.of_motion:fluid", plan="plan:plan_of_fluid"),
-    "fit": Numerics(sweeps="knobs.of_measured:fit", plan="plan_measured:plan_of_fit"),
-    "emission": Numerics(plan="plan_measured:plan_of_emission"),
+    "fit": Numerics(choose="accuracy_measured:choose_for_lines", relative="accuracy_measured:error_of_constants",
+                    choose_relative="accuracy_measured:choose_for_constants",
+                    sweeps="knobs.of_measured:fit", plan="plan_measured:plan_of_fit"),
+    "emission": Numerics("K", choose="accuracy_measured:choose_depth", plan="plan_measured:plan_of_emission"),
     "assign": Numerics(sweeps="knobs.of_measured:assign", plan="plan_measured:plan_of_assign"),
     "torsion": Numerics(sweeps="knobs.of_measured:torsion", plan="plan:plan_of_torsion"),
 }  # fmt: skip
@@ -73,9 +78,16 @@ def load(name: str) -> Callable[..., Any]:
     return found
 
 
-def choose(scene: Any, request: Any, accuracy: float) -> Choice:
+def choose(scene: Any, request: Any, accuracy: float, unit: str) -> Choice:
     """The request with the cheapest settings that reach an accuracy."""
     numerics = numerics_of(scene.kind)
+    if numerics.relative and unit == "%":
+        by_percent: Choice = (
+            load(numerics.choose_relative)(scene, request, accuracy)
+            if numerics.choose_relative
+            else Choice(request, NOTHING_CHEAPER)
+        )
+        return by_percent
     if numerics.choose:
         found: Choice = load(numerics.choose)(scene, request, accuracy)
         return found
@@ -93,6 +105,8 @@ def choose_by_knob(request: Any, accuracy: float) -> Choice:
 def error_of(kind: str, answer: Any, unit: str) -> float:
     """The error that an answer has, in the unit of the accuracy."""
     numerics = numerics_of(kind)
+    if numerics.relative and unit == "%":
+        return float(load(numerics.relative)(answer))
     if numerics.error:
         return float(load(numerics.error)(answer, unit))
     return float(answer.errors.numerical or 0.0)

@@ -346,6 +346,8 @@ VERB = Verb(
     notes=lambda answer: answer.notes,
     drawn="MHz",
     spectral=True,
+    accuracy="of the brightness",
+    accuracy_example="1 mK",
     start={
         "molecules.source": "CO",
         "molecules.column": 1e16,

@@ -344,6 +344,7 @@ VERB = Verb(
     content=content,
     notes=lambda answer: (*answer.request.notes, *answer.fit.notes),
     drawn=None,
+    accuracy="of the frequencies of the lines, or of the constants (% of their standard errors)",
     sound=False,
     build=build,
     check=check,

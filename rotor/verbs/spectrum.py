@@ -319,5 +319,5 @@ VERB = Verb(
     build=build,
     adapt=adapt,
     check=check,
-    accuracy="of the frequencies",
+    accuracy="of the frequencies, or of the intensities (%)",
 )

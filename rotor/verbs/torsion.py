@@ -153,6 +153,7 @@ VERB = Verb(
     ),
     content=content,
     notes=lambda answer: answer.warnings,
+    accuracy="of the levels",
     sound=False,  # a potential is read, and a scan fails, where it is made
     drawn="",
     start={"molecule": "C2H6", "observables.bond": "1-2"},
