@@ -1,4 +1,4 @@
-"""The Python blocks of the pages on classical motion, scenes, spins and states run, and their assertions hold."""
+"""The Python blocks of the pages on classical motion, the Hamiltonian, scenes, spins and states run, and their assertions hold."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
-@pytest.mark.parametrize("page", ["classical", "gas", "potential", "scenes", "spins_and_states"])
+@pytest.mark.parametrize("page", ["classical", "gas", "hamiltonian", "potential", "scenes", "spins_and_states"])
 def test_blocks_run(page):
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / f"{page}.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
