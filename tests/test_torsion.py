@@ -236,6 +236,27 @@ def test_a_relaxed_scan_is_even_where_the_molecule_has_a_plane():
     assert len(scan.angles) == 12
 
 
+@pytest.mark.parametrize(
+    ("smiles", "bond", "even"),
+    [("CCCC", "2-3", True), ("CC=O", "1-2", True), ("OO", "1-2", True), ("CC(F)Cl", "1-2", False)],
+)
+def test_planes_of_both_parts_make_the_potential_even(smiles, bond, even):
+    rotation = bond_rotation(read_molecule(f"SMILES:{smiles}"), bond)
+    about = rotation.mirror_angle()
+    assert (about is not None) == even
+    if about is not None:  # both hands of a turn have the same distances between atoms
+        turned = [rotation.turned(about + sign * 0.7).positions_angstrom for sign in (1, -1)]
+        lengths = [np.sort(np.linalg.norm(x[:, None] - x, axis=-1), axis=None) for x in turned]
+        assert np.abs(lengths[0] - lengths[1]).max() < 0.1  # the geometry is symmetric to some 0.03 Å
+
+
+def test_both_gauche_wells_of_butane_are_alike():
+    answer = answer_torsion(TorsionRequest(top_of("SMILES:CCCC"), "2-3"))
+    wells = sorted(well.energy_mhz for well in answer.torsion.wells())
+    assert len(wells) == 3
+    assert wells[1] == pytest.approx(wells[2], rel=1e-9)  # of a series without odd terms
+
+
 def test_a_scan_of_an_ase_calculator_object_is_that_of_its_name():
     top = top_of("SMILES:OO")
     by_name = answer_torsion(TorsionRequest(top, "1-2", points=12))

@@ -113,6 +113,35 @@ class BondRotation:
                 return n
         return 1
 
+    def mirror_angle(self, isotopes: bool = True) -> float | None:
+        """An angle α_0 about which energy and moments are even: planes of symmetry of both parts along the bond coincide there.
+
+        None where a part has no such plane. isotopes: as for `symmetry_number`.
+        """
+        planes = [self._plane(atoms, isotopes) for atoms in (self.top, self.frame)]
+        if planes[0] is None or planes[1] is None:
+            return None
+        return float((planes[1] - planes[0] + math.pi / 2) % math.pi - math.pi / 2)
+
+    def _plane(self, atoms: Ints, isotopes: bool) -> float | None:
+        """φ about the bond of a plane whose reflection brings every atom of a part to a place of its like; None without one."""
+        x, axis = self.molecule.positions_angstrom, _axis(self.molecule.positions_angstrom, self.first, self.last)
+        across = _across(x, self, atoms.tolist(), unit=False)
+        along = (x[atoms] - x[self.last]) @ axis
+        kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
+        alike = np.array([[one == other for other in kinds] for one in kinds])
+        outermost = int(np.argmax(np.abs(across)))
+        planes = []
+        for other in np.flatnonzero(alike[outermost]).tolist():
+            turn = across[outermost] * across[other]  # exp 2iφ
+            reflected = turn / abs(turn) * across.conj() if turn else across
+            apart = np.hypot(np.abs(reflected[:, None] - across), along[:, None] - along)
+            apart = np.where(alike, apart, np.inf)
+            if apart.min(axis=1).max() < SYMMETRIC_ANGSTROM:
+                mean = np.sum(across * across[apart.argmin(axis=1)])
+                planes.append((float(apart.min(axis=1).max()), float(np.angle(mean)) / 2))
+        return min(planes)[1] if planes else None
+
     def angle(self, positions: Floats) -> float:
         """Mean angle by which the inner atoms of the top have turned against those of the frame, radian from -π to π.
 
@@ -221,12 +250,12 @@ def _off_axis(positions: Floats, atom: int, first: int, last: int) -> float:
     return float(np.linalg.norm(np.cross(positions[atom] - positions[last], _axis(positions, first, last))))
 
 
-def _across(positions: Floats, rotation: BondRotation, atoms: list[int]) -> NDArray[np.complex128]:
-    """exp iφ of atoms about the bond, φ from the plane of the bond and the first atom of the dihedral angle."""
+def _across(positions: Floats, rotation: BondRotation, atoms: list[int], unit: bool = True) -> NDArray[np.complex128]:
+    """exp iφ of atoms about the bond, φ from the plane of the bond and the first atom of the dihedral angle; times r if not `unit`."""
     axis = _axis(positions, rotation.first, rotation.last)
     side = positions[rotation.dihedral_atoms()[0]] - positions[rotation.first]
     side = side - (side @ axis) * axis
     side /= np.linalg.norm(side)
     arms = positions[atoms] - positions[rotation.last]
     waves = arms @ side + 1j * (arms @ np.cross(axis, side))
-    return np.asarray(waves / np.abs(waves))
+    return np.asarray(waves / np.abs(waves) if unit else waves)

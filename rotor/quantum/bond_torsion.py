@@ -41,9 +41,15 @@ class FourierSeries:
     sines: Floats
 
     @classmethod
-    def fitted(cls, angles: ArrayLike, values: ArrayLike, period: int, harmonics: int) -> FourierSeries:
-        """Least squares of n = period, 2 period, ..., harmonics · period."""
+    def fitted(
+        cls, angles: ArrayLike, values: ArrayLike, period: int, harmonics: int, even_about: float | None = None
+    ) -> FourierSeries:
+        """Least squares of n = period, 2 period, ..., harmonics · period; of cos n(α - α_0) alone where f is even about an angle α_0."""
         alpha, n = np.asarray(angles, dtype=float), period * np.arange(1, harmonics + 1)
+        if even_about is not None:
+            cosines = np.hstack([np.ones((len(alpha), 1)), np.cos(np.outer(alpha - even_about, n))])
+            even = np.linalg.lstsq(cosines, np.asarray(values, dtype=float), rcond=None)[0]
+            return cls(float(even[0]), n, even[1:] * np.cos(n * even_about), even[1:] * np.sin(n * even_about))
         phases = np.outer(alpha, n)
         columns = np.hstack([np.ones((len(alpha), 1)), np.cos(phases), np.sin(phases)])
         fit = np.linalg.lstsq(columns, np.asarray(values, dtype=float), rcond=None)[0]

@@ -312,13 +312,17 @@ def _made(
         raise ValueError(f"potential: {error}") from None
     period = rotation.symmetry_number(isotopes=False)
     harmonics = max(1, len(scan.angles) // 3)
-    potential = FourierSeries.fitted(scan.angles, scan.energies_cm * units.MHZ_PER_CM, period, harmonics)
+    potential = FourierSeries.fitted(
+        scan.angles, scan.energies_cm * units.MHZ_PER_CM, period, harmonics, rotation.mirror_angle(False)
+    )
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
     own = rotation.symmetry_number()
     if own != period:  # isotopes: the masses repeat less often than the potential, and are scanned rigidly
         return potential, _rigid_kinetic(rotation, request.points), scan.source, scan, float(misfit)
-    kinetic = FourierSeries.fitted(scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics)
+    kinetic = FourierSeries.fitted(
+        scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
+    )
     return potential, kinetic, scan.source, scan, float(misfit)
 
 
@@ -337,7 +341,9 @@ def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
     moments = [
         rotation.reduced_moment(rotation.turned_positions(rotation.molecule.positions_angstrom, x)) for x in angles
     ]
-    return FourierSeries.fitted(angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / np.array(moments), period, count // 3)
+    return FourierSeries.fitted(
+        angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / np.array(moments), period, count // 3, rotation.mirror_angle()
+    )
 
 
 def _series(terms: TorsionalPotential) -> FourierSeries:
