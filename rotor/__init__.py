@@ -11,7 +11,6 @@ Every verb of the command line is a function whose keyword arguments are numbers
 The building blocks behind them are in `rotor.api`. Names are loaded when they are first used, so that `import rotor` does no work.
 """
 
-from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -51,8 +50,11 @@ VERBS = (
     "zeeman",
     "align",
     "emission",
+    "info",
+    "isotopologues",
     "fit",
     "assign",
+    "structure",
     "torsion",
 )  # each a function of that name
 
@@ -103,21 +105,15 @@ def _moved(name: str) -> Any:
     from rotor import api
 
     if name not in api.MODULES:
-        raise AttributeError(f"module 'rotor' has no attribute {name!r}{_near(name, [*__all__, *api.MODULES])}")
+        from rotor.checks import did_you_mean
+
+        raise AttributeError(f"module 'rotor' has no attribute {name!r}{did_you_mean(name, [*__all__, *api.MODULES])}")
     import warnings
 
     warnings.warn(
         f"rotor.{name} is rotor.api.{name} from version 0.3 on; see docs/migration.md", DeprecationWarning, stacklevel=3
     )
     return getattr(api, name)
-
-
-def _near(name: str, known: Iterable[str]) -> str:
-    """The names that are like an unknown one, as the end of a message."""
-    from difflib import get_close_matches
-
-    matches = get_close_matches(name, known, n=3)
-    return f"; did you mean {', '.join(matches)}?" if matches else ""
 
 
 def __dir__() -> list[str]:

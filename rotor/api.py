@@ -6,11 +6,13 @@
 Functions of a top take whatever `rotor.read` takes instead. Names are loaded when they are first used.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache, wraps
 from importlib import import_module
 from inspect import signature
 from typing import TYPE_CHECKING, Any
+
+from rotor.checks import did_you_mean
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace as AlignmentTrace
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
     from rotor.spectra.request import GasLayer as GasLayer
     from rotor.spectra.request import SpectrumRequest as SpectrumRequest
     from rotor.spectra.request import answer_spectrum as answer_spectrum
+    from rotor.structures.family import family as family
     from rotor.thermodynamics import VibrationalStates as VibrationalStates
     from rotor.thermodynamics import partition_function as partition_function
     from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
@@ -87,6 +90,7 @@ MODULES = {
     "answer_thermo": "rotor.thermodynamics.request",
     "answer_tumble": "rotor.classical.tumble",
     "answer_zeeman": "rotor.quantum.fields.zeeman_request",
+    "family": "rotor.structures.family",
     "effects_of": "rotor.quantum.effects.of_top",
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
@@ -115,7 +119,7 @@ def __getattr__(name: str) -> Any:
     if name in MODULES:
         found = getattr(import_module(MODULES[name]), name)
         return _taking_words(found) if name in OF_TOPS else found
-    raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{_near(name, MODULES)}")
+    raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{did_you_mean(name, MODULES)}")
 
 
 @cache
@@ -144,16 +148,8 @@ def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], optio
     except TypeError as error:
         unknown = next((name for name in options if name not in taken.parameters), None)
         names = [name for name in taken.parameters if name not in ("top", *options)]
-        which = _near(unknown, names) if unknown else ""
+        which = did_you_mean(unknown, names) if unknown else ""
         raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None
-
-
-def _near(name: str, known: Iterable[str]) -> str:
-    """The names that are like one that is not known, as the end of a message."""
-    from difflib import get_close_matches
-
-    found = get_close_matches(name, known, n=3)
-    return f"; did you mean {', '.join(found)}?" if found else ""
 
 
 def __dir__() -> list[str]:

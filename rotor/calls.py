@@ -13,6 +13,7 @@ from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Any
 
+from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Given
@@ -37,6 +38,14 @@ EXAMPLES = {
     "assign": ("rotor.assign([[7000.0, 1.0], [9000.0, 2.0]]).word", "'not found'"),
     "torsion": (
         'rotor.torsion("C2H6", bond="1-2", potential="V3=1013 cm-1", vmax=0).table.energy_cm.round(2).tolist()', "[150.15, 150.15]",
+    ),
+    "info": ('rotor.info("CO").facts()["kind"]', "'linear'"),
+    "isotopologues": (
+        'rotor.isotopologues("CO", min_abundance=1e-3).table.columns["label"].tolist()', "['CO', '[13C]O (1=13C)', 'C[18O] (2=18O)']",
+    ),
+    "structure": (
+        'rotor.structure(rotor.api.family(rotor.Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]]), [("CO", "", {"B": 57635.968}, {})]), '
+        'methods="r0").table.columns["value"].round(4).tolist()', "[1.1309]",
     ),
     "fit": (
         'rotor.fit([(1, 0, 20.0, 0.1), (2, 1, 40.0, 0.1)], constants="B=9 MHz", free="B").parameters.value_mhz.round(6).tolist()', "[10.0]",
@@ -160,17 +169,11 @@ def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Re
     fields = {field.name: field for field in verb.fields.values()}
     unknown = [name for name in values if name not in fields]
     if unknown:
-        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{_near(unknown[0], fields)}")
+        others = f"; it takes {', '.join(fields)}"
+        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
     given = Given({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
     request, subject = verb.read(given, Place())
     return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(given))), subject, given)
-
-
-def _near(name: str, known: Mapping[str, Any]) -> str:
-    from difflib import get_close_matches
-
-    matches = get_close_matches(name, known, n=3)
-    return f"; did you mean {', '.join(matches)}?" if matches else f"; it takes {', '.join(known)}"
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 
 def require_positive(name: str, value: float, unit: str = "") -> float:
@@ -88,3 +88,15 @@ def require_top(value: object) -> None:
 
 class RunStopped(ValueError):
     """A run that began could not continue; what was written before stays."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """The names that are like an unknown one, as the end of a message; empty where there is none.
+
+    >>> did_you_mean("jmex", ["jmax", "range"])
+    '; did you mean jmax?'
+    """
+    from difflib import get_close_matches
+
+    matches = get_close_matches(name, list(known), n=3)
+    return f"; did you mean {', '.join(matches)}?" if matches else ""

@@ -332,10 +332,10 @@ def test_a_family_that_cannot_be_is_refused(call, folder, old, new, words):
 
 def test_methods_that_cannot_be_are_refused(call, folder):
     (folder / "ocs.toml").write_text(FAMILY)
-    assert "--method rx" in call("structure", "ocs.toml", "--method", "rx")[2]
+    assert "--method: 'rx'" in call("structure", "ocs.toml", "--method", "rx")[2]
     code, _, err = call("structure", "ocs.toml", "--method", "rs", "--check")
     assert code == 2
-    assert "--check goes with r0, rm1, rm2 or re" in err
+    assert "--check: goes with r0, rm1, rm2 or re" in err
     assert "no constant has a correction" in call("structure", "ocs.toml", "--method", "re")[2]
     assert "a family of isotopologues is a .toml file" in call("structure", "ocs.xyz")[2]
 

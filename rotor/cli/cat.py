@@ -33,6 +33,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.requests.readers import Quantity
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.compare import Comparison
@@ -113,7 +114,11 @@ def filtered(lines: Catalogue, range_: str | None, min_lgint: str | None) -> Cat
     first, last = (0.0, math.inf)
     if range_ is not None:
         first, last = inputs.parsed("--range", range_, lambda text: parse_range(text, "MHz"))
-    least = inputs.cut("--min-lgint", min_lgint) if min_lgint is not None else None
+    least = (
+        None
+        if min_lgint is None
+        else inputs.read_as("--min-lgint", min_lgint, Quantity(least=-300, most=300), none="none")
+    )
     frequency, _ = in_mhz(lines)
     chosen = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
     return lines.take(chosen)

@@ -10,7 +10,7 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.inputs import json_option
 from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 from rotor.verbs.molecule import refuse_weights_of_another_kind
@@ -83,7 +83,7 @@ def top_with_errors(source: str) -> Top:
 
         path = parameters_beside(path)
     if path.suffix.lower() != ".var" or not path.exists():
-        return inputs.read_top(Input(source))
+        return inputs.read_top(source)
 
     from rotor.formats.read_write import read_spcat_top
     from rotor.formats.spcat.hamiltonian.codes import constants_of

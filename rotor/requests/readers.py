@@ -302,6 +302,38 @@ class Names(Reader):
         return ", ".join(value)
 
 
+_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # those in brackets are part of a name
+
+
+@dataclass(frozen=True)
+class NameList(Reader):
+    """Names: a text with commas, or a list; each once. words: those allowed; empty: any. A comma in brackets is part of a name."""
+
+    words: Collection[str] = ()
+    metavar: str = "LIST"
+    scene_type: Any = list[str]
+
+    def read(self, given: Any) -> tuple[str, ...]:
+        """The names."""
+        names = [name.strip() for name in _COMMAS.split(given)] if isinstance(given, str) else list(given)
+        if self.words and not set(names) <= set(self.words):
+            raise ValueError(f"{given!r}: expected each of {', '.join(self.words)} once at most")
+        if not names or not all(names):
+            raise ValueError(f"{given!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice:
+            raise ValueError(f"{given!r}: {twice} is named twice; once is enough")
+        return tuple(names)
+
+    def write(self, value: Any) -> list[str]:
+        """The names as a list."""
+        return list(value)
+
+    def show(self, value: Any) -> str:
+        """The names between commas."""
+        return ",".join(value)
+
+
 @dataclass(frozen=True)
 class Pairs(Reader):
     """Numbers by name: `ee=1,eo=3`, or a table. number: the type of the values. what: the names are of."""

@@ -23,9 +23,9 @@ from rotor.formats.fit_request import (
 )
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
-from rotor.requests.readers import Flag, Text, Whole
+from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
-from rotor.verbs.measured_lines import FitInput, MeasuredLines, Names, build
+from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
 from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work
 
 if TYPE_CHECKING:
@@ -50,11 +50,11 @@ class Further:
     """What is done beside the fit."""
 
     try_constants: tuple[str, ...] | None = declared(
-        None, Names(), "Try each of these constants more, or less", option="--try", panel=OBSERVABLES, common=True
+        None, NameList(), "Try each of these constants more, or less", option="--try", panel=OBSERVABLES, common=True
     )
     choose: tuple[str, ...] | None = declared(
         None,
-        Names(),
+        NameList(),
         "Build the model up from these constants, one at a time",
         option="--choose",
         panel=OBSERVABLES,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
 from rotor.requests.fill import Given, read_instance, renaming, written_fields
-from rotor.requests.readers import Custom, InsideError, Quantity, Reader, Text, Whole
-from rotor.requests.readers import Names as Texts
+from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.subjects import beside, optional_molecule, saved_molecule
@@ -21,29 +19,6 @@ from rotor.verbs.verb import Place, Subject, SubjectKind
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
     from rotor.verbs.verb import Verb
-
-_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # those in brackets are part of a name
-
-
-class Names(Reader):
-    """Names of constants: a text with commas, or a list; each once."""
-
-    metavar = "LIST"
-    scene_type: Any = list[str]
-
-    def read(self, given: Any) -> tuple[str, ...]:
-        """The names."""
-        names = [name.strip() for name in _COMMAS.split(given)] if isinstance(given, str) else list(given)
-        if not all(names):
-            raise ValueError(f"{given!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice:
-            raise ValueError(f"{given!r}: {twice} is named twice; once is enough")
-        return tuple(names)
-
-    def write(self, value: Any) -> list[str]:
-        """The names as a list."""
-        return list(value)
 
 
 class Priors(Reader):
@@ -110,11 +85,11 @@ class FitInput:
     """What is fitted, and how; a .par file says itself what is free. The numbers are those of `rotor.fitting.fit.FitOptions`."""
 
     free: tuple[str, ...] | None = declared(
-        None, Names(), 'Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; by default those of the '
+        None, NameList(), 'Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; by default those of the '
         "start that have an error", "parameters.free", panel=OBSERVABLES, common=True, example=["A", "B", "C", "DeltaJ"],
     )  # fmt: skip
     ties: tuple[str, ...] = declared(
-        (), Texts(metavar="TEXT"), 'Constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable', "parameters.ties",
+        (), Names(metavar="TEXT"), 'Constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable', "parameters.ties",
         option="--tie", panel=OBSERVABLES, common=True, example=["deltaK = 0.5*deltaJ"],
     )  # fmt: skip
     priors: Mapping[str, float] | None = declared(

@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field, all_fields
-from rotor.requests.readers import Each, Flag, Names, Quantity, Text
+from rotor.requests.readers import Each, Flag, NameList, Names, Quantity, Text
 from rotor.verbs.verb import Output
 
 
@@ -110,7 +110,7 @@ def _default(one: Field) -> Any:
         return one.typed
     if one.default is REQUIRED:
         return one.example
-    if isinstance(one.reader, Names | Choices):
+    if isinstance(one.default, tuple) and isinstance(one.reader, Names | NameList | Choices):
         return list(one.default)
     if one.default is None or isinstance(one.reader, Flag | Text):
         return one.default

@@ -269,7 +269,11 @@ class Verb:
         from rotor.reports.screen import json_text, json_with_rows
 
         table = self.table(answer) if self.records is None else self.records(answer)
-        return json_text({**content, self.rows: None}) if table is None else json_with_rows(table, self.rows, content)
+        return (
+            json_text({**content, self.rows: content.get(self.rows)})
+            if table is None
+            else json_with_rows(table, self.rows, content)
+        )
 
     def output(self, name: str) -> Output:
         """A file by its name."""

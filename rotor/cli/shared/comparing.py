@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input
 from rotor.cli.shared.options import option
 from rotor.cli.shared.output import ComputationError, note
 from rotor.table import counted
@@ -93,7 +93,7 @@ def beside(lines: Catalogue, file: str, options: CompareOptions, chosen: Any) ->
             note(text)
         return Compared(compare(lines, chosen(prediction.catalogue)))
     kelvin, source = temperature_of(file, options.temperature)
-    found = compare(lines, chosen(predicted(lines, Input(other, isotope=options.isotope), kelvin)))
+    found = compare(lines, chosen(predicted(lines, other, options.isotope, kelvin)))
     reference = found.reference
     range_mhz = (float(reference.frequency_mhz.min()), float(reference.frequency_mhz.max()))
     return Compared(within(found, range_mhz, float(reference.lgint.min())), kelvin, source)
@@ -123,13 +123,13 @@ def temperature_of(file: str, given: str | None) -> tuple[float, str]:
     return FORMAT_K, "the format's"
 
 
-def predicted(lines: Catalogue, given: Input, kelvin: float) -> Catalogue:
+def predicted(lines: Catalogue, source: str, isotopes: Sequence[str] | None, kelvin: float) -> Catalogue:
     """Lines of a molecule to the highest J of the catalogue, down to its weakest line and somewhat beyond its range."""
     import rotor
     from rotor.formats.line_tables import catalogue
     from rotor.formats.spcat.compare import in_mhz
 
-    top = inputs.with_some_dipole(inputs.read_top(given))
+    top = inputs.with_dipole(source, isotopes)
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
     frequency, _ = in_mhz(lines)
     reach = 1000.0 + 0.01 * float(frequency.max())  # lines that lie elsewhere with other constants are found too
@@ -141,9 +141,9 @@ def predicted(lines: Catalogue, given: Input, kelvin: float) -> Catalogue:
         untrusted=True,
         range_mhz=(max(0.0, float(frequency.min()) - reach), float(frequency.max()) + reach),
     )
-    note(f"{given.text}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")
+    note(f"{source}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")
     if not len(made):
-        raise ComputationError(f"--compare: {given.text} has no lines in the range of the catalogue")
+        raise ComputationError(f"--compare: {source} has no lines in the range of the catalogue")
     return catalogue(made)
 
 

@@ -126,7 +126,7 @@ def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str |
     from rotor.observed.species import species_of_lines
     from rotor.spectra.lines import line_list
 
-    top = inputs.with_some_dipole(inputs.read_top(inputs.Input(word)))
+    top = inputs.with_dipole(word)
     lines = line_list(top, temperature_k=300.0, min_lgint=-12.0, range_mhz=range_mhz)
     return species_of_lines(lines, top.name or word)
 

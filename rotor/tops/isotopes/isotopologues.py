@@ -148,7 +148,7 @@ def single_substitutions(parent: Top, element: str, name: str) -> tuple[Isotopol
 
 def _geometry(parent: Top) -> Molecule:
     if parent.molecule is None:
-        raise ValueError(f"isotopes cannot be changed in {parent.name or 'constants alone'}: there is no geometry")
+        raise ValueError(f"no isotope of {parent.name or 'constants alone'} can be changed: there is no geometry")
     return parent.molecule
 
 

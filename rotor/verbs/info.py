@@ -1,29 +1,22 @@
-"""`rotor info`: what a molecule is as a top."""
+"""`info`: what a molecule is as a top."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-import typer
-
-from rotor.checks import require_whole
-from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input, json_option
-from rotor.cli.shared.options import grouped, option
-from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table
+from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
+from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
-
-if TYPE_CHECKING:
-    from rotor.tops.top import Top
-
-TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
-
-MOST_CONFORMERS = 1000
-ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
+from rotor.requests.fill import Given, read_fields
+from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
+from rotor.tops.facts import estimated_errors_mhz
+from rotor.tops.top import Top
+from rotor.units import MHZ_PER_CM
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import Output, Report, Subject, Verb, Work
 
 EXAMPLES = """\b
 Examples:
@@ -32,70 +25,20 @@ Examples:
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
 
 
-@dataclass(frozen=True)
-class Options:
-    """What is computed besides the top itself."""
-
-    temperature: str | None = option(None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K.")
-    conformers: int | None = option(
-        None, metavar="N", help="Of a SMILES: the different conformers among N that are tried, with their energies."
-    )
-    json: str | None = json_option()
+def build(verb: Verb, given: Given, subject: Subject) -> InfoRequest:
+    """The request, with the text of a SMILES."""
+    return InfoRequest(**subject.values, **read_fields(InfoRequest, given, subject), smiles=subject.text)
 
 
-@grouped()
-def command(context: typer.Context, given: Input, options: Options) -> None:
-    """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
-    temperatures = (
-        TEMPERATURES_K if options.temperature is None else inputs.temperatures("--temperature", options.temperature)
-    )
-    files = Files.of(options)
-    top = inputs.read_top(given)
-
-    from rotor.quantum.effects.of_top import effects_of
-    from rotor.quantum.estimates.limits import limit_facts, populated_j
-    from rotor.reports.top_facts import describe
-    from rotor.thermodynamics.partition_table import partition_table
-
-    content = describe(top, given.text, context.obj)
-    content |= limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
-    content["partition_function"] = partition_table(top, temperatures, sum_progress())
-    if options.conformers is not None:
-        content["conformers"] = conformer_table(given.source, options.conformers)
-    deliver(
-        files,
-        {},
-        lambda: json_text(content),
-        lambda: _show(top, content, given.sources),
-    )
+def answer(request: InfoRequest, work: Work) -> InfoAnswer:
+    """The answer, with a bar on a terminal while levels are summed."""
+    return answer_info(request, sum_progress() if work.progress else None)
 
 
-def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
-    """Energy and constants of each different conformer of a SMILES, the lowest first."""
-    from rotor.molecules.readers.smiles import conformers
-    from rotor.tops.top import Top
-
-    require_whole("--conformers", count, 1, MOST_CONFORMERS)
-    if not (source or "").startswith("SMILES:"):
-        raise ValueError(f"--conformers: {source or 'constants'!r} is one geometry; conformers are made of a SMILES")
-    found = []
-    for one in conformers((source or "").removeprefix("SMILES:").strip(), count):
-        top = Top.from_molecule(one.molecule)
-        found.append(
-            {
-                "energy_kj_per_mol": one.energy_kj_per_mol,
-                "rotational_constants_mhz": top.rotational_constants_mhz,
-                "dipole_abc_debye": top.dipole_abc_debye,
-                "uncertainty": one.molecule.uncertainty,
-            }
-        )
-    return found
-
-
-def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
-    from rotor.reports import top_facts as report
-
-    print(report.heading(top))
+def show(answer: InfoAnswer, report: Report) -> None:
+    """Print the top, its constants, axes, nuclei, Q(T) and conformers."""
+    top, content = answer.request.top, report.content
+    print(top_facts.heading(top))
     show_facts(_facts(top, content))
     others = _conformers_of(content.get("conformers", []))
     axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
@@ -104,17 +47,11 @@ def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
             print()
             show_table(table)
     print()
-    show_facts(
-        [
-            *source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), whole_sources),
-            *report.model_facts(content),
-        ]
-    )
+    sources = source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), report.sources)
+    show_facts([*sources, *top_facts.model_facts(content)])
 
 
-def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.reports import top_facts as report
-
+def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     facts: list[tuple[str, str]] = []
     if top.symmetry is not None:
         number = content["symmetry_number"]
@@ -123,13 +60,13 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         )
     if top.constants.representation:
         heading = "reduction" if top.constants.reduction else "representation"
-        facts.append((heading, report.form_text(top.constants)))
-    dipole = report.dipole_text(top)
+        facts.append((heading, top_facts.form_text(top.constants)))
+    dipole = top_facts.dipole_text(top)
     facts += [
         ("dipole", dipole),
-        ("polarizability", report.tensor_text(top)),
-        *report.weights_facts(top, content["spin_weights"]),
-        *report.states_facts(top),
+        ("polarizability", top_facts.tensor_text(top)),
+        *top_facts.weights_facts(top, content["spin_weights"]),
+        *top_facts.states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),
     ]
@@ -138,14 +75,14 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     return facts
 
 
-def _near_text(content: dict[str, Any]) -> str:
+def _near_text(content: Mapping[str, Any]) -> str:
     if content["near_point_group"] is None:
         return ""
     off = content["near_displacement_angstrom"]
     return f"; near {content['near_point_group']}: nuclei are up to {off:.2g} Å off it (--symmetry-tolerance takes it)"
 
 
-def _kind_text(kind: str, decision: dict[str, Any]) -> str:
+def _kind_text(kind: str, decision: Mapping[str, Any]) -> str:
     """Which numbers decided the kind of the geometry, and how clearly."""
     numbers = (
         f"Ia/Ic = {decision['ia_over_ic']:.3g} (linear below {decision['linear_below']:g}), "
@@ -161,17 +98,15 @@ def _margin_text(margin: float) -> str:
 
 
 def _constants_table(top: Top) -> Table:
-    from rotor.reports.top_facts import known_digits
-    from rotor.tops.facts import estimated_errors_mhz
-    from rotor.units import MHZ_PER_CM
-
     known, estimated = top.constants.uncertainties, estimated_errors_mhz(top)
     rows = []
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)
-        error = f"{known[name]:.2g}" if name in known else f"about {known_digits(guess, guess)}" if guess else ""
-        wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
-        rows.append((name, known_digits(mhz, guess), error, wavenumber))
+        error = (
+            f"{known[name]:.2g}" if name in known else f"about {top_facts.known_digits(guess, guess)}" if guess else ""
+        )
+        wavenumber = top_facts.known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
+        rows.append((name, top_facts.known_digits(mhz, guess), error, wavenumber))
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
 
 
@@ -179,13 +114,11 @@ def _states_table(top: Top) -> Table | None:
     """Constants of further states and what couples them."""
     if top.states is None:
         return None
-    from rotor.units import MHZ_PER_CM
-
     rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.10g}") for name, mhz in top.states.values.items()]
     return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
 
 
-def _axes_table(content: dict[str, Any]) -> Table:
+def _axes_table(content: Mapping[str, Any]) -> Table:
     """Moments, planar moments, and the axes and the centre of mass in the frame of the input."""
     moments, planar, frame = (content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
@@ -198,7 +131,7 @@ def _axes_table(content: dict[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"axis"}))
 
 
-def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
+def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
     """Nuclei that split lines, by how much, and the constants that are known."""
     rows = []
     for one in content["splitting_nuclei"]:
@@ -225,7 +158,7 @@ def _reason(source: str) -> str:
     return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
 
 
-def _q_table(content: dict[str, Any]) -> Table:
+def _q_table(content: Mapping[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
         known = row["q"] is not None
@@ -239,7 +172,7 @@ def _q_table(content: dict[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"remark"}))
 
 
-def _conformers_of(records: Sequence[dict[str, Any]]) -> Table | None:
+def _conformers_of(records: Sequence[Mapping[str, Any]]) -> Table | None:
     """The conformers, where they were asked for."""
     if not records:
         return None
@@ -250,3 +183,24 @@ def _conformers_of(records: Sequence[dict[str, Any]]) -> Table | None:
         dipole = [f"{mu + 0.0:.2f}" for mu in one["dipole_abc_debye"] or ()] or ["-"] * 3
         rows.append([str(number), f"{one['energy_kj_per_mol']:.2f}", *constants, *dipole])
     return Table("", columns, rows)
+
+
+VERB = Verb(
+    name="info",
+    about="Frame, constants, kind of top with its margin, moments, dipole, table of Q(T).",
+    examples=EXAMPLES,
+    request=InfoRequest,
+    answer=answer,
+    table=lambda answer: answer.table,
+    rows="partition_function",
+    records=lambda answer: None,
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the table of Q(T) as CSV", example="q.csv"),
+        Output("parquet", (".parquet",), "Write the table of Q(T) as Parquet", example="q.parquet"),
+    ),
+    subject=OneMolecule(("polarizability", "anisotropy", "internal_rotation")),
+    build=build,
+    drawn=None,
+    start={"molecule": "water", "outputs.csv": "q.csv"},
+)

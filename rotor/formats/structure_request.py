@@ -1,0 +1,218 @@
+"""A request for the structure of a family of isotopologues, and what answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.family_file import FamilyFile
+from rotor.molecules.molecule import Molecule
+from rotor.requests.field import OBSERVABLES, check_fields, declared
+from rotor.requests.readers import Flag, NameList, Text
+from rotor.structures.consistency import PlanarMoment, Without, doubts, gains, moments_across_planes, without_each
+from rotor.structures.family import Family
+from rotor.structures.least_squares import FittedStructure, fit_structure
+from rotor.structures.substitution import SubstitutionStructure, Value, substitution_structure
+from rotor.table import Table
+
+METHODS = ("rs", "r0", "rm1", "rm2", "re")
+
+
+@dataclass(frozen=True)
+class StructureRequest:
+    """Structures of a family; every field is checked when the request is made.
+
+    file: the family, with its coordinates. methods: substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re).
+    weights: of the moments. leave_out: axes whose moments are not fitted. pair: moments of a planar molecule that serve for rs. check:
+    whether fits are made again without each isotopologue.
+    """
+
+    file: FamilyFile
+    methods: tuple[str, ...] = declared(
+        ("rs", "r0"), NameList(METHODS), "Of rs, r0, rm1, rm2, re", "observables.method", common=True
+    )
+    weights: str = declared(
+        "equal", Text(metavar="NAME"), "Moments weighted equally, or by their errors (errors)", "numerics.weights"
+    )
+    leave_out: str = declared(
+        "",
+        Text(metavar="AXES"),
+        "Axes whose moments are not fitted, such as c",
+        "numerics.leave_out",
+        common=True,
+        example="c",
+    )
+    pair: str = declared(
+        "ab", Text(metavar="AB"), "Which two moments serve for rs of a planar molecule: ab, ac, bc", "numerics.pair"
+    )
+    check: bool = declared(
+        False,
+        Flag(),
+        "Fit again without each isotopologue: is one unlike the others?",
+        "observables.check",
+        panel=OBSERVABLES,
+        common=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.check and set(self.methods) == {"rs"}:
+            raise ValueError(
+                "check: goes with r0, rm1, rm2 or re, which are fitted to all isotopologues; add one to the methods"
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StructureTable(Table):
+    """Values of all methods by rows: method, coordinate, value, error, unit."""
+
+    by_method: Mapping[str, tuple[Value, ...]]
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """method, coordinate, value, error, unit."""
+        rows = [(method, one) for method, values in self.by_method.items() for one in values]
+        return {
+            "method": np.array([method for method, _ in rows]),
+            "coordinate": np.array([one.name for _, one in rows]),
+            "value": np.array([one.value for _, one in rows], dtype=np.float64),
+            "error": np.array([one.error for _, one in rows], dtype=np.float64),
+            "unit": np.array([one.unit for _, one in rows]),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class StructureAnswer:
+    """What each method gives. without: fits without each isotopologue, by method. doubts: about isotopologues."""
+
+    request: StructureRequest
+    substitution: SubstitutionStructure | None
+    fitted: tuple[FittedStructure, ...]
+    planar: tuple[PlanarMoment, ...] = ()
+    without: Mapping[str, list[Without]] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> StructureTable:
+        """Bond lengths, angles and vibrational terms."""
+        values = {} if self.substitution is None else {"rs": tuple(self.substitution.values)}
+        return StructureTable(values | {one.method: (*one.values, *one.vibrational) for one in self.fitted})
+
+    @property
+    def geometry(self) -> tuple[Molecule, tuple[Value, ...], str]:
+        """The last geometry that is complete, its values and the name of the method.
+
+        Raises ValueError where rs alone was made and does not have every atom.
+        """
+        if self.fitted:
+            last = self.fitted[-1]
+            return last.molecule, tuple(last.values), last.method
+        assert self.substitution is not None  # one method at least
+        positions = self.substitution.positions_angstrom
+        if np.isnan(positions).any():
+            raise ValueError("rs has not every atom; add a method that fits the whole geometry")
+        symbols = self.request.file.family.molecule.symbols
+        return Molecule(symbols, positions), tuple(self.substitution.values), "rs"
+
+    @property
+    def notes(self) -> list[str]:
+        """Doubts about isotopologues, and what the moments do not determine."""
+        found = [*self.doubts, *(self.substitution.notes if self.substitution else ())]
+        for one in self.fitted:
+            found += [f"{one.method}: {text}" for text in one.notes]
+            found += [f"{one.method}: not determined by these moments: {c.text}" for c in one.undetermined]
+        return found
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the structures, by the keys of docs/command_line.md."""
+        family = self.request.file.family
+        return {
+            "name": family.name,
+            "kind": family.top.kind,
+            "isotopologues": [
+                {
+                    "name": one.name,
+                    "formula": one.molecule.formula,
+                    "constants_mhz": dict(one.constants_mhz),
+                    "errors_mhz": dict(one.errors_mhz),
+                    "corrections_mhz": dict(one.corrections_mhz),
+                    "moments_u_angstrom2": one.moments,
+                    "axes": one.axes,
+                    "source": one.source or None,
+                }
+                for one in family.species
+            ],
+            "planar_moments": [{**vars(one), "doubtful": one.doubtful} for one in self.planar],
+            "without": {method: [vars(one) for one in found] for method, found in self.without.items()},
+            "rs": _substitution_record(self.substitution),
+            **{one.method: _fitted_record(one) for one in self.fitted},
+            "notes": self.notes,
+        }
+
+
+def answer_structure(request: StructureRequest) -> StructureAnswer:
+    """The structures of the methods, in their order; with check, fitted again without each isotopologue."""
+    file = request.file
+    substitution = None
+    if "rs" in request.methods:
+        substitution = substitution_structure(file.family, pair=request.pair, coordinates=file.coordinates)
+
+    def fitted_to(family: Family, name: str) -> FittedStructure:
+        """The structure of one kind, fitted."""
+        return fit_structure(
+            family,
+            name,
+            coordinates=file.coordinates,
+            held=file.held,
+            weights=request.weights,
+            leave_out=tuple(request.leave_out),
+        )
+
+    fitted = tuple(fitted_to(file.family, name) for name in request.methods if name != "rs")
+    without = {
+        one.method: without_each(file.family, one, partial(fitted_to, name=one.method))
+        for one in fitted
+        if request.check
+    }
+    said = [text for one in fitted for text in gains(one.method, without.get(one.method, []), one.rms_u_angstrom2)]
+    planar = tuple(moments_across_planes(file.family))
+    return StructureAnswer(request, substitution, fitted, planar, without, (*doubts(file.family), *said))
+
+
+def _substitution_record(found: SubstitutionStructure | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "atoms": [
+            {
+                "atom": one.atom,
+                "isotopologue": one.species,
+                "coordinates_angstrom": one.coordinates_angstrom,
+                "squares_angstrom2": one.squares_angstrom2,
+                "costain_angstrom": one.costain_angstrom,
+                "measured_angstrom": one.measured_angstrom,
+            }
+            for one in found.atoms
+        ],
+        "values": [vars(one) for one in found.values],
+    }
+
+
+def _fitted_record(one: FittedStructure) -> dict[str, Any]:
+    return {
+        "converged": one.minimum.converged,
+        "reason": one.minimum.reason,
+        "values": [vars(value) for value in one.values],
+        "vibrational": [vars(value) for value in one.vibrational],
+        "rms_u_angstrom2": one.rms_u_angstrom2,
+        "degrees_of_freedom": one.degrees_of_freedom,
+        "condition": one.condition,
+        "undetermined": [c.text for c in one.undetermined],
+        "positions_angstrom": one.molecule.positions_angstrom,
+        "moments": [{**vars(moment), "difference": moment.difference} for moment in one.moments],
+    }

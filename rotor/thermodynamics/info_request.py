@@ -1,0 +1,112 @@
+"""A request for what a molecule is as a top, and what answers it: sizes of effects, Q(T), conformers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.requests.field import OBSERVABLES, check_fields, declared
+from rotor.requests.readers import Grid, Quantity, Whole
+from rotor.table import Table
+from rotor.thermodynamics.partition_table import partition_table
+from rotor.tops.facts import top_facts
+from rotor.tops.top import Top
+
+TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
+MOST_CONFORMERS, MOST_TEMPERATURES = 1000, 100_000
+ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
+
+
+@dataclass(frozen=True)
+class InfoRequest:
+    """What is computed of a top beside itself.
+
+    top: the molecule. temperatures_k: of Q. conformers: how many geometries of a SMILES are tried; None: none. smiles: of them.
+    """
+
+    top: Top
+    temperatures_k: tuple[float, ...] = declared(
+        TEMPERATURES_K, Grid("K", most_points=MOST_TEMPERATURES, each=Quantity("K", above=0)), "Temperatures: 10:300K:30 or 10,20,50 K",
+        "conditions.temperature", common=True, example="10:300K:30",
+    )  # fmt: skip
+    conformers: int | None = declared(
+        None, Whole(1, MOST_CONFORMERS), "Of a SMILES: the different conformers among N that are tried, with their energies",
+        "observables.conformers", panel=OBSERVABLES, common=True, example=20,
+    )  # fmt: skip
+    smiles: str = ""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.conformers is not None and not self.smiles.startswith("SMILES:"):
+            raise ValueError(
+                f"conformers: {self.smiles or 'constants'!r} is one geometry; conformers are made of a SMILES"
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartitionRows(Table):
+    """Q(T) by rows: temperature, the sum, its classical limit, the highest J of the sum, the error."""
+
+    records: tuple[Mapping[str, Any], ...]
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """temperature_k, q, classical, jmax, relative_error; NaN and -1 where there is none."""
+        names = ("temperature_k", "q", "classical", "relative_error")
+        numbers = {name: np.array([one[name] for one in self.records], dtype=np.float64) for name in names}
+        return {**numbers, "jmax": np.array([-1 if one["jmax"] is None else one["jmax"] for one in self.records])}
+
+
+@dataclass(frozen=True, eq=False)
+class InfoAnswer:
+    """What a top is: records of Q(T) and of conformers, and sizes of effects."""
+
+    request: InfoRequest
+    partition: tuple[Mapping[str, Any], ...]
+    conformers: tuple[Mapping[str, Any], ...]
+    sizes: Mapping[str, Any]
+
+    @property
+    def table(self) -> PartitionRows:
+        """Q(T)."""
+        return PartitionRows(self.partition)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the top, by the keys of docs/command_line.md."""
+        found = {**top_facts(self.request.top), **self.sizes, "partition_function": list(self.partition)}
+        return found | ({} if self.request.conformers is None else {"conformers": list(self.conformers)})
+
+
+def answer_info(request: InfoRequest, progress: Callable[..., Any] | None = None) -> InfoAnswer:
+    """Sizes of effects at the J most populated at 300 K, Q(T), and conformers where they are asked for."""
+    top = request.top
+    sizes = limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
+    rows = partition_table(top, request.temperatures_k, progress)
+    return InfoAnswer(request, tuple(rows), tuple(_conformers(request)), sizes)
+
+
+def _conformers(request: InfoRequest) -> Sequence[dict[str, Any]]:
+    """Energy and constants of each different conformer, the lowest first."""
+    if request.conformers is None:
+        return ()
+    from rotor.molecules.readers.smiles import conformers
+
+    found = []
+    for one in conformers(request.smiles.removeprefix("SMILES:").strip(), request.conformers):
+        top = Top.from_molecule(one.molecule)
+        found.append(
+            {
+                "energy_kj_per_mol": one.energy_kj_per_mol,
+                "rotational_constants_mhz": top.rotational_constants_mhz,
+                "dipole_abc_debye": top.dipole_abc_debye,
+                "uncertainty": one.molecule.uncertainty,
+            }
+        )
+    return found

@@ -1,0 +1,106 @@
+"""`isotopologues`: the family of a molecule, by abundance or by substitution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
+from rotor.reports.screen import Table, show_table
+from rotor.reports.top_facts import known_digits
+from rotor.tops.facts import estimated_errors_mhz
+from rotor.tops.isotopes.isotopologues import Isotopologue
+from rotor.tops.top import Top
+from rotor.verbs.molecule import STATES
+from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.verb import Output, Report, Verb
+
+EXAMPLES = """\b
+Examples:
+  rotor isotopologues water
+  rotor isotopologues CH3Cl --min-abundance 0.01 --json family.json
+  rotor isotopologues H2CO --each C=13C --each O=18O
+  rotor isotopologues water --site 2=2H --site 3=2H"""
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """No options of printing."""
+
+
+def show(answer: IsotopologuesAnswer, report: Report) -> None:
+    """Print the isotopologues, and constants of spins where they are known."""
+    show_table(_table(answer.request.top, answer.family))
+    rows = [[one.label, _constants_text(one.top)] for one in answer.family if one.top.spin_constants]
+    if rows:
+        columns = ("isotopologue", "constants of spins (MHz)")
+        print()
+        show_table(Table("", columns, rows, frozenset(columns)))
+
+
+def _constants_text(top: Top) -> str:
+    """The constants of spins of a top by name, in MHz."""
+    known = top.spin_constants.values if top.spin_constants else {}
+    return ", ".join(f"{name} {value:.6g}" for name, value in known.items())
+
+
+def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
+    columns = ("isotopologue", "abundance", "ways", "mass (u)", "kind", "group", "A (MHz)", "B (MHz)", "C (MHz)", "± %",
+               "axes", "turned (°)", "μa (D)", "μb (D)", "μc (D)", "spin weights")  # fmt: skip
+    left = frozenset({"isotopologue", "kind", "group", "axes", "spin weights"})
+    return Table(f"isotopologues of {parent.name or 'the molecule'}", columns, [_row(one) for one in family], left)
+
+
+def _rigid_texts(top: Top) -> list[str]:
+    """A, B, C with the digits that their estimated error leaves, and that error in per cent."""
+    errors = estimated_errors_mhz(top)
+    if not errors:
+        return [f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz] + [""]
+    name = next(iter(errors))
+    relative = errors[name] / top.constants[name]
+    texts = [known_digits(x, relative * x) if x < float("inf") else "-" for x in top.rotational_constants_mhz]
+    return [*texts, f"{100 * relative:.2g}"]
+
+
+def _row(one: Isotopologue) -> list[str]:
+    top = one.top
+    weights = ", ".join(f"{name} {weight}" for name, weight in top.spin_weights.to_mapping().items())
+    dipole = top.dipole_abc_debye
+    return [
+        one.label,
+        f"{one.abundance:.3e}",
+        str(one.arrangements),
+        f"{top.mass_u:.5f}",
+        top.kind,
+        top.symmetry.point_group if top.symmetry else "",
+        *_rigid_texts(top),
+        one.axes,
+        f"{one.turned_degrees:.2f}",
+        *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),
+        weights or "all alike",
+    ]
+
+
+VERB = Verb(
+    name="isotopologues",
+    about="Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each, and constants of spins if known.",
+    examples=EXAMPLES,
+    request=IsotopologuesRequest,
+    answer=lambda request, work: answer_isotopologues(request),
+    table=lambda answer: answer.table,
+    rows="isotopologues",
+    records=lambda answer: None,
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the isotopologues as CSV", example="family.csv"),
+        Output("parquet", (".parquet",), "Write the isotopologues as Parquet", example="family.parquet"),
+    ),
+    subject=OneMolecule(
+        ("constants", "isotopes", "polarizability", "anisotropy", "spin_weights", *STATES, "internal_rotation", "calculator", "hessian",
+         "symmetry_tolerance"),
+    ),
+    shown=Nothing,
+    notes=lambda answer: answer.remarks,
+    drawn=None,
+    sound=False,
+    start={"molecule": "water", "observables.min_abundance": 1e-4, "outputs.csv": "family.csv"},
+)  # fmt: skip

@@ -1,0 +1,219 @@
+"""`structure`: bond lengths and angles from the constants, or the measured lines, of isotopologues."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.formats.family_file import FamilyFile, read_family
+from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import MOLECULE, all_fields, declared
+from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.readers import Custom
+from rotor.structures.family import Family
+from rotor.table import counted
+from rotor.verbs.isotopologues import Nothing
+from rotor.verbs.subjects import beside
+from rotor.verbs.verb import PICTURES, NoAnswerError, Output, Place, Report, Subject, SubjectKind, Verb
+
+if TYPE_CHECKING:
+    from rotor.structures.consistency import PlanarMoment, Without
+    from rotor.structures.substitution import SubstitutionStructure, Value
+
+EXAMPLES = """\b
+Examples:
+  rotor structure ocs.toml
+  rotor structure h2co.toml --method rs,r0 --leave-out c --plot h2co.png
+  rotor structure water.toml --method re --xyz water_re.xyz"""
+
+ROUND_OFF = 1e-9  # of a value: an error below it means that symmetry fixes the value
+
+
+@dataclass(frozen=True)
+class FamilyInput:
+    """Which family."""
+
+    source: Any = declared(
+        None,
+        Custom(lambda given: given),
+        "Family of isotopologues (.toml)",
+        "family.file",
+        option="FAMILY",
+        panel=MOLECULE,
+        example="family.toml",
+    )
+
+
+class Isotopologues(SubjectKind):
+    """The isotopologues of a file."""
+
+    fields = all_fields(FamilyInput)
+
+    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+        """The family that the file has."""
+        asked: FamilyInput = read_instance(FamilyInput, given)
+        if asked.source is None:
+            raise ValueError("FAMILY is missing; expected a family of isotopologues (.toml)")
+        if isinstance(asked.source, Family):
+            return Subject({"file": FamilyFile(asked.source, (), (), {})}, (asked,), asked.source.name, place.note)
+        if not os.fspath(asked.source).lower().endswith(".toml"):
+            raise ValueError(
+                f"{asked.source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
+            )
+        return Subject(
+            {"file": read_family(str(Path(place.folder) / asked.source))}, (asked,), str(asked.source), place.note
+        )
+
+    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
+        """The file, counted from the folder of the scene."""
+        if isinstance(subject.molecules[0].source, Family):
+            raise ValueError("a scene holds no family itself; give a file")
+        return {key: beside(value, folder) for key, value in written_fields(subject.molecules[0]).items()}
+
+
+def _geometry(answer: StructureAnswer) -> Any:
+    try:
+        return answer.geometry
+    except ValueError as error:
+        raise NoAnswerError(f"--xyz and --plot: {error}") from None
+
+
+def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
+    """The geometry as a file."""
+    molecule, _, method = _geometry(answer)
+    positions = (molecule.positions_angstrom.round(8) + 0.0).tolist()
+    rows = [f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}" for s, (x, y, z) in zip(molecule.symbols, positions, strict=True)]
+    head = f"{answer.request.file.family.name}, {method}, principal axes a b c"
+    path.write_text("\n".join([str(len(rows)), head, *rows]) + "\n", encoding="utf-8", newline="\n")
+
+
+def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
+    """The picture as a file."""
+    from rotor.plots.picture import name_text
+    from rotor.plots.structure import plot_structure
+
+    molecule, values, method = _geometry(answer)
+    title = f"{name_text(answer.request.file.family.name)}, {method}"
+    plot_structure(molecule, path, values=values, title=title, provenance=report.command)
+
+
+def failure(answer: StructureAnswer) -> str:
+    """Which method has not converged."""
+    bad = [one for one in answer.fitted if not one.minimum.converged]
+    return f"{bad[0].method} has not converged: {bad[0].minimum.reason}" if bad else ""
+
+
+def show(answer: StructureAnswer, report: Report) -> None:
+    """Print the values of each method."""
+    family = answer.request.file.family
+    print(f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top")
+    if answer.planar:
+        show_table(_planar_table(answer.planar))
+    if answer.substitution:
+        show_table(_coordinates_table(answer.substitution))
+        if answer.substitution.values:
+            show_table(_values_table("rs", answer.substitution.values))
+    for one in answer.fitted:
+        show_table(_values_table(one.method, (*one.values, *one.vibrational)))
+        worst = max(one.moments, key=lambda moment: abs(moment.difference))
+        show_facts(
+            [
+                (
+                    "moments",
+                    f"{len(one.moments)}, {counted(one.degrees_of_freedom, 'degree')} of freedom, rms {one.rms_u_angstrom2:.3g} u Å²",
+                ),
+                ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
+                ("search", one.minimum.reason),
+            ]
+        )
+        if answer.without.get(one.method):
+            show_table(_without_table(one.method, answer.without[one.method]))
+
+
+def _planar_table(found: Sequence[PlanarMoment]) -> Table:
+    rows = [
+        [
+            one.species,
+            one.axis,
+            f"{one.value:.5f}",
+            f"{one.change:+.5f}",
+            f"{one.error:.5f}",
+            "doubtful" if one.doubtful else "",
+        ]
+        for one in found
+    ]
+    columns = ["isotopologue", "axis", "P (u Å²)", "from the parent", "error", ""]
+    return Table("planar moments of substitutions in a plane", columns, rows, frozenset({"isotopologue", "axis", ""}))
+
+
+def _without_table(method: str, found: Sequence[Without]) -> Table:
+    rows = [[one.species, f"{one.rms_u_angstrom2:.3g}", f"{one.chance:.2g}"] for one in found]
+    return Table(f"{method} without", ["isotopologue", "rms (u Å²)", "by chance"], rows, frozenset({"isotopologue"}))
+
+
+def _coordinates_table(found: SubstitutionStructure) -> Table:
+    rows = []
+    for one in found.atoms:
+        columns = (one.coordinates_angstrom, one.squares_angstrom2, one.errors_angstrom, one.zero_by_symmetry)
+        cells = [_coordinate_text(*numbers) for numbers in zip(*(list(column) for column in columns), strict=True)]
+        rows.append([str(one.atom), one.species, *cells, one.kraitchman.shape])
+    return Table(
+        "rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"})
+    )
+
+
+def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry: bool) -> str:
+    """A coordinate with its error in the last digits; imaginary ones as i·|r|, 0 where symmetry makes it so."""
+    if zero_by_symmetry:
+        return "0"
+    return f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{value:.5f}({round(error * 1e5)})"
+
+
+def _values_table(method: str, values: Sequence[Value]) -> Table:
+    rows = [[one.name, _value_text(one.value, one.error), one.unit] for one in values]
+    return Table(method, ["coordinate", "value", "unit"], rows, frozenset({"coordinate", "unit"}))
+
+
+def _value_text(value: float, error: float) -> str:
+    from rotor.fitting.publication import value_text
+
+    if not math.isfinite(error):
+        return f"{value:.6g} (no error)"
+    return value_text(value, error) if error > ROUND_OFF * abs(value) else f"{value:.6g} (by symmetry)"
+
+
+VERB = Verb(
+    name="structure",
+    about="Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re).",
+    examples=EXAMPLES,
+    request=StructureRequest,
+    answer=lambda request, work: answer_structure(request),
+    table=lambda answer: answer.table,
+    rows="rs",
+    records=lambda answer: None,
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the values of all methods as CSV", example="structure.csv"),
+        Output("parquet", (".parquet",), "Write the values of all methods as Parquet", example="structure.parquet"),
+        Output(
+            "xyz",
+            (".xyz",),
+            "Write the geometry of the last method, in principal axes",
+            write_geometry,
+            "structure.xyz",
+        ),
+        Output("plot", PICTURES, "Draw the molecule with its bonds (.png, .pdf, .svg)", draw, "structure.png"),
+    ),
+    subject=Isotopologues(),
+    shown=Nothing,
+    notes=lambda answer: answer.notes,
+    drawn=None,
+    sound=False,
+    failure=failure,
+    start={"family.file": "family.toml", "observables.method": ["rs", "r0"], "outputs.csv": "structure.csv"},
+)
