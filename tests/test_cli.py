@@ -35,7 +35,7 @@ SPECTRUM = """
     temperature_k q jmax jmax_source constants_reason min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2
     optical_depth hyperfine patterns strongest lines files errors
 """
-INFO_KEYS = set(INFO.split())
+INFO_KEYS = set(INFO.split()) | {"files"}
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())
 
 
