@@ -48,3 +48,36 @@ def test_the_sum_beside_a_given_q_is_made_once(call, folder, monkeypatch):
     assert code == 0
     assert "the sum over the levels is 178" in err
     assert len(sums) == 1
+
+
+@pytest.mark.parametrize(("name", "kelvin"), [("NH3", 300.0), ("NH3", 50.0)])
+def test_the_note_on_q_estimates_further_states(name, kelvin):
+    """A sum over the coupled states of a file took 18 s for the sake of this note; a tenth is enough."""
+    from rotor.spectra.request import SpectrumRequest, _expected_q, answer_spectrum
+
+    answer = answer_spectrum(SpectrumRequest(rotor.read(name), temperature_k=kelvin, jmax=3, q=1.0))
+    expected, of_states = _expected_q(answer.lines)
+    summed = rotor.thermodynamics.partition_function(answer.lines.top, kelvin, effects=answer.lines.levels.effects).q
+    assert of_states
+    assert expected == pytest.approx(summed, rel=0.05)  # half of what the note is about
+    assert "about" in answer.notes[-1]
+
+
+def test_a_file_of_many_states_is_not_summed_for_a_note(monkeypatch):
+    """The sum is of the levels of one state."""
+    from pathlib import Path
+
+    from rotor.spectra.request import SpectrumRequest, answer_spectrum
+    from rotor.thermodynamics import partition
+
+    counted, solve = [], partition.level_sums
+
+    def counting(top, *arguments, **options):
+        counted.append(top.states)
+        return solve(top, *arguments, **options)
+
+    monkeypatch.setattr(partition, "level_sums", counting)
+    top = rotor.read(Path(__file__).parent / "oracles" / "kinds" / "eighteen_states" / "eighteen_states.int")
+    answer = answer_spectrum(SpectrumRequest(top, jmax=2, q=1000.0, min_lgint=None))
+    assert answer.notes[-1].startswith("Q = 1000 is given where the sum over the levels is about 1.6e+06")
+    assert counted == [None]

@@ -6,12 +6,13 @@ The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` is 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_top
 from rotor.quantum.effect import QuantumEffect
@@ -195,16 +196,15 @@ class SpectrumAnswer(TextOf):
         given, lines = self.request.q, self.lines
         if given is None or not lines.levels.of_named_constants:
             return tuple(lines.warnings)
-        from rotor.thermodynamics import partition_function
-
         try:
-            summed = partition_function(lines.top, lines.temperature_k, effects=lines.levels.effects).q
+            summed, of_states = _expected_q(lines)
         except ValueError:  # the sum does not converge: the value that was given stands alone
             return tuple(lines.warnings)
         if Q_TOO_SMALL * summed <= given <= Q_TOO_LARGE * summed:
             return tuple(lines.warnings)
         factor = f"intensities differ by a factor of {summed / given:.3g}"
-        text = f"Q = {given:g} is given where the sum over the levels is {summed:.4g}: {factor}"
+        sum_text = f"about {summed:.2g}" if of_states else f"{summed:.4g}"
+        text = f"Q = {given:g} is given where the sum over the levels is {sum_text}: {factor}"
         return (*lines.warnings, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
 
     @property
@@ -307,6 +307,32 @@ class SpectrumAnswer(TextOf):
         if lines.levels.of_named_constants:
             return found
         return without_constants(found) | {"q": found["q"] | {"classical": None}, "limits": []}
+
+
+def _expected_q(lines: Lines) -> tuple[float, bool]:
+    """Q summed over the levels, and whether that of further states is estimated: a sum over many coupled states takes minutes.
+
+    Q = Q_0 Σ_v e^(-E_v/kT) w_v/w_0 with the levels of state 0 alone, E_v the energy of a state and w_v its mean spin weight: what a
+    state's own constants and couplings change is far below the tenth that a note is about.
+    """
+    from rotor.thermodynamics import partition_function
+
+    top, effects, kelvin = lines.top, lines.levels.effects, lines.temperature_k
+    of_states = [effect for effect in effects if effect.states(top)]
+    if not of_states:
+        return partition_function(top, kelvin, effects=effects).q, False
+    others = tuple(effect for effect in effects if effect not in of_states)
+    first = partition_function(
+        replace(top, states=None, level_table=None, symmetry_checked=False), kelvin, effects=others
+    ).q
+    sums = 1.0
+    for effect in of_states:
+        values = effect.parameters(top)
+        for state in effect.states(top):
+            energy = state.operators(values).get((0, 0, 0), 0.0)
+            weight = 1.0 if state.spin_weights is None else state.spin_weights.mean / top.spin_weights.mean
+            sums += weight * math.exp(-energy / (units.MHZ_PER_K * kelvin))
+    return first * sums, True
 
 
 def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) -> SpectrumAnswer:
