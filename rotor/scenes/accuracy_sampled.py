@@ -193,9 +193,9 @@ def _by_energy(scene: Any, request: FluidRequest, asked: float) -> Choice:
     step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
     while step > SHORTEST_STEP_FS:
         if (error := conserved_bound_k(request, step)) <= asked:
-            return Choice(
-                replace(request, settings=replace(request.settings, step_fs=step)), f"a step of {step:g} fs", error
-            )
+            longest = ", nothing cheaper: the longest there is" if step == LONGEST_STEP_FS else ""
+            how = f"a step of {step:g} fs{longest}; root mean square of the conserved energy about its mean"
+            return Choice(replace(request, settings=replace(request.settings, step_fs=step)), how, error)
         step = math.floor(95.0 * step) / 100.0
     raise ValueError(
         f"accuracy: {asked:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
