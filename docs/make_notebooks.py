@@ -84,7 +84,13 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
         ipc = {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
         config = Config({"KernelManager": ipc})
         client = NotebookClient(
-            notebook, timeout=limit, kernel_name="python3", resources=place, config=config, extra_arguments=[DRAWN]
+            notebook,
+            timeout=limit,
+            kernel_name="python3",
+            resources=place,
+            config=config,
+            extra_arguments=[DRAWN],
+            store_widget_state=False,  # a widget's state holds its whole page
         )
         client.execute(env=ONE_THREAD | os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     for cell in notebook.cells:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, write_case
+from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, true_lines, write_case
 
 from rotor.viewer.actions import ACTIONS
 from rotor.viewer.opening import open_session
@@ -437,6 +437,60 @@ def test_species_of_many_kinds_are_predicted_and_labelled(service):
         assert facts["quanta"][number]["names"][: len(names)] == names
         window = done(service, "window", first_mhz=8000, last_mhz=17000, pixels=100)
         assert number in window["sticks"]
+
+
+def test_constants_as_text_are_a_species(service):
+    answer = service.answer({"do": "add_species", "source": "A=2458.69 B=490.43 C=408.87 MHz", "temperature_k": 3.0})
+    assert "dipole not known, 1 D along each axis assumed" in answer["notes"][0]
+    assert service.session.state.species[2].constants == {"A": 2458.69, "B": 490.43, "C": 408.87}
+    assert done(service, "window", first_mhz=8000, last_mhz=9000, pixels=100)["sticks"]["2"]["x"]
+
+
+def test_a_list_of_peaks_is_drawn_as_sticks_and_a_drag_takes_its_peak(service, tmp_path):
+    lines = true_lines((8000.0, 17000.0)).strongest(60).sorted()
+    off = 0.004 * np.random.default_rng(9).normal(size=len(lines))
+    rows = zip(lines.frequency_mhz + off, lines.intensity_nm2_mhz / lines.intensity_nm2_mhz.max(), strict=True)
+    text = "\n".join(f"{f:.5f},{h:.6g},0.004" for f, h in rows)
+    (tmp_path / "peaks.csv").write_text(f"frequency_mhz,intensity,uncertainty_mhz\n{text}\n")
+    listed = open_session("peaks.csv", [NAME], temperature_k=KELVIN)
+    listed.session.release()
+    window = done(listed, "window", first_mhz=8000, last_mhz=17000, pixels=500)
+    assert window["y"].count(0.0) >= 2 * window["y"].count(1.0) > 0
+    assert window["x"][0] == window["x"][1] == window["x"][2]
+    strongest = float(lines.frequency_mhz[np.argmax(lines.intensity_nm2_mhz)])
+    peak = done(listed, "peak", first_mhz=strongest - 0.3, last_mhz=strongest + 0.3)["peak"]
+    assert (peak["error_mhz"], peak["width_mhz"], round(peak["height"], 5)) == (0.004, None, 1.0)
+    assert "the list has no peak there" in done(listed, "peak", first_mhz=8000.001, last_mhz=8000.002)["why"]
+    for upper, lower in SERIES:
+        assert assign_line(listed, upper, lower)["ok"]["label"]
+    done(listed, "refit", species=1)
+    record = listed.session.state.species[1]
+    for name in "ABC":
+        assert abs(record.constants[name] - TRUE[name]) < 5 * record.errors[name]
+    assert service.peaks is None  # of the spectrum
+
+
+def test_the_search_of_unknown_molecules_is_one_step(tmp_path, monkeypatch):
+    from rotor.spectra.lines import line_list
+    from rotor.tops.top import Top
+
+    truth = Top.from_constants("A=5210.331 B=2012.874 C=1533.209 MHz", dipole_abc_debye=(1.6, 0.9, 0.0))
+    lines = line_list(truth, temperature_k=2.0, range_mhz=(6000, 18000)).strongest(80).sorted()
+    rows = zip(lines.frequency_mhz, lines.intensity_nm2_mhz / lines.intensity_nm2_mhz.max(), strict=True)
+    (tmp_path / "peaks.csv").write_text("\n".join(f"{f:.5f},{h:.6g},0.005" for f, h in rows))
+    monkeypatch.chdir(tmp_path)
+    service = open_session("peaks.csv")
+    service.session.release()
+    answer = service.answer({"do": "search", "seconds": 60})
+    assert "certain" in answer["notes"][0]
+    record = service.session.state.species[1]
+    for name, true in (("A", 5210.331), ("B", 2012.874), ("C", 1533.209)):
+        assert abs(record.constants[name] - true) < 0.02
+    assert len(service.session.state.lines) > 20
+    done(service, "refit", species=1)
+    done(service, "undo")
+    done(service, "undo")
+    assert service.session.state.records == {}
 
 
 def test_combination_differences_close(service):

@@ -33,7 +33,7 @@ class Options:
         ..., metavar="SPECTRUM", help="A spectrum: text, FITS or .npy; or the session file of one (.view.json)."
     )
     molecules: list[str] | None = argument(
-        None, metavar="MOLECULE", help="Species to predict: names, files, SMILES:..."
+        None, metavar="MOLECULE", help='Species to predict: names, files, SMILES:..., "A=9 B=3 C=2 GHz".'
     )
     lines: str | None = option(None, metavar="FILE", help="Assigned lines of the first molecule: .lin, .csv, .cat.")
     session: str | None = option(None, metavar="FILE", help="Session file; SPECTRUM.view.json if left out.")

@@ -13,10 +13,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from rotor.assignment.peaks import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.fits import lines_from, refitted
 from rotor.viewer.loomis_wood import centres_of
-from rotor.viewer.peak_fit import fit_peak
+from rotor.viewer.peak_fit import Peak, fit_peak
 from rotor.viewer.prediction import MOST_J, Predictions, changed, species_of_source, with_hyperfine
 from rotor.viewer.records import (
     COLOURS,
@@ -38,11 +39,12 @@ MOST_SPECIES = 30
 
 @dataclass(frozen=True)
 class Context:
-    """What actions need beside the state. notes: takes remarks for the user."""
+    """What actions need beside the state. notes: takes remarks for the user. peaks: of a list, in place of a spectrum."""
 
     spectrum: ObservedSpectrum
     predictions: Predictions
     notes: list[str]
+    peaks: PeakList | None = None
 
 
 Action = Callable[[State, Message, Context], tuple[str, dict[str, Record | None]]]
@@ -160,6 +162,18 @@ def _refuse_many(state: State, more: int) -> None:
         raise ValueError(f"{len(state.lines) + more} lines; a session has at most {MOST_LINES}")
 
 
+def peak_in(context: Context, first_mhz: float, last_mhz: float) -> Peak:
+    """The fitted peak of a range; of a list of peaks the highest one that stands there. ValueError where there is none."""
+    if context.peaks is None:
+        return fit_peak(context.spectrum, first_mhz, last_mhz)
+    listed = context.peaks
+    inside = np.flatnonzero((listed.frequency_mhz >= first_mhz) & (listed.frequency_mhz <= last_mhz))
+    if not len(inside):
+        raise ValueError(f"{first_mhz:.4f} to {last_mhz:.4f} MHz: the list has no peak there")
+    i = inside[np.argmax(listed.intensity[inside])]
+    return Peak(float(listed.frequency_mhz[i]), float(listed.uncertainty_mhz[i]), height=float(listed.intensity[i]))
+
+
 def assign_series(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:
     """Every row of the chosen series with a peak near its centre assigned to it."""
     series = state.settings.series
@@ -178,10 +192,10 @@ def assign_series(state: State, message: Message, context: Context) -> tuple[str
         centres.upper.tolist(), centres.lower.tolist(), centres.frequency_mhz.tolist(), strict=True
     ):
         try:
-            peak = fit_peak(spectrum, centre - reach, centre + reach)
+            peak = peak_in(context, centre - reach, centre + reach)
         except ValueError:
             continue  # no peak in this row
-        if abs(peak.height) < SEEN * max(peak.height_error, 1e-300) or peak.error_mhz > reach:
+        if abs(peak.height) < SEEN * (peak.height_error or 0.0) or peak.error_mhz > reach:
             continue
         line = Line(
             series.species,

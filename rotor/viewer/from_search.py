@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.peaks import PeakList
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.actions import free_blend, number_of
@@ -16,12 +17,13 @@ MOST_SPECIES = 5
 USUAL_SECONDS, MOST_SECONDS = 20.0, 600.0
 
 
-def search(spectrum: ObservedSpectrum, message: Mapping[str, Any]) -> Any:
+def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakList | None = None) -> Any:
     """The answer of `rotor assign` to the peaks of a spectrum. Message: species (1 to 5), seconds, temperature_k."""
     count = int(number_of(message, "species", above=0, default=1))
     seconds = min(number_of(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
     temperature = number_of(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None
-    peaks = peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, spectrum.source)
+    if peaks is None:
+        peaks = peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, spectrum.source)
     return answer_assign(
         AssignRequest(peaks, species=min(count, MOST_SPECIES), seconds=seconds, temperature_k=temperature)
     )

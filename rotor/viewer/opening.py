@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from rotor.assignment.peaks import PeakList
 from rotor.formats.packed import first_bytes
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 from rotor.viewer.actions import Context, add_species
@@ -18,6 +19,7 @@ from rotor.viewer.service import Service
 from rotor.viewer.session import SUFFIX, Session, check_spectrum, is_session, read_session, spectrum_file
 
 Note = Callable[[str], None]
+ALIKE = 0.1  # relative difference of neighbouring steps of a spectrum; those of a list of peaks are random
 
 
 def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSpectrum:
@@ -40,6 +42,17 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
         else ReadChoices(axis_unit=reading.axis_unit, unit=reading.unit, noise=reading.noise)
     )
     return read_spectrum(path, choices)
+
+
+def peaks_of_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
+    """The peaks of a file that is a list of them; None for a spectrum, most of whose steps are like the step before."""
+    steps = np.diff(spectrum.frequency_mhz)
+    alike = np.abs(np.diff(steps)) <= ALIKE * steps[1:]
+    if len(steps) < 2 or alike.mean() > 0.5 or first_bytes(path, 9) == b"SIMPLE  =":
+        return None
+    from rotor.formats.peak_files import read_peaks
+
+    return read_peaks(path)
 
 
 def open_session(
@@ -105,7 +118,7 @@ def open_session(
         )
         spectrum = open_spectrum(where, stated)
         _bind(made, stated, where, file.parent, len(spectrum), resumed)
-        service = Service(made, spectrum)
+        service = Service(made, spectrum, peaks_of_list(where, spectrum))
         _fill(service, molecules, lines, temperature_k, note)
         made.save()
     except BaseException:
@@ -139,7 +152,7 @@ def _fill(service: Service, molecules: Sequence[str], lines: str | None, tempera
     for source in molecules:
         if any(one.source == service.predictions.stored(source) for one in session.state.species.values()):
             continue
-        context = Context(service.spectrum, service.predictions, [])
+        context = Context(service.spectrum, service.predictions, [], service.peaks)
         message: dict[str, Any] = {"source": source, "temperature_k": temperature_k}
         session.apply(*add_species(session.state, message, context))
         for text in context.notes:

@@ -136,6 +136,13 @@ function floats({ start, scale, steps, base64 }) { // numbers of an exported pag
   return Float64Array.from(new Float32Array(bytes.buffer), (value) => start + value * scale);
 }
 
+const thin = (text) => text.replace(/\d+/, (whole) => (whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, "\u2009") : whole));
+function spaced() { // frequencies at the ticks: 17 990 with a thin space
+  const formatter = new Bokeh.BasicTickFormatter({ use_scientific: false }), plain = formatter.doFormat.bind(formatter);
+  formatter.doFormat = (ticks, options) => plain(ticks, options).map(thin);
+  return formatter;
+}
+
 // --- A figure of Bokeh with pointer handling of our own: drag, wheel, selection, nearest point
 
 class Plot {
@@ -222,7 +229,7 @@ class SpectrumWindow extends Plot {
     this.first = first; this.last = last; this.busy = false; this.again = false; this.data = { x: [], y: [], sticks: {} };
     const f = this.figure;
     f.xaxis.axis_label = "frequency (MHz)";
-    f.xaxis.formatter = new Bokeh.BasicTickFormatter({ use_scientific: false });
+    f.xaxis.formatter = spaced();
     f.yaxis.axis_label = app.info.unit === "K" && app.info.notes.some((note) => note.includes("intensities in K assumed")) ? "intensity" : `intensity (${app.info.unit})`;
     this.trace = this.source({ x: [], y: [] });
     this.model = this.source({ x: [], y: [] });
@@ -332,7 +339,7 @@ class ResidualPlot extends Plot {
     super(app, place, { label: "Observed minus calculated frequency of the assigned lines" });
     const f = this.figure;
     f.xaxis.axis_label = "frequency (MHz)"; f.yaxis.axis_label = "obs − calc (kHz)";
-    f.xaxis.formatter = new Bokeh.BasicTickFormatter({ use_scientific: false });
+    f.xaxis.formatter = spaced();
     this.bars = this.source({ x: [], y0: [], y1: [], color: [] });
     this.points = this.source({ x: [], y: [], color: [], fill: [], marker: [] });
     this.zero = new Bokeh.Span({ location: 0, dimension: "width", line_width: 1 });
@@ -408,7 +415,7 @@ class LoomisWood extends Plot {
     if (this.busy) { this.again = true; return; }
     this.busy = true;
     try {
-      const answer = await this.app.transport.call({ do: "loomis_wood", half_width_mhz: this.half, pixels: Math.round((this.box.width || 500) / 2), rows: 50, preview: this.app.preview ?? undefined });
+      const answer = await this.app.transport.call({ do: "loomis_wood", half_width_mhz: this.half, pixels: Math.round((this.box.width || 500) * 0.8), rows: 50, preview: this.app.preview ?? undefined });
       this.rows = answer.rows; this.total = answer.total;
       this.draw();
     } catch (error) { this.app.say(error.message, true); }
@@ -423,7 +430,7 @@ class LoomisWood extends Plot {
       for (const value of row.y) { if (value < low) low = value; if (value > high) high = value; }
       const unit = (0.85 * this.scale) / (high - low || 1);
       xs.push(row.x); ys.push(row.y.map((value) => Math.min((value - low) * unit, 1.4) - i - 0.7));
-      texts.x.push(-0.99 * this.half); texts.y.push(-i - 0.62);
+      texts.x.push(-0.99 * this.half); texts.y.push(-i - 0.56);
       texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
       if (row.at != null && Math.abs(row.at) < this.half) { marks.x.push(row.at); marks.y.push(-i - 0.8); marks.color.push(colors[(app.species[series?.species]?.colour ?? 0) % colors.length]); marks.marker.push(row.rejected ? "x" : "triangle"); }
     });
@@ -719,7 +726,7 @@ export class App {
     if (!Object.keys(this.species).length) return [h("p", {}, "No molecule yet. Add one by name, file or SMILES, or let rotor assign look for unknown ones."), live && this.adder(), live && this.searcher()].filter(Boolean);
     if (!o) return [h("h3", {}, "Assign a peak"), h("ol", {}, h("li", {}, "Shift and drag over a peak, or click a predicted stick (keys: n, then f)."), h("li", {}, "Mark the lines that it is; several make a blend."), h("li", {}, "Enter.")),
       this.fitSummary()];
-    const head = o.peak ? h("dl", { class: "facts" }, [["centre", `${o.peak.frequency_mhz.toFixed(4)} ± ${fixed(o.peak.error_mhz, 5)} MHz`], ["width", `${fixed(o.peak.width_mhz, 4)} ± ${fixed(o.peak.width_error_mhz, 4)} MHz`], ["height", `${o.peak.height.toPrecision(4)} ± ${o.peak.height_error.toPrecision(2)}`]].map(([a, b]) => [h("dt", {}, a), h("dd", {}, b)])) : h("p", { class: "wrong" }, o.why);
+    const head = o.peak ? h("dl", { class: "facts" }, [["centre", `${o.peak.frequency_mhz.toFixed(4)} ± ${fixed(o.peak.error_mhz, 5)} MHz`], ["width", o.peak.width_mhz == null ? "not in the list" : `${fixed(o.peak.width_mhz, 4)} ± ${fixed(o.peak.width_error_mhz, 4)} MHz`], ["height", `${o.peak.height.toPrecision(4)}${o.peak.height_error == null ? "" : ` ± ${o.peak.height_error.toPrecision(2)}`}`]].map(([a, b]) => [h("dt", {}, a), h("dd", {}, b)])) : h("p", { class: "wrong" }, o.why);
     const rows = o.candidates.slice(0, 60).map((c, i) => h("tr", { class: o.marked.has(i) ? "marked" : "" },
       h("td", {}, h("input", { type: "checkbox", "data-field": `c${i}`, "aria-label": this.text(c), checked: o.marked.has(i), onchange: (event) => { event.target.checked ? o.marked.add(i) : o.marked.delete(i); this.panels(); } })),
       h("td", {}, this.swatch(c.species), this.text(c), c.assigned ? " ✓" : ""), h("td", { class: "number" }, fixed(c.off_mhz, 3)), h("td", { class: "number" }, percent(c.height))));

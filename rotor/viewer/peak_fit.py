@@ -26,16 +26,19 @@ NAMES = ("baseline", "slope", "height", "frequency", "width")
 
 @dataclass(frozen=True)
 class Peak:
-    """A fitted peak: centre, width (full, half maximum) and height with standard errors. rms: of the residuals over the noise."""
+    """A peak: centre, width (full, half maximum) and height with standard errors; None for what a list of peaks does not state.
+
+    baseline: below it. rms: of the residuals of the fit over the noise.
+    """
 
     frequency_mhz: float
     error_mhz: float
-    width_mhz: float
-    width_error_mhz: float
-    height: float
-    height_error: float
-    baseline: float
-    rms: float
+    width_mhz: float | None = None
+    width_error_mhz: float | None = None
+    height: float = 0.0
+    height_error: float | None = None
+    baseline: float | None = None
+    rms: float | None = None
 
 
 def fit_peak(spectrum: ObservedSpectrum, first_mhz: float, last_mhz: float) -> Peak:

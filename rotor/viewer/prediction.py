@@ -7,6 +7,7 @@ and a moved constant one line list.
 from __future__ import annotations
 
 import math
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -48,10 +49,15 @@ def constant_set(top: Top, hyperfine: bool) -> ConstantSet:
     return TopConstants(top, hyperfine) if hyperfine or further else top.constants
 
 
+_CONSTANTS = re.compile(r"\s*[^\W\d_]\w*\s*=\s*[-+\d.]")  # such as "A=2458.69 B=490.43 C=408.87 MHz"
+
+
 def top_of_source(source: str) -> Top:
-    """The top of a name, a file or a text such as SMILES:C=O. ValueError for what is none."""
+    """The top of a name, a file, a text such as SMILES:C=O, or constants such as "B=6081 MHz". ValueError for what is none."""
     from rotor.formats import read
 
+    if _CONSTANTS.match(source) and not _is_file(Path(source)):
+        return Top.from_constants(source)
     top = read(source)
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__}, not a molecule or constants")

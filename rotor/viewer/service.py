@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.assignment.peaks import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.version import version
 from rotor.viewer.actions import (
@@ -24,12 +25,12 @@ from rotor.viewer.actions import (
     constants_in,
     import_lines,
     number_of,
+    peak_in,
     species_of,
 )
 from rotor.viewer.exports import exported
 from rotor.viewer.fits import levels_of, refitted, residuals_of
 from rotor.viewer.loomis_wood import centres_of, rows_of, rows_of_labels
-from rotor.viewer.peak_fit import fit_peak
 from rotor.viewer.prediction import Predicted, Predictions, changed
 from rotor.viewer.pyramid import pyramid
 from rotor.viewer.records import Line, Record, Species, species_key
@@ -46,10 +47,14 @@ Answer = dict[str, Any]
 class Service:
     """A session with its spectrum. answer: of one message. Threads may call it; one message is answered at a time."""
 
-    def __init__(self, session: Session, spectrum: ObservedSpectrum) -> None:
+    def __init__(self, session: Session, spectrum: ObservedSpectrum, peaks: PeakList | None = None) -> None:
         self.session = session
         self.spectrum = spectrum
-        self.pyramid = pyramid(spectrum.frequency_mhz, spectrum.intensity)
+        self.peaks = peaks
+        x, y = spectrum.frequency_mhz, spectrum.intensity
+        if peaks is not None:  # drawn as sticks
+            x, y = np.repeat(x, 3), np.stack([0 * y, y, 0 * y], axis=1).reshape(-1)
+        self.pyramid = pyramid(x, y)
         self.band_mhz = (float(spectrum.frequency_mhz[0]), float(spectrum.frequency_mhz[-1]))
         self.predictions = Predictions(self.band_mhz, session.path.parent if session.path else None)
         self._lock = threading.RLock()
@@ -68,20 +73,27 @@ class Service:
         """The answer to a message: `ok` with its content, or `error` with one line; `notes` where there is more to know."""
         if not isinstance(message, dict) or not isinstance(message.get("do"), str):
             return {"error": 'expected a message {"do": NAME, ...}'}
-        with self._lock:
-            try:
+        try:
+            if message["do"] == SEARCH:
+                return self._search(message)
+            with self._lock:
                 return self._answer(message["do"], message)
-            except ValueError as error:
-                return {"error": " ".join(str(error).split())}
-            except OSError as error:
-                return {"error": f"{error.filename or 'session'}: {error.strerror}"}
-            except (
-                ArithmeticError,
-                LookupError,
-                TypeError,
-                AttributeError,
-            ) as error:  # a message that nothing foresees
-                return {"error": f"{message['do']}: {type(error).__name__}: {error}"}
+        except ValueError as error:
+            return {"error": " ".join(str(error).split())}
+        except OSError as error:
+            return {"error": f"{error.filename or 'session'}: {error.strerror}"}
+        except (ArithmeticError, LookupError, TypeError, AttributeError) as error:  # a message that nothing foresees
+            return {"error": f"{message['do']}: {type(error).__name__}: {error}"}
+
+    def _search(self, message: Mapping[str, Any]) -> Answer:
+        """Species and lines by `rotor assign`; other messages are answered while it searches."""
+        from rotor.viewer.from_search import records_of, search
+
+        answer = search(self.spectrum, message, self.peaks)
+        with self._lock:
+            label, changes, remarks = records_of(answer, self.session.state)
+            self.session.apply(label, changes)
+        return {"ok": {"label": label}, "notes": remarks}
 
     def _answer(self, name: str, message: Mapping[str, Any]) -> Answer:
         if name in self._queries:
@@ -98,7 +110,7 @@ class Service:
         return {"ok": {"label": label if moved else None}, "notes": context.notes}
 
     def _context(self) -> Context:
-        return Context(self.spectrum, self.predictions, [])
+        return Context(self.spectrum, self.predictions, [], self.peaks)
 
     def _refits(self, changes: Mapping[str, Record | None], context: Context) -> dict[str, Record | None]:
         """Species whose lines or free constants change, refitted; a note says why one is not."""
@@ -156,12 +168,18 @@ class Service:
             "rotor": version(),
             "band_mhz": list(self.band_mhz),
             "range": [float(y.min()), float(y.max())],
-            "channel_mhz": self.spectrum.channel_mhz,
+            "channel_mhz": self.channel_mhz,
+            "list": self.peaks is not None,
             "noise": float(np.median(self.spectrum.noise)),
             "unit": self.spectrum.unit,
             "notes": list(self.spectrum.notes),
             "session": self.facts(),
         }
+
+    @property
+    def channel_mhz(self) -> float:
+        """Width of a channel; of a list of peaks their usual error."""
+        return self.spectrum.channel_mhz if self.peaks is None else float(np.median(self.peaks.uncertainty_mhz))
 
     def _previewed(self, message: Mapping[str, Any]) -> dict[int, Species]:
         """The species, one with constants that are being moved."""
@@ -266,7 +284,7 @@ class Service:
             raise ValueError(f"peak: {first:g} to {last:g} MHz: expected a range that rises")
         answer: Answer = {"peak": None, "why": None, "candidates": []}
         try:
-            peak = fit_peak(self.spectrum, first, last)
+            peak = peak_in(self._context(), first, last)
             answer["peak"] = asdict(peak)
             centre = peak.frequency_mhz
         except ValueError as error:
