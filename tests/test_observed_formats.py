@@ -218,3 +218,44 @@ def test_units_and_conventions() -> None:
     assert intensity_unit("Jy beam-1", "a") == ("Jy/beam", 1.0)
     with pytest.raises(ValueError, match="known are radio"):
         frequency_of_velocity(1.0, 1.0, "sideways")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frequency_mhz,intensity_k\n1000,1\n1001,2.5\n1002,-3e-1\n",
+        "# xLabel: frequency [GHz]\n# yLabel: (Jy/beam) Mean\n1.0 1\n\n1.1 2\n1.2 3\n",
+        "1000\t1\t0.1\n1001\t2\t0.2\n",
+        "\ufefffreq (GHz), T (K), noise\n100,1,0.1\n101,2,0.1\n",
+    ],
+)
+def test_columns_read_at_once_are_those_read_line_by_line(text: str) -> None:
+    from rotor.formats.spectra import text as reader
+
+    heading, numbers = reader._plain_columns(text) or ([], np.zeros(0))
+    expected_heading, expected = reader._parsed_by_line(text, "a.csv")
+    assert np.array_equal(numbers, expected)
+    assert [line for line in heading if line] == expected_heading
+
+
+@pytest.mark.parametrize(
+    "text", ["1000 1\n1001 2 3\n", "1000 1\n# remark\n1001 2\n", "1000 1D0\n1001 2D0\n", "1000,1\n1001,\n", "", "a b\n"]
+)
+def test_what_is_no_plain_table_is_read_line_by_line(text: str) -> None:
+    from rotor.formats.spectra import text as reader
+
+    assert reader._plain_columns(text) is None
+
+
+def test_a_long_spectrum_is_read_in_a_fraction_of_the_time() -> None:
+    from time import process_time
+
+    from rotor.formats.spectra import text as reader
+
+    text = "\n".join(f"{1000 + 0.01 * i:.4f},{i % 17}" for i in range(40_000))
+    times = []
+    for read in (lambda: reader._plain_columns(text), lambda: reader._parsed_by_line(text, "a.csv")):
+        begun = process_time()
+        assert len(read()[1]) == 40_000
+        times.append(process_time() - begun)
+    assert times[1] > 4 * times[0]  # 20 measured

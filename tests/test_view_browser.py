@@ -233,6 +233,59 @@ def test_an_exported_page_opens_without_server_and_network(served, browser, tmp_
     context.close()
 
 
+def test_the_widget_of_a_notebook_is_the_same_page(served, browser, tmp_path):
+    """The module that anywidget loads, with a model that carries messages as the channel of a notebook does."""
+    from rotor.viewer.widget import widget_class
+
+    service = served[1]
+    widget = widget_class()(service, 500)
+    (tmp_path / "widget.mjs").write_text(str(widget._esm), encoding="utf-8")
+    (tmp_path / "widget.html").write_text(
+        f"<!doctype html><style>{widget._css}</style><div id=cell style='width:1000px'></div>"
+    )
+    context = browser.new_context(viewport={"width": 1050, "height": 700})
+    opened = context.new_page()
+    wrong = []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.expose_function("toPython", lambda content: said(widget, content))
+    opened.goto((tmp_path / "widget.html").as_uri())
+    opened.evaluate(
+        """async (text) => {
+        const module = await import(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+        const listeners = [];
+        const model = { get: () => 500, on: (name, call) => listeners.push(call),
+          send: (content) => toPython(content).then((answers) => answers.forEach((one) => listeners.forEach((call) => call(one)))) };
+        await module.default.render({ model, el: document.querySelector("#cell") });
+        }""",
+        (tmp_path / "widget.mjs").read_text(encoding="utf-8"),
+    )
+    opened.wait_for_selector(READY, timeout=30_000)
+    opened.click("#tab-Constants")
+    assert opened.locator("details.species").count() == 1
+    opened.click("details.species >> text=Remove")
+    for _ in range(100):
+        if not service.session.state.species:
+            break
+        opened.wait_for_timeout(50)
+    assert service.session.state.species == {}
+    opened.click("text=Undo")
+    for _ in range(100):
+        if opened.locator("details.species").count() == 1:
+            break
+        opened.wait_for_timeout(50)
+    assert opened.locator("details.species").count() == 1
+    assert not wrong
+    context.close()
+
+
+def said(widget, content):
+    """What the widget sends back for a message, in order."""
+    sent = []
+    widget.send = sent.append
+    widget._received(widget, content, None)
+    return sent
+
+
 def luminance(rgb):
     """Relative luminance of WCAG 2.2."""
     parts = [value / 255 / 12.92 if value / 255 <= 0.04045 else ((value / 255 + 0.055) / 1.055) ** 2.4 for value in rgb]
