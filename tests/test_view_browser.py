@@ -136,6 +136,7 @@ def test_open_zoom_assign_refit_undo_export(page, served, tmp_path):
     assert Path(waiting.value.path()).read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_everything_by_keyboard(page, served):
     service = served[1]
     page.evaluate("rotorView.show(16027, null, 20)")
@@ -176,6 +177,7 @@ def test_everything_by_keyboard(page, served):
     assert {"Refit", "Undo", "Lines", "Windows", "Keys"} <= reached
 
 
+@pytest.mark.slow
 def test_loomis_wood_rows_and_sliders(page, served):
     service = served[1]
     page.keyboard.press("4")
@@ -185,6 +187,17 @@ def test_loomis_wood_rows_and_sliders(page, served):
     settled(page, "rotorView.wood.rows.length === 2 && rotorView.pane === 'wood'")
     page.click("text=Assign all rows")
     settled(page, "Object.keys(rotorView.lines).length === 2")
+    page.keyboard.press("l")  # residuals: a click on one shows its line
+    settled(page, "rotorView.pane === 'residuals' && rotorView.residuals.rows.length === 2")
+    at = page.evaluate(
+        """() => {
+        const r = rotorView.residuals, { x_range: X, y_range: Y } = r.figure, { left, top, width, height } = r.box;
+        const place = r.place.getBoundingClientRect(), p = r.rows[1];
+        const across = (p.x - X.start) / (X.end - X.start), down = (Y.end - p.y) / (Y.end - Y.start);
+        return [place.left + left + width * across, place.top + top + height * down, p.number]; }"""
+    )
+    page.mouse.click(at[0], at[1])
+    settled(page, f"rotorView.line === {at[2]} && rotorView.tab === 'Lines'")
     page.keyboard.press("3")
     before = service.session.state
     page.evaluate(
@@ -233,6 +246,7 @@ def test_an_exported_page_opens_without_server_and_network(served, browser, tmp_
     context.close()
 
 
+@pytest.mark.slow
 def test_the_widget_of_a_notebook_is_the_same_page(served, browser, tmp_path):
     """The module that anywidget loads, with a model that carries messages as the channel of a notebook does."""
     from rotor.viewer.widget import widget_class
@@ -319,6 +333,7 @@ def test_text_and_species_have_contrast(page, theme):
     assert ratio(text["accent"], text["on-accent"]) >= 4.5
 
 
+@pytest.mark.slow
 def test_small_and_dark_the_page_has_no_sideways_scroll(browser, served):
     context = browser.new_context(viewport={"width": 420, "height": 800}, color_scheme="dark")
     opened = context.new_page()

@@ -13,13 +13,17 @@ const PEN = {
 const KEYS = [
   ["← →", "move along the spectrum (Shift: a whole window)"], ["+ −", "zoom in and out (↑ ↓ too)"], ["0", "the whole band"],
   ["n p", "next, previous predicted line"], ["] [", "next, previous assigned line"], ["f", "fit the peak at the middle of the window"],
-  ["Enter", "assign the fitted peak to the marked lines"], ["a", "drag selects a peak instead of moving"], ["x", "reject or accept the selected line"],
-  ["Delete", "remove the selected line"], ["r", "refit"], ["u, Ctrl+Z", "undo"], ["y, Ctrl+Y", "redo"], ["w", "open or close a second window"],
-  ["m", "prediction mirrored or overlaid"], ["s", "height of the sticks: of this window or of the whole band"], ["l", "residuals or Loomis-Wood rows"],
+  ["Enter", "assign the fitted peak to the marked lines"], ["a", "drag selects a peak instead of moving"],
+    ["x", "reject or accept the selected line"],
+  ["Delete", "remove the selected line"], ["r", "refit"], ["u, Ctrl+Z", "undo"], ["y, Ctrl+Y", "redo"],
+    ["w", "open or close a second window"],
+  ["m", "prediction mirrored or overlaid"], ["s", "height of the sticks: of this window or of the whole band"],
+    ["l", "residuals or Loomis-Wood rows"],
   ["1 … 5", "panels"], ["t", "light or dark"], ["? Esc", "show, hide these keys"],
 ];
 const EXPORTS = [
-  ["lin", "Lines (.lin)"], ["csv", "Lines (.csv)"], ["par", "SPFIT input (.par)"], ["var", "SPCAT input (.var)"], ["toml", "Molecule file (.toml)"],
+  ["lin", "Lines (.lin)"], ["csv", "Lines (.csv)"], ["par", "SPFIT input (.par)"], ["var", "SPCAT input (.var)"],
+    ["toml", "Molecule file (.toml)"],
   ["scene", "Scene of the fit (.toml)"], ["fit", "Report of the fit"], ["md", "Table (Markdown)"], ["tex", "Table (LaTeX)"],
 ];
 const TABS = ["Assign", "Lines", "Constants", "Series", "Levels"];
@@ -39,10 +43,12 @@ function h(tag, attributes = {}, ...children) {
 }
 const fixed = (value, digits) => (value == null || !isFinite(value) ? "–" : value.toFixed(digits));
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-const quantum = (q, name, halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`) : name === "species" ? "AE"[q] ?? `${q}` : `${q}`);
+const quantum = (q, name,
+  halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`) : name === "species" ? "AE"[q] ?? `${q}` : `${q}`);
 const HEAD = { j: "J", ka: "Ka", kc: "Kc", k: "K", n: "N", f: "F", f1: "F1", v: "v", i_tot: "I" };
 const digitsOf = (error, value) => (error > 0 ? clamp(Math.ceil(-Math.log10(error)) + 1, 0, 12) : value && Math.abs(value) < 1 ? 9 : 4);
-const short = (value) => (value >= 1e-4 && value < 1e5 ? value.toFixed(clamp(1 - Math.floor(Math.log10(value)), 0, 9)) : value.toExponential(1));
+const short = (value) => (value >= 1e-4 && value < 1e5 ? value.toFixed(clamp(1 - Math.floor(Math.log10(value)), 0,
+  9)) : value.toExponential(1));
 const percent = (part) => (part >= 0.1 ? (100 * part).toFixed(0) : (100 * part).toPrecision(2));
 const frame = () => new Promise((done) => requestAnimationFrame(done));
 
@@ -55,7 +61,8 @@ function ints(text) { // "3 0 3", "3,0,3"
 // --- Transports: call(message) gives an answer; onsession is called with the session after each change
 
 export class SocketTransport {
-  constructor(address) { this.address = address; this.waiting = new Map(); this.next = 1; this.onsession = () => {}; this.onstatus = () => {}; this.live = true; }
+  constructor(address) { this.address = address; this.waiting = new Map(); this.next = 1; this.onsession = () => {};
+    this.onstatus = () => {}; this.live = true; }
   open() {
     return new Promise((done, fail) => {
       this.socket = new WebSocket(this.address);
@@ -69,7 +76,8 @@ export class SocketTransport {
     for (const one of this.waiting.values()) one.fail(new Error("the connection with the server was lost"));
     this.waiting.clear();
     this.onstatus("The server does not answer; every finished action is saved. Trying again…");
-    setTimeout(() => this.open().then(() => this.call({ do: "hello" })).then((answer) => this.onsession(answer.session)).catch(() => {}), 1500);
+    setTimeout(() => this.open().then(() => this.call({ do: "hello" })).then((answer) => this.onsession(answer.session)).catch(() => {}),
+      1500);
   }
   receive(content) {
     if (content.session) return this.onsession(content.session);
@@ -98,7 +106,8 @@ export class WidgetTransport extends SocketTransport {
 }
 
 export class StaticTransport { // an exported page: numbers inside, nothing computed but what is drawn
-  constructor(data) { this.data = data; this.onsession = () => {}; this.onstatus = () => {}; this.live = false; this.x = floats(data.x); this.y = floats(data.y); }
+  constructor(data) { this.data = data; this.onsession = () => {}; this.onstatus = () => {}; this.live = false; this.x = floats(data.x);
+    this.y = floats(data.y); }
   open() { return Promise.resolve(); }
   async call(message) {
     if (message.do === "hello") return this.data.hello;
@@ -172,8 +181,10 @@ class Plot {
     f.background_fill_color = pen.paper; f.border_fill_color = pen.paper; f.outline_line_color = pen.grid;
     for (const axis of [...f.below, ...f.left]) {
       if (!axis.axis_label_text_color && axis.axis_label_text_color !== null) continue;
-      Object.assign(axis, { axis_label_text_color: pen.ink, major_label_text_color: pen.ink, axis_line_color: pen.ink, major_tick_line_color: pen.ink,
-        minor_tick_line_color: null, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px", major_label_text_font_size: "12px" });
+      Object.assign(axis, { axis_label_text_color: pen.ink, major_label_text_color: pen.ink, axis_line_color: pen.ink,
+        major_tick_line_color: pen.ink,
+        minor_tick_line_color: null, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px",
+          major_label_text_font_size: "12px" });
     }
     for (const grid of f.center) if ("grid_line_color" in grid) grid.grid_line_color = pen.grid;
   }
@@ -197,7 +208,8 @@ class Plot {
       moved ||= Math.abs(to.sx - from.sx) > 3;
       if (!moved) return;
       if (choose) this.select(from.x, to.x, from.y);
-      else this.onpan?.(start - ((to.sx - from.sx) / this.box.width) * (end - start), end - ((to.sx - from.sx) / this.box.width) * (end - start));
+      else this.onpan?.(start - ((to.sx - from.sx) / this.box.width) * (end - start),
+        end - ((to.sx - from.sx) / this.box.width) * (end - start));
     };
     const up = (now) => {
       window.removeEventListener("pointermove", move); window.removeEventListener("pointerup", up);
@@ -237,8 +249,10 @@ class SpectrumWindow extends Plot {
     this.marks = this.source({ x: [], y: [], color: [], fill: [], marker: [] });
     this.traceGlyph = f.line({ field: "x" }, { field: "y" }, { source: this.trace, line_width: 1 });
     this.modelGlyph = f.line({ field: "x" }, { field: "y" }, { source: this.model, line_width: 1.8, line_dash: [6, 3] });
-    f.segment({ field: "x" }, { field: "y0" }, { field: "x" }, { field: "y1" }, { source: this.sticks, line_color: { field: "color" }, line_width: 1.6 });
-    f.scatter({ field: "x" }, { field: "y" }, { source: this.marks, marker: { field: "marker" }, size: 9, line_color: { field: "color" }, fill_color: { field: "fill" }, line_width: 1.5 });
+    f.segment({ field: "x" }, { field: "y0" }, { field: "x" }, { field: "y1" },
+      { source: this.sticks, line_color: { field: "color" }, line_width: 1.6 });
+    f.scatter({ field: "x" }, { field: "y" }, { source: this.marks, marker: { field: "marker" }, size: 9, line_color: { field: "color" },
+      fill_color: { field: "fill" }, line_width: 1.5 });
     this.zero = new Bokeh.Span({ location: 0, dimension: "width", line_width: 1 });
     this.cursor = new Bokeh.Span({ location: 0, dimension: "height", line_width: 1, line_dash: [4, 4], visible: false });
     this.chosen = new Bokeh.BoxAnnotation({ left: 0, right: 0, fill_alpha: 0.15, visible: false });
@@ -253,7 +267,8 @@ class SpectrumWindow extends Plot {
     super.theme();
     const pen = PEN[this.app.theme];
     this.traceGlyph.glyph.line_color = pen.trace; this.modelGlyph.glyph.line_color = pen.mark;
-    this.zero.line_color = pen.grid; this.cursor.line_color = pen.mark; this.chosen.fill_color = pen.select; this.chosen.line_color = pen.select;
+    this.zero.line_color = pen.grid; this.cursor.line_color = pen.mark; this.chosen.fill_color = pen.select;
+      this.chosen.line_color = pen.select;
     this.draw();
   }
   go(first, last) {
@@ -280,15 +295,19 @@ class SpectrumWindow extends Plot {
   draw() {
     const { x, y, sticks, model } = this.data, app = this.app, colors = PALETTE[app.theme];
     let low = Infinity, high = -Infinity;
-    for (let i = 0; i < x.length; i++) if (x[i] >= this.first && x[i] <= this.last) { if (y[i] < low) low = y[i]; if (y[i] > high) high = y[i]; }
-    if (model && app.settings.emission) for (let i = 0; i < model.x.length; i++) if (model.x[i] >= this.first && model.x[i] <= this.last) high = Math.max(high, model.y[i]);
+    for (let i = 0; i < x.length; i++) if (x[i] >= this.first && x[i] <= this.last) { if (y[i] < low) low = y[i];
+      if (y[i] > high) high = y[i]; }
+    if (model && app.settings.emission) for (let i = 0; i < model.x.length;
+      i++) if (model.x[i] >= this.first && model.x[i] <= this.last) high = Math.max(high, model.y[i]);
     if (!isFinite(low)) { low = 0; high = 1; }
     const tall = Math.max(high - Math.min(low, 0), 1e-30), mirrored = !app.settings.overlaid;
     let strongest = 0;
-    for (const one of Object.values(sticks)) one.x.forEach((at, i) => { if (at >= this.first && at <= this.last && one.height[i] > strongest) strongest = one.height[i]; });
+    for (const one of Object.values(sticks)) one.x.forEach((at,
+      i) => { if (at >= this.first && at <= this.last && one.height[i] > strongest) strongest = one.height[i]; });
     const unit = (tall * 0.95) / (app.autoscale ? strongest || 1 : 1);
     const columns = { x: [], y0: [], y1: [], color: [] };
-    const least = Object.values(sticks).reduce((sum, one) => sum + one.x.length, 0) < 200 ? 0.012 * tall : 0; // a weak line is seen where there are few
+    const least = Object.values(sticks).reduce((sum, one) => sum + one.x.length, 0) < 200 ? 0.012 * tall : 0;
+      // a weak line is seen where there are few
     this.lines = [];
     const foot = mirrored ? Math.min(low, 0) - 0.04 * tall : 0;
     this.foot = foot;
@@ -345,23 +364,30 @@ class ResidualPlot extends Plot {
     this.zero = new Bokeh.Span({ location: 0, dimension: "width", line_width: 1 });
     this.shown = new Bokeh.BoxAnnotation({ left: 0, right: 0, fill_alpha: 0.12, line_alpha: 0.6 });
     f.add_layout(this.zero); f.add_layout(this.shown);
-    f.segment({ field: "x" }, { field: "y0" }, { field: "x" }, { field: "y1" }, { source: this.bars, line_color: { field: "color" }, line_alpha: 0.6 });
-    f.scatter({ field: "x" }, { field: "y" }, { source: this.points, marker: { field: "marker" }, size: 8, line_color: { field: "color" }, fill_color: { field: "fill" } });
+    f.segment({ field: "x" }, { field: "y0" }, { field: "x" }, { field: "y1" },
+      { source: this.bars, line_color: { field: "color" }, line_alpha: 0.6 });
+    f.scatter({ field: "x" }, { field: "y" }, { source: this.points, marker: { field: "marker" }, size: 8, line_color: { field: "color" },
+      fill_color: { field: "fill" } });
     this.onclick = (at) => { const one = this.nearest(at); if (one) app.selectLine(one.number, true); };
-    this.ontip = (at) => { const one = this.nearest(at); return one ? `${app.name(one.line)}  ${one.facts.label}\nobs − calc ${fixed(1e3 * one.facts.difference_mhz, 2)} kHz` : null; };
+    this.ontip = (at) => { const one = this.nearest(at);
+      return one ? `${app.name(one.line)}  ${one.facts.label}\nobs − calc ${fixed(1e3 * one.facts.difference_mhz, 2)} kHz` : null; };
   }
-  theme() { super.theme(); const pen = PEN[this.app.theme]; this.zero.line_color = pen.ink; this.shown.fill_color = pen.select; this.shown.line_color = pen.select; this.draw(); }
+  theme() { super.theme(); const pen = PEN[this.app.theme]; this.zero.line_color = pen.ink; this.shown.fill_color = pen.select;
+    this.shown.line_color = pen.select; this.draw(); }
   draw() {
-    const app = this.app, colors = PALETTE[app.theme], bars = { x: [], y0: [], y1: [], color: [] }, points = { x: [], y: [], color: [], fill: [], marker: [] };
+    const app = this.app, colors = PALETTE[app.theme], bars = { x: [], y0: [], y1: [], color: [] },
+      points = { x: [], y: [], color: [], fill: [], marker: [] };
     this.rows = [];
     let most = 0;
     for (const [number, line] of Object.entries(app.lines)) {
       const facts = app.facts[number];
       if (facts?.difference_mhz == null) continue;
-      const y = 1e3 * facts.difference_mhz, error = 1e3 * line.error_mhz, colour = app.species[line.species]?.colour ?? 0, color = colors[colour % colors.length];
+      const y = 1e3 * facts.difference_mhz, error = 1e3 * line.error_mhz, colour = app.species[line.species]?.colour ?? 0,
+        color = colors[colour % colors.length];
       this.rows.push({ number: Number(number), line, facts, x: line.frequency_mhz, y });
       bars.x.push(line.frequency_mhz); bars.y0.push(y - error); bars.y1.push(y + error); bars.color.push(color);
-      points.x.push(line.frequency_mhz); points.y.push(y); points.color.push(color); points.marker.push(line.rejected ? "x" : MARKS[colour % MARKS.length]);
+      points.x.push(line.frequency_mhz); points.y.push(y); points.color.push(color);
+        points.marker.push(line.rejected ? "x" : MARKS[colour % MARKS.length]);
       points.fill.push(Number(number) === app.line ? PEN[app.theme].mark : color);
       if (!line.rejected) most = Math.max(most, Math.abs(y) + error);
     }
@@ -375,7 +401,8 @@ class ResidualPlot extends Plot {
   nearest(at) {
     const { x_range: X, y_range: Y } = this.figure, sx = this.box.width / (X.end - X.start), sy = this.box.height / (Y.end - Y.start);
     let best = null, least = 12;
-    for (const row of this.rows ?? []) { const away = Math.hypot((row.x - at.x) * sx, (row.y - at.y) * sy); if (away < least) { best = row; least = away; } }
+    for (const row of this.rows ?? []) { const away = Math.hypot((row.x - at.x) * sx, (row.y - at.y) * sy);
+      if (away < least) { best = row; least = away; } }
     return best;
   }
 }
@@ -386,22 +413,27 @@ class LoomisWood extends Plot {
   constructor(app, place) {
     super(app, place, { label: "Loomis-Wood rows of a series" });
     const f = this.figure;
-    this.half = app.transport.data?.loomis_wood.half_width_mhz ?? Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = []; this.busy = false;
+    this.half = app.transport.data?.loomis_wood.half_width_mhz ?? Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = [];
+      this.busy = false;
     f.xaxis.axis_label = "distance from the expected line (MHz)";
     f.yaxis.visible = false; f.ygrid.visible = false;
     this.traces = this.source({ xs: [], ys: [] });
     this.texts = this.source({ x: [], y: [], text: [] });
     this.marks = this.source({ x: [], y: [], color: [], marker: [] });
     this.traceGlyph = f.multi_line({ field: "xs" }, { field: "ys" }, { source: this.traces, line_width: 1 });
-    this.textGlyph = f.text({ field: "x" }, { field: "y" }, { field: "text" }, { source: this.texts, text_font_size: "11px", text_baseline: "bottom" });
-    f.scatter({ field: "x" }, { field: "y" }, { source: this.marks, marker: { field: "marker" }, size: 9, line_color: { field: "color" }, fill_color: { field: "color" } });
+    this.textGlyph = f.text({ field: "x" }, { field: "y" }, { field: "text" },
+      { source: this.texts, text_font_size: "11px", text_baseline: "bottom" });
+    f.scatter({ field: "x" }, { field: "y" }, { source: this.marks, marker: { field: "marker" }, size: 9, line_color: { field: "color" },
+      fill_color: { field: "color" } });
     this.middle = new Bokeh.Span({ location: 0, dimension: "height", line_width: 1, line_dash: [4, 4] });
     this.chosen = new Bokeh.BoxAnnotation({ left: 0, right: 0, fill_alpha: 0.2, visible: false });
     f.add_layout(this.middle); f.add_layout(this.chosen);
-    this.onselect = (a, b, y) => { this.chosen.visible = false; const row = this.rowAt(y); if (row) app.fitPeak(row.centre_mhz + a, row.centre_mhz + b, app.active, row); };
+    this.onselect = (a, b, y) => { this.chosen.visible = false; const row = this.rowAt(y);
+      if (row) app.fitPeak(row.centre_mhz + a, row.centre_mhz + b, app.active, row); };
     this.onpan = null;
     this.onclick = (at) => { const row = this.rowAt(at.y); if (row) app.show(row.centre_mhz + at.x, app.active); };
-    this.ontip = (at) => { const row = this.rowAt(at.y); return row ? `row ${row.n}${row.upper.length ? "  " + app.text({ ...row, species: app.settings.series?.species }) : ""}\n${(row.centre_mhz + at.x).toFixed(4)} MHz` : null; };
+    this.ontip = (at) => { const row = this.rowAt(at.y);
+      return row ? `row ${row.n}${row.upper.length ? "  " + app.text({ ...row, species: app.settings.series?.species }) : ""}\n${(row.centre_mhz + at.x).toFixed(4)} MHz` : null; };
   }
   theme() {
     super.theme();
@@ -415,7 +447,8 @@ class LoomisWood extends Plot {
     if (this.busy) { this.again = true; return; }
     this.busy = true;
     try {
-      const answer = await this.app.transport.call({ do: "loomis_wood", half_width_mhz: this.half, pixels: Math.round((this.box.width || 500) * 0.8), rows: 50, preview: this.app.preview ?? undefined });
+      const answer = await this.app.transport.call({ do: "loomis_wood", half_width_mhz: this.half,
+        pixels: Math.round((this.box.width || 500) * 0.8), rows: 50, preview: this.app.preview ?? undefined });
       this.rows = answer.rows; this.total = answer.total;
       this.draw();
     } catch (error) { this.app.say(error.message, true); }
@@ -432,7 +465,9 @@ class LoomisWood extends Plot {
       xs.push(row.x); ys.push(row.y.map((value) => Math.min((value - low) * unit, 1.4) - i - 0.7));
       texts.x.push(-0.99 * this.half); texts.y.push(-i - 0.56);
       texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
-      if (row.at != null && Math.abs(row.at) < this.half) { marks.x.push(row.at); marks.y.push(-i - 0.8); marks.color.push(colors[(app.species[series?.species]?.colour ?? 0) % colors.length]); marks.marker.push(row.rejected ? "x" : "triangle"); }
+      if (row.at != null && Math.abs(row.at) < this.half) { marks.x.push(row.at); marks.y.push(-i - 0.8);
+        marks.color.push(colors[(app.species[series?.species]?.colour ?? 0) % colors.length]);
+        marks.marker.push(row.rejected ? "x" : "triangle"); }
     });
     this.traces.data = { xs, ys }; this.texts.data = texts; this.marks.data = marks;
     this.figure.x_range.setv({ start: -this.half, end: this.half });
@@ -444,8 +479,10 @@ class LoomisWood extends Plot {
 
 export class App {
   constructor(root, transport) {
-    this.root = root; this.transport = transport; this.windows = []; this.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-    this.choosing = false; this.autoscale = true; this.tab = "Assign"; this.pane = "residuals"; this.line = null; this.offered = null; this.measured = [];
+    this.root = root; this.transport = transport; this.windows = [];
+      this.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    this.choosing = false; this.autoscale = true; this.tab = "Assign"; this.pane = "residuals"; this.line = null; this.offered = null;
+      this.measured = [];
     this.filter = ""; this.picked = new Set(); this.spans = {}; this.preview = null;
     transport.onsession = (session) => this.update(session);
     transport.onstatus = (text) => this.lostText(text);
@@ -466,7 +503,8 @@ export class App {
     this.root.dataset.ready = "yes";
   }
   take(session) {
-    this.session = session; this.species = {}; this.lines = {}; this.settings = { series: null, emission: false, overlaid: false, auto_refit: false, least_error_mhz: 0.001 };
+    this.session = session; this.species = {}; this.lines = {};
+      this.settings = { series: null, emission: false, overlaid: false, auto_refit: false, least_error_mhz: 0.001 };
     for (const [key, record] of Object.entries(session.records)) {
       const [kind, number] = key.split("/");
       if (kind === "species") this.species[number] = record;
@@ -501,7 +539,8 @@ export class App {
   }
   lostText(text) { if (this.banner) { this.banner.textContent = text; this.banner.hidden = !text; } }
   name(line) { return this.species[line.species]?.name ?? "?"; }
-  label(q, species) { const known = this.quanta[species] ?? { names: [], halves: [] }; return q.map((value, i) => quantum(value, known.names[i], known.halves)).join(" "); }
+  label(q, species) { const known = this.quanta[species] ?? { names: [], halves: [] };
+    return q.map((value, i) => quantum(value, known.names[i], known.halves)).join(" "); }
   text(line) { return `${this.label(line.upper, line.species)} ← ${this.label(line.lower, line.species)}`; }
 
   // Building
@@ -515,32 +554,45 @@ export class App {
     this.redoButton = button("Redo", "y", () => this.do({ do: "redo" }));
     this.chooseButton = button("Select", "a: drag over a peak to fit it", () => this.choose(!this.choosing), { "aria-pressed": "false" });
     this.autoBox = h("input", { type: "checkbox", onchange: (event) => this.do({ do: "settings", auto_refit: event.target.checked }) });
-    this.exportMenu = h("select", { "aria-label": "Export", onchange: (event) => { const what = event.target.value; event.target.value = ""; this.export(what); } },
-      h("option", { value: "" }, "Export…"), live ? EXPORTS.map(([what, text]) => h("option", { value: what }, text)) : [], h("option", { value: "png" }, "Picture (.png)"));
+    this.exportMenu = h("select", { "aria-label": "Export", onchange: (event) => { const what = event.target.value;
+      event.target.value = ""; this.export(what); } },
+      h("option", { value: "" }, "Export…"), live ? EXPORTS.map(([what, text]) => h("option", { value: what }, text)) : [],
+        h("option", { value: "png" }, "Picture (.png)"));
     const bar = h("header", { class: "bar" },
       h("strong", { class: "name", title: this.session.spectrum.path }, this.session.spectrum.path.split("/").pop()),
-      h("span", { class: "group" }, button("−", "zoom out", () => this.zoom(2), { "aria-label": "Zoom out" }), button("+", "zoom in", () => this.zoom(0.5), { "aria-label": "Zoom in" }), button("All", "0: the whole band", () => this.active.go(...this.info.band_mhz))),
+      h("span", { class: "group" }, button("−", "zoom out", () => this.zoom(2), { "aria-label": "Zoom out" }),
+        button("+", "zoom in", () => this.zoom(0.5), { "aria-label": "Zoom in" }),
+        button("All", "0: the whole band", () => this.active.go(...this.info.band_mhz))),
       live && h("span", { class: "group" }, this.chooseButton, this.undoButton, this.redoButton),
-      live && h("span", { class: "group" }, button("Refit", "r: fit the free constants to the assigned lines", () => this.refit(), { class: "main" }), h("label", { title: "refit after each assignment" }, this.autoBox, "auto")),
-      h("span", { class: "group" }, this.exportMenu, button("Windows", "w: a second window", () => this.twoWindows()), button("Keys", "?", () => this.help()), button("◐", "t: light or dark", () => this.turn(), { "aria-label": "Light or dark" })));
+      live && h("span", { class: "group" }, button("Refit", "r: fit the free constants to the assigned lines", () => this.refit(),
+        { class: "main" }), h("label", { title: "refit after each assignment" }, this.autoBox, "auto")),
+      h("span", { class: "group" }, this.exportMenu, button("Windows", "w: a second window", () => this.twoWindows()),
+        button("Keys", "?", () => this.help()), button("◐", "t: light or dark", () => this.turn(), { "aria-label": "Light or dark" })));
     this.windowPlaces = h("div", { class: "windows" });
     this.residualPlace = h("div", { class: "plot" }); this.woodPlace = h("div", { class: "plot", style: "visibility:hidden" });
     this.residualTab = button("Residuals", "l", () => this.showPane("residuals"), { role: "tab" });
     this.woodTab = button("Loomis-Wood", "l", () => this.showPane("wood"), { role: "tab" });
     this.woodTools = h("span", { class: "group", hidden: true },
-      h("label", {}, "± MHz ", h("input", { type: "number", min: "0.001", step: "any", style: "width:6em", "data-field": "half", onchange: (event) => { this.wood.half = Math.abs(Number(event.target.value)) || 1; this.wood.load(); } })),
-      h("label", {}, "height ", h("input", { type: "range", min: "-1", max: "2", step: "0.1", value: "0", oninput: (event) => { this.wood.scale = 10 ** Number(event.target.value); this.wood.draw(); } })),
-      live && button("Assign all rows", "a peak within a fifth of the half width of each expected line", () => this.do({ do: "assign_series", tolerance_mhz: this.wood.half / 5 })));
-    this.tabButtons = TABS.map((name, i) => button(name, `${i + 1}`, () => this.showTab(name), { role: "tab", id: `tab-${name}`, "aria-controls": "panel" }));
+      h("label", {}, "± MHz ", h("input", { type: "number", min: "0.001", step: "any", style: "width:6em", "data-field": "half",
+        onchange: (event) => { this.wood.half = Math.abs(Number(event.target.value)) || 1; this.wood.load(); } })),
+      h("label", {}, "height ", h("input", { type: "range", min: "-1", max: "2", step: "0.1", value: "0",
+        oninput: (event) => { this.wood.scale = 10 ** Number(event.target.value); this.wood.draw(); } })),
+      live && button("Assign all rows", "a peak within a fifth of the half width of each expected line",
+        () => this.do({ do: "assign_series", tolerance_mhz: this.wood.half / 5 })));
+    this.tabButtons = TABS.map((name, i) => button(name, `${i + 1}`, () => this.showTab(name),
+      { role: "tab", id: `tab-${name}`, "aria-controls": "panel" }));
     this.panel = h("div", { class: "panel", id: "panel", role: "tabpanel", tabindex: "0" });
     this.tipBox = h("div", { class: "tip", hidden: true });
-    this.helpBox = h("dialog", { class: "keys", "aria-label": "Keys" }, h("h2", {}, "Keys"), h("dl", {}, KEYS.map(([key, text]) => [h("dt", {}, key), h("dd", {}, text)])),
+    this.helpBox = h("dialog", { class: "keys", "aria-label": "Keys" }, h("h2", {}, "Keys"),
+      h("dl", {}, KEYS.map(([key, text]) => [h("dt", {}, key), h("dd", {}, text)])),
       h("p", {}, "Drag moves the spectrum, the wheel zooms. Shift and drag over a peak fits it; several lines marked in the list make a blend. A click on a stick offers that line."),
       h("form", { method: "dialog" }, h("button", {}, "Close")));
     this.root.replaceChildren(bar, this.banner,
       h("main", { class: "body" },
         h("section", { class: "plots" }, this.windowPlaces,
-          h("div", { class: "lower" }, h("div", { class: "tabs" }, h("span", { role: "tablist", class: "group" }, this.residualTab, this.woodTab), this.woodTools), h("div", { class: "stack" }, this.residualPlace, this.woodPlace))),
+          h("div", { class: "lower" }, h("div", { class: "tabs" },
+            h("span", { role: "tablist", class: "group" }, this.residualTab, this.woodTab), this.woodTools),
+            h("div", { class: "stack" }, this.residualPlace, this.woodPlace))),
         h("aside", { class: "side" }, h("div", { class: "tabs", role: "tablist" }, this.tabButtons), this.panel)),
       h("footer", {}, this.status, h("output", { class: "place" })), this.tipBox, this.helpBox);
     this.root.classList.add("rotor-view");
@@ -580,7 +632,8 @@ export class App {
   bar() {
     const { undo, redo } = this.session;
     this.undoButton.disabled = !undo; this.redoButton.disabled = !redo;
-    this.undoButton.title = undo ? `u: undo “${undo}”` : "nothing to undo"; this.redoButton.title = redo ? `y: redo “${redo}”` : "nothing to redo";
+    this.undoButton.title = undo ? `u: undo “${undo}”` : "nothing to undo";
+      this.redoButton.title = redo ? `y: redo “${redo}”` : "nothing to redo";
     this.autoBox.checked = this.settings.auto_refit;
   }
   turn() {
@@ -599,14 +652,17 @@ export class App {
     this.tipBox.style.top = `${y + 16 - origin.top}px`;
   }
   help() { this.helpBox.open ? this.helpBox.close() : this.helpBox.showModal(); }
-  choose(on) { this.choosing = on; this.chooseButton.setAttribute("aria-pressed", String(on)); this.root.classList.toggle("choosing", on); this.say(on ? "Drag over a peak to fit it" : "Drag moves the spectrum"); }
-  zoom(factor) { const w = this.active, middle = (w.first + w.last) / 2, half = ((w.last - w.first) / 2) * factor; w.go(middle - half, middle + half); }
+  choose(on) { this.choosing = on; this.chooseButton.setAttribute("aria-pressed", String(on)); this.root.classList.toggle("choosing", on);
+    this.say(on ? "Drag over a peak to fit it" : "Drag moves the spectrum"); }
+  zoom(factor) { const w = this.active, middle = (w.first + w.last) / 2, half = ((w.last - w.first) / 2) * factor;
+    w.go(middle - half, middle + half); }
   show(frequency, one, span = null) {
     const w = one ?? this.active, wide = span ?? Math.min(w.last - w.first, Math.max(60 * this.info.channel_mhz, frequency * 2e-4));
     w.cursor.location = frequency; w.cursor.visible = true;
     w.go(frequency - wide / 2, frequency + wide / 2);
   }
-  showTab(name) { this.tab = name; this.panels(); if (window.innerWidth <= 900) this.panel.parentElement.scrollIntoView({ block: "nearest" }); if (name === "Levels") this.loadLevels(); }
+  showTab(name) { this.tab = name; this.panels();
+    if (window.innerWidth <= 900) this.panel.parentElement.scrollIntoView({ block: "nearest" }); if (name === "Levels") this.loadLevels(); }
   showPane(name, load = true) {
     this.pane = name;
     const wood = name === "wood";
@@ -629,9 +685,13 @@ export class App {
     if (answer.peak) { one.cursor.location = middle; one.cursor.visible = true; this.measured = [...this.measured, middle].slice(-3); }
     const series = this.settings.series;
     const inside = (c) => c.frequency_mhz >= first && c.frequency_mhz <= last;
-    if (row?.upper.length && !answer.candidates.some((c) => this.same(c, { ...row, species: series.species }))) answer.candidates.unshift({ species: series.species, upper: row.upper, lower: row.lower, frequency_mhz: row.centre_mhz, off_mhz: row.centre_mhz - middle, height: 0, assigned: row.line != null });
-    let marked = answer.candidates.findIndex((c) => (row?.upper.length ? this.same(c, { ...row, species: series.species }) : this.wish ? this.same(c, this.wish) : inside(c)));
-    if (marked < 0 && answer.candidates.length && !row) marked = answer.candidates.reduce((best, c, i, all) => (Math.abs(c.off_mhz) < Math.abs(all[best].off_mhz) ? i : best), 0);
+    if (row?.upper.length && !answer.candidates.some((c) => this.same(c,
+      { ...row, species: series.species }))) answer.candidates.unshift({ species: series.species, upper: row.upper, lower: row.lower,
+      frequency_mhz: row.centre_mhz, off_mhz: row.centre_mhz - middle, height: 0, assigned: row.line != null });
+    let marked = answer.candidates.findIndex((c) => (row?.upper.length ? this.same(c,
+      { ...row, species: series.species }) : this.wish ? this.same(c, this.wish) : inside(c)));
+    if (marked < 0 && answer.candidates.length && !row) marked = answer.candidates.reduce((best, c, i,
+      all) => (Math.abs(c.off_mhz) < Math.abs(all[best].off_mhz) ? i : best), 0);
     this.wish = null;
     this.offered = { ...answer, first, last, marked: new Set(marked >= 0 ? [marked] : []) };
     this.say(answer.peak ? `Peak at ${middle.toFixed(4)} MHz; Enter assigns it to the marked line` : answer.why, !answer.peak);
@@ -644,14 +704,17 @@ export class App {
     const reach = Math.max(8 * this.info.channel_mhz, (one.last - one.first) / 40);
     return this.fitPeak(line.frequency_mhz - reach, line.frequency_mhz + reach, one);
   }
-  fitMiddle() { const w = this.active, middle = w.cursor.visible ? w.cursor.location : (w.first + w.last) / 2, reach = Math.max(8 * this.info.channel_mhz, (w.last - w.first) / 40); return this.fitPeak(middle - reach, middle + reach, w); }
+  fitMiddle() { const w = this.active, middle = w.cursor.visible ? w.cursor.location : (w.first + w.last) / 2,
+    reach = Math.max(8 * this.info.channel_mhz, (w.last - w.first) / 40); return this.fitPeak(middle - reach, middle + reach, w); }
   async assign() {
     const { peak, candidates, marked } = this.offered ?? {};
     const chosen = [...(marked ?? [])].map((i) => candidates[i]);
     if (!peak || !chosen.length) { this.say("Select a peak (Shift and drag, or f), then mark the lines that it is", true); return; }
     const total = chosen.reduce((sum, c) => sum + c.height, 0);
-    const to = chosen.map((c) => ({ species: c.species, upper: c.upper, lower: c.lower, weight: chosen.length > 1 && total > 0 ? Math.max(c.height / total, 1e-6) : 1 }));
-    const answer = await this.do({ do: "assign", frequency_mhz: peak.frequency_mhz, error_mhz: peak.error_mhz, width_mhz: peak.width_mhz, to });
+    const to = chosen.map((c) => ({ species: c.species, upper: c.upper, lower: c.lower,
+      weight: chosen.length > 1 && total > 0 ? Math.max(c.height / total, 1e-6) : 1 }));
+    const answer = await this.do({ do: "assign", frequency_mhz: peak.frequency_mhz, error_mhz: peak.error_mhz, width_mhz: peak.width_mhz,
+      to });
     if (answer) { this.offered = null; for (const w of this.windows) w.chosen.visible = false; this.panels(); }
   }
   selectLine(number, go = false) {
@@ -662,7 +725,9 @@ export class App {
     this.residuals.draw(); this.panels();
   }
   step(direction, list) { // the next of some frequencies from the middle of the window
-    const w = this.active, middle = w.cursor.visible && w.cursor.location > w.first && w.cursor.location < w.last ? w.cursor.location : (w.first + w.last) / 2, tiny = 1e-6;
+    const w = this.active,
+      middle = w.cursor.visible && w.cursor.location > w.first && w.cursor.location < w.last ? w.cursor.location : (w.first + w.last) / 2,
+      tiny = 1e-6;
     const ahead = list.filter((one) => direction * (one.frequency_mhz - middle) > tiny);
     if (!ahead.length) { this.say("No line further on in this window", true); return null; }
     const next = ahead.reduce((best, one) => (direction * (one.frequency_mhz - best.frequency_mhz) < 0 ? one : best));
@@ -672,7 +737,8 @@ export class App {
   stepPredicted(direction) {
     const w = this.active, tallest = Math.max(...(w.lines ?? []).map((line) => line.height), 0);
     const line = this.step(direction, (w.lines ?? []).filter((one) => one.height > 0.01 * tallest));
-    if (line) { this.wish = line; this.say(`${this.name(line)} ${this.text(line)}, ${line.frequency_mhz.toFixed(4)} MHz; f fits the peak there`); }
+    if (line) { this.wish = line;
+      this.say(`${this.name(line)} ${this.text(line)}, ${line.frequency_mhz.toFixed(4)} MHz; f fits the peak there`); }
   }
   stepAssigned(direction) {
     const rows = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz).map(([number]) => Number(number));
@@ -682,14 +748,16 @@ export class App {
     this.selectLine(this.line == null ? nearest : rows[clamp(rows.indexOf(this.line) + direction, 0, rows.length - 1)], true);
   }
   numbers() { return [...this.picked].map(Number); }
-  reject() { const lines = this.numbers(); if (lines.length) this.do({ do: "reject", lines, rejected: !this.lines[lines[0]].rejected }); else this.say("Select a line first", true); }
+  reject() { const lines = this.numbers(); if (lines.length) this.do({ do: "reject", lines, rejected: !this.lines[lines[0]].rejected });
+    else this.say("Select a line first", true); }
   remove() { const lines = this.numbers(); if (lines.length) this.do({ do: "remove", lines }); else this.say("Select a line first", true); }
   async refit() {
     const numbers = Object.keys(this.species).filter((number) => Object.values(this.lines).some((line) => line.species === Number(number)));
     if (!numbers.length) this.say("Assign lines first", true);
     for (const number of numbers) {
       const answer = await this.do({ do: "refit", species: Number(number) });
-      if (answer) { await frame(); const fit = this.species[number]?.fit; if (fit) this.say(`${this.species[number].name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`); }
+      if (answer) { await frame(); const fit = this.species[number]?.fit;
+        if (fit) this.say(`${this.species[number].name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`); }
     }
   }
   async export(what) {
@@ -697,7 +765,8 @@ export class App {
     if (what === "png") return this.picture();
     for (const number of Object.keys(this.species)) {
       if (what !== "toml" && !Object.values(this.lines).some((line) => line.species === Number(number))) continue;
-      try { const { name, text } = await this.transport.call({ do: "export", what, species: Number(number) }); this.download(name, new Blob([text], { type: "text/plain" })); this.say(`${name} written`); }
+      try { const { name, text } = await this.transport.call({ do: "export", what, species: Number(number) });
+        this.download(name, new Blob([text], { type: "text/plain" })); this.say(`${name} written`); }
       catch (error) { this.say(error.message, true); }
     }
   }
@@ -708,7 +777,8 @@ export class App {
     for (const one of canvases) { out.getContext("2d").drawImage(one, 0, top); top += one.height; }
     out.toBlob((blob) => this.download("view.png", blob));
   }
-  download(name, blob) { const link = h("a", { href: URL.createObjectURL(blob), download: name }); link.click(); setTimeout(() => URL.revokeObjectURL(link.href), 5000); }
+  download(name, blob) { const link = h("a", { href: URL.createObjectURL(blob), download: name }); link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 5000); }
 
   // Panels
 
@@ -720,30 +790,49 @@ export class App {
     this.panel.scrollTop = top;
     if (held) this.panel.querySelector(`[data-field="${CSS.escape(held)}"]`)?.focus();
   }
-  swatch(number) { return h("span", { class: "swatch", style: `background:${PALETTE[this.theme][(this.species[number]?.colour ?? 0) % 7]}` }); }
+  swatch(number) { return h("span",
+    { class: "swatch", style: `background:${PALETTE[this.theme][(this.species[number]?.colour ?? 0) % 7]}` }); }
   panelAssign() {
     const o = this.offered, live = this.transport.live;
-    if (!Object.keys(this.species).length) return [h("p", {}, "No molecule yet. Add one by name, file or SMILES, or let rotor assign look for unknown ones."), live && this.adder(), live && this.searcher()].filter(Boolean);
-    if (!o) return [h("h3", {}, "Assign a peak"), h("ol", {}, h("li", {}, "Shift and drag over a peak, or click a predicted stick (keys: n, then f)."), h("li", {}, "Mark the lines that it is; several make a blend."), h("li", {}, "Enter.")),
+    if (!Object.keys(this.species).length) return [h("p", {},
+      "No molecule yet. Add one by name, file or SMILES, or let rotor assign look for unknown ones."), live && this.adder(),
+      live && this.searcher()].filter(Boolean);
+    if (!o) return [h("h3", {}, "Assign a peak"), h("ol", {}, h("li", {},
+      "Shift and drag over a peak, or click a predicted stick (keys: n, then f)."),
+      h("li", {}, "Mark the lines that it is; several make a blend."), h("li", {}, "Enter.")),
       this.fitSummary()];
-    const head = o.peak ? h("dl", { class: "facts" }, [["centre", `${o.peak.frequency_mhz.toFixed(4)} ± ${fixed(o.peak.error_mhz, 5)} MHz`], ["width", o.peak.width_mhz == null ? "not in the list" : `${fixed(o.peak.width_mhz, 4)} ± ${fixed(o.peak.width_error_mhz, 4)} MHz`], ["height", `${o.peak.height.toPrecision(4)}${o.peak.height_error == null ? "" : ` ± ${o.peak.height_error.toPrecision(2)}`}`]].map(([a, b]) => [h("dt", {}, a), h("dd", {}, b)])) : h("p", { class: "wrong" }, o.why);
+    const head = o.peak ? h("dl", { class: "facts" }, [["centre",
+      `${o.peak.frequency_mhz.toFixed(4)} ± ${fixed(o.peak.error_mhz, 5)} MHz`],
+      ["width", o.peak.width_mhz == null ? "not in the list" : `${fixed(o.peak.width_mhz, 4)} ± ${fixed(o.peak.width_error_mhz, 4)} MHz`],
+      ["height", `${o.peak.height.toPrecision(4)}${o.peak.height_error == null ? "" : ` ± ${o.peak.height_error.toPrecision(2)}`}`]].map(([a, b]) => [h("dt", {}, a), h("dd", {}, b)])) : h("p", { class: "wrong" }, o.why);
     const rows = o.candidates.slice(0, 60).map((c, i) => h("tr", { class: o.marked.has(i) ? "marked" : "" },
-      h("td", {}, h("input", { type: "checkbox", "data-field": `c${i}`, "aria-label": this.text(c), checked: o.marked.has(i), onchange: (event) => { event.target.checked ? o.marked.add(i) : o.marked.delete(i); this.panels(); } })),
-      h("td", {}, this.swatch(c.species), this.text(c), c.assigned ? " ✓" : ""), h("td", { class: "number" }, fixed(c.off_mhz, 3)), h("td", { class: "number" }, percent(c.height))));
+      h("td", {}, h("input", { type: "checkbox", "data-field": `c${i}`, "aria-label": this.text(c), checked: o.marked.has(i),
+        onchange: (event) => { event.target.checked ? o.marked.add(i) : o.marked.delete(i); this.panels(); } })),
+      h("td", {}, this.swatch(c.species), this.text(c), c.assigned ? " ✓" : ""), h("td", { class: "number" }, fixed(c.off_mhz, 3)),
+        h("td", { class: "number" }, percent(c.height))));
     return [h("h3", {}, "Peak"), head, h("h3", {}, "It may be"),
-      o.candidates.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"), h("th", { class: "number" }, "off (MHz)"), h("th", { class: "number" }, "%"))), h("tbody", {}, rows)) : h("p", {}, "No predicted line near it."),
-      h("p", {}, h("button", { type: "button", class: "main", disabled: !o.peak || !o.marked.size, onclick: () => this.assign() }, o.marked.size > 1 ? `Assign as a blend of ${o.marked.size}` : "Assign"), " ", h("button", { type: "button", onclick: () => { this.offered = null; this.panels(); } }, "Cancel")),
+      o.candidates.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"),
+        h("th", { class: "number" }, "off (MHz)"), h("th", { class: "number" }, "%"))), h("tbody", {}, rows)) : h("p", {},
+        "No predicted line near it."),
+      h("p", {}, h("button", { type: "button", class: "main", disabled: !o.peak || !o.marked.size, onclick: () => this.assign() },
+        o.marked.size > 1 ? `Assign as a blend of ${o.marked.size}` : "Assign"), " ",
+        h("button", { type: "button", onclick: () => { this.offered = null; this.panels(); } }, "Cancel")),
       this.picker()];
   }
   picker() { // quantum numbers of a level: its allowed lines join the candidates
     const number = Number(Object.keys(this.species).find((n) => this.species[n].visible) ?? Object.keys(this.species)[0]);
-    const select = h("select", { "aria-label": "Species" }, Object.entries(this.species).map(([n, one]) => h("option", { value: n }, one.name)));
-    const names = this.quanta[number]?.names ?? [], input = h("input", { "data-field": "pick", placeholder: names.map((n) => HEAD[n] ?? n).join(" "), "aria-label": "Quantum numbers of a level", style: "width:8em" });
+    const select = h("select", { "aria-label": "Species" }, Object.entries(this.species).map(([n, one]) => h("option", { value: n },
+      one.name)));
+    const names = this.quanta[number]?.names ?? [], input = h("input",
+      { "data-field": "pick", placeholder: names.map((n) => HEAD[n] ?? n).join(" "), "aria-label": "Quantum numbers of a level",
+      style: "width:8em" });
     const pick = async (event) => {
       event.preventDefault();
       try {
-        const found = await this.transport.call({ do: "pick", species: Number(select.value), level: ints(input.value) }), middle = this.offered.peak?.frequency_mhz ?? 0;
-        const added = found.candidates.filter((c) => !this.offered.candidates.some((o) => this.same(o, c))).map((c) => ({ ...c, off_mhz: c.frequency_mhz - middle }));
+        const found = await this.transport.call({ do: "pick", species: Number(select.value), level: ints(input.value) }),
+          middle = this.offered.peak?.frequency_mhz ?? 0;
+        const added = found.candidates.filter((c) => !this.offered.candidates.some((o) => this.same(o, c))).map((c) => ({ ...c,
+          off_mhz: c.frequency_mhz - middle }));
         this.offered.candidates.push(...added);
         this.say(`${added.length} allowed lines of the level added`); this.panels();
       } catch (error) { this.say(error.message, true); }
@@ -752,33 +841,60 @@ export class App {
   }
   fitSummary() {
     return Object.entries(this.species).map(([number, one]) => h("section", {}, h("h3", {}, this.swatch(number), one.name), one.fit
-      ? [h("p", {}, `${one.fit.lines} lines, rms ${fixed(1e3 * one.fit.rms_mhz, 2)} kHz, weighted rms ${fixed(one.fit.weighted_rms, 2)}`), one.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${one.fit.open.join(", ")}`) : null]
+      ? [h("p", {}, `${one.fit.lines} lines, rms ${fixed(1e3 * one.fit.rms_mhz, 2)} kHz, weighted rms ${fixed(one.fit.weighted_rms, 2)}`),
+        one.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${one.fit.open.join(", ")}`) : null]
       : h("p", {}, `${Object.values(this.lines).filter((line) => line.species === Number(number)).length} lines assigned, not fitted`)));
   }
   panelLines() {
-    const every = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz), words = this.filter.toLowerCase().split(/\s+/).filter(Boolean);
-    const text = (number, line) => `${this.name(line)} ${this.facts[number]?.label ?? ""} ${line.frequency_mhz.toFixed(3)} ${line.comment} ${line.rejected ? "rejected" : ""} ${this.off(number) > 3 ? "far" : ""}`.toLowerCase();
+    const every = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz),
+      words = this.filter.toLowerCase().split(/\s+/).filter(Boolean);
+    const text = (number,
+      line) => `${this.name(line)} ${this.facts[number]?.label ?? ""} ${line.frequency_mhz.toFixed(3)} ${line.comment} ${line.rejected ? "rejected" : ""} ${this.off(number) > 3 ? "far" : ""}`.toLowerCase();
     const shown = every.filter(([number, line]) => words.every((word) => text(number, line).includes(word)));
-    const search = h("input", { type: "search", "data-field": "filter", value: this.filter, placeholder: "filter: species, quantum numbers, rejected, far", "aria-label": "Filter", oninput: (event) => { this.filter = event.target.value; this.panels(); } });
-    const edit = (name, label) => h("label", {}, label, " ", h("input", { type: "number", step: "any", min: "0", "data-field": name, style: "width:6em", onchange: (event) => { if (this.picked.size) this.do({ do: "edit", lines: this.numbers(), [name]: Number(event.target.value) }); } }));
-    const tools = this.transport.live && h("div", { class: "row" }, h("button", { type: "button", onclick: () => this.reject() }, "Reject / accept"), h("button", { type: "button", onclick: () => this.remove() }, "Remove"), edit("error_mhz", "error (MHz)"), edit("weight", "weight"),
-      h("label", { title: "no assigned peak gets a smaller error" }, "least error (MHz) ", h("input", { type: "number", step: "any", min: "0", style: "width:6em", "data-field": "least", value: this.settings.least_error_mhz, onchange: (event) => this.do({ do: "settings", least_error_mhz: Number(event.target.value) }) })));
+    const search = h("input", { type: "search", "data-field": "filter", value: this.filter,
+      placeholder: "filter: species, quantum numbers, rejected, far", "aria-label": "Filter",
+      oninput: (event) => { this.filter = event.target.value; this.panels(); } });
+    const edit = (name, label) => h("label", {}, label, " ", h("input",
+      { type: "number", step: "any", min: "0", "data-field": name, style: "width:6em",
+      onchange: (event) => { if (this.picked.size) this.do({ do: "edit", lines: this.numbers(), [name]: Number(event.target.value) });
+      } }));
+    const tools = this.transport.live && h("div", { class: "row" },
+      h("button", { type: "button", onclick: () => this.reject() }, "Reject / accept"),
+      h("button", { type: "button", onclick: () => this.remove() }, "Remove"), edit("error_mhz", "error (MHz)"), edit("weight", "weight"),
+      h("label", { title: "no assigned peak gets a smaller error" }, "least error (MHz) ",
+        h("input", { type: "number", step: "any", min: "0", style: "width:6em", "data-field": "least",
+        value: this.settings.least_error_mhz, onchange: (event) => this.do({ do: "settings",
+        least_error_mhz: Number(event.target.value) }) })));
     const blends = {};
     for (const [, line] of every) blends[line.blend] = (blends[line.blend] ?? 0) + 1;
-    const rows = shown.slice(0, 500).map(([number, line]) => h("tr", { class: [this.picked.has(number) ? "marked" : "", line.rejected ? "rejected" : "", this.off(number) > 3 ? "far" : ""].join(" "), onclick: (event) => { if (event.target.type !== "checkbox") this.selectLine(number, true); } },
-      h("td", {}, h("input", { type: "checkbox", "data-field": `line${number}`, "aria-label": `select ${this.text(line)}`, checked: this.picked.has(number), onchange: (event) => { event.target.checked ? this.picked.add(number) : this.picked.delete(number); this.line = Number(number); this.panels(); } })),
-      h("td", {}, this.swatch(line.species), this.text(line), blends[line.blend] > 1 ? h("abbr", { title: "blend" }, " ∪") : ""), h("td", { class: "number" }, line.frequency_mhz.toFixed(4)), h("td", { class: "number" }, fixed(1e3 * this.facts[number]?.difference_mhz, 1)), h("td", { class: "number" }, fixed(1e3 * line.error_mhz, 1))));
-    return [search, h("p", { class: "quiet" }, `${shown.length} of ${every.length} lines${shown.length > 500 ? ", the first 500 shown" : ""}`), tools,
-      h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"), h("th", { class: "number" }, "MHz"), h("th", { class: "number" }, "o−c (kHz)"), h("th", { class: "number" }, "σ (kHz)"))), h("tbody", {}, rows))].filter(Boolean);
+    const rows = shown.slice(0, 500).map(([number, line]) => h("tr",
+      { class: [this.picked.has(number) ? "marked" : "", line.rejected ? "rejected" : "", this.off(number) > 3 ? "far" : ""].join(" "),
+      onclick: (event) => { if (event.target.type !== "checkbox") this.selectLine(number, true); } },
+      h("td", {}, h("input", { type: "checkbox", "data-field": `line${number}`, "aria-label": `select ${this.text(line)}`,
+        checked: this.picked.has(number),
+        onchange: (event) => { event.target.checked ? this.picked.add(number) : this.picked.delete(number); this.line = Number(number);
+        this.panels(); } })),
+      h("td", {}, this.swatch(line.species), this.text(line), blends[line.blend] > 1 ? h("abbr", { title: "blend" }, " ∪") : ""),
+        h("td", { class: "number" }, line.frequency_mhz.toFixed(4)),
+        h("td", { class: "number" }, fixed(1e3 * this.facts[number]?.difference_mhz, 1)),
+        h("td", { class: "number" }, fixed(1e3 * line.error_mhz, 1))));
+    return [search, h("p", { class: "quiet" },
+      `${shown.length} of ${every.length} lines${shown.length > 500 ? ", the first 500 shown" : ""}`), tools,
+      h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"), h("th", { class: "number" }, "MHz"),
+        h("th", { class: "number" }, "o−c (kHz)"), h("th", { class: "number" }, "σ (kHz)"))), h("tbody", {}, rows))].filter(Boolean);
   }
-  off(number) { const line = this.lines[number], d = this.facts[number]?.difference_mhz; return d == null ? 0 : Math.abs(d) / line.error_mhz; }
+  off(number) { const line = this.lines[number], d = this.facts[number]?.difference_mhz;
+    return d == null ? 0 : Math.abs(d) / line.error_mhz; }
   adder() {
     const input = h("input", { "data-field": "add", placeholder: "name, file or SMILES:…", "aria-label": "Molecule" });
-    return h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); if (input.value.trim()) this.do({ do: "add_species", source: input.value.trim() }); } }, input, h("button", {}, "Add molecule"));
+    return h("form", { class: "row", onsubmit: (event) => { event.preventDefault();
+      if (input.value.trim()) this.do({ do: "add_species", source: input.value.trim() }); } }, input, h("button", {}, "Add molecule"));
   }
   searcher() { // rotor assign over the whole spectrum
-    const seconds = h("input", { type: "number", min: "1", max: "600", value: "20", style: "width:4.5em", "data-field": "seconds", "aria-label": "Seconds of the search" });
-    const start = async (event) => { event.preventDefault(); this.say("rotor assign searches the spectrum…"); await this.do({ do: "search", seconds: Number(seconds.value) }); };
+    const seconds = h("input", { type: "number", min: "1", max: "600", value: "20", style: "width:4.5em", "data-field": "seconds",
+      "aria-label": "Seconds of the search" });
+    const start = async (event) => { event.preventDefault(); this.say("rotor assign searches the spectrum…");
+      await this.do({ do: "search", seconds: Number(seconds.value) }); };
     return h("form", { class: "row", onsubmit: start }, h("button", {}, "Search unknown molecules"), h("label", {}, "for ", seconds, " s"));
   }
   slider(number, name, value, span, message, digits) { // a number with a slider about it: moves the prediction while dragged
@@ -789,8 +905,10 @@ export class App {
       for (const one of this.windows) one.load();
       if (this.pane === "wood") this.wood.load();
     };
-    const box = h("input", { type: "number", step: "any", value: value.toFixed(digits), "data-field": `${number}.${name}`, "aria-label": name, onchange: (event) => send(Number(event.target.value), true) });
-    const range = h("input", { type: "range", min: "-1", max: "1", step: "0.002", value: "0", "data-field": `${number}.${name}.s`, "aria-label": `${name}, slider`, tabindex: "0",
+    const box = h("input", { type: "number", step: "any", value: value.toFixed(digits), "data-field": `${number}.${name}`,
+      "aria-label": name, onchange: (event) => send(Number(event.target.value), true) });
+    const range = h("input", { type: "range", min: "-1", max: "1", step: "0.002", value: "0", "data-field": `${number}.${name}.s`,
+      "aria-label": `${name}, slider`, tabindex: "0",
       oninput: (event) => { const next = value + Number(event.target.value) * span; box.value = next.toFixed(digits); send(next, false); },
       onchange: (event) => send(value + Number(event.target.value) * span, true) });
     return [box, range];
@@ -798,63 +916,115 @@ export class App {
   panelConstants() {
     const live = this.transport.live;
     const parts = Object.entries(this.species).map(([number, one]) => this.speciesPart(number, one));
-    const emission = h("label", {}, h("input", { type: "checkbox", "data-field": "emission", checked: this.settings.emission, onchange: (event) => this.do({ do: "settings", emission: event.target.checked }) }), "emission model over the spectrum (column, velocity, width)");
+    const emission = h("label", {}, h("input", { type: "checkbox", "data-field": "emission", checked: this.settings.emission,
+      onchange: (event) => this.do({ do: "settings", emission: event.target.checked }) }),
+      "emission model over the spectrum (column, velocity, width)");
     return [...parts, live && this.adder(), live && this.searcher(), live && h("p", {}, emission)].filter(Boolean);
   }
   speciesPart(number, one) {
     const reach = this.spans[number] ?? 1e-3, lines = Object.values(this.lines).filter((line) => line.species === Number(number)).length;
     const rows = Object.entries(one.constants).map(([name, value]) => {
-      const error = one.errors[name], digits = digitsOf(error, value), before = one.fit?.before?.[name], moved = before == null ? null : value - before;
+      const error = one.errors[name], digits = digitsOf(error, value), before = one.fit?.before?.[name],
+        moved = before == null ? null : value - before;
       const span = reach * (Math.abs(value) || Math.abs(Object.values(one.constants)[0]) * 1e-6);
-      const free = h("input", { type: "checkbox", "data-field": `${number}.${name}.free`, "aria-label": `${name} free`, checked: one.free.includes(name), onchange: (event) => this.do({ do: "free", species: Number(number), free: event.target.checked ? [...one.free, name] : one.free.filter((other) => other !== name) }) });
+      const free = h("input", { type: "checkbox", "data-field": `${number}.${name}.free`, "aria-label": `${name} free`,
+        checked: one.free.includes(name), onchange: (event) => this.do({ do: "free", species: Number(number),
+        free: event.target.checked ? [...one.free, name] : one.free.filter((other) => other !== name) }) });
       const [box, range] = this.slider(number, name, value, span, (next) => ({ do: "constants", constants: { [name]: next } }), digits);
-      return [h("tr", {}, h("td", {}, free), h("th", { scope: "row" }, name), h("td", {}, box), h("td", { class: "number" }, error ? `± ${short(error)}` : "")), h("tr", { class: "slide" }, h("td", { colspan: "3" }, range), h("td", { class: "number moved", title: "moved by the last fit" }, moved ? `${moved > 0 ? "+" : "−"}${short(Math.abs(moved))}` : ""))];
+      return [h("tr", {}, h("td", {}, free), h("th", { scope: "row" }, name), h("td", {}, box),
+        h("td", { class: "number" }, error ? `± ${short(error)}` : "")),
+        h("tr", { class: "slide" }, h("td", { colspan: "3" }, range),
+        h("td", { class: "number moved", title: "moved by the last fit" },
+        moved ? `${moved > 0 ? "+" : "−"}${short(Math.abs(moved))}` : ""))];
     });
-    const small = (name, value, span, message, digits, unit) => { const [box, range] = this.slider(number, name, value, span, message, digits); return h("div", { class: "knob" }, h("label", {}, name, " ", box, ` ${unit}`), range); };
+    const small = (name, value, span, message, digits, unit) => { const [box, range] = this.slider(number, name, value, span, message,
+      digits); return h("div", { class: "knob" }, h("label", {}, name, " ", box, ` ${unit}`), range); };
     const dipole = one.dipole_abc_debye ?? [0, 0, 0], axes = ["μa", "μb", "μc"];
-    const add = h("input", { placeholder: "add: DeltaJ, …", "aria-label": "Constant to add", "data-field": `${number}.add`, style: "width:9em" });
-    return h("details", { open: true, class: "species" }, h("summary", {}, this.swatch(number), one.name, h("span", { class: "quiet" }, ` ${lines} lines${one.fit ? `, rms ${fixed(1e3 * one.fit.rms_mhz, 1)} kHz` : ""}`)),
-      h("div", { class: "row" }, h("label", {}, h("input", { type: "checkbox", "data-field": `${number}.visible`, checked: one.visible, onchange: (event) => this.do({ do: "species", species: Number(number), visible: event.target.checked }) }), "shown"),
-        h("label", {}, "colour ", h("select", { "data-field": `${number}.colour`, onchange: (event) => this.do({ do: "species", species: Number(number), colour: Number(event.target.value) }) }, ["blue", "orange", "green", "purple", "ochre", "teal", "grey"].map((name, i) => h("option", { value: i, selected: i === one.colour }, name)))),
-        h("label", {}, "slider ± ", h("select", { "data-field": `${number}.reach`, onchange: (event) => { this.spans[number] = Number(event.target.value); this.panels(); } }, [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1].map((r) => h("option", { value: r, selected: r === reach }, `${Number((r * 100).toPrecision(1))} %`)))),
-        h("label", { title: "lines split by nuclear spins, where the source has their constants" }, h("input", { type: "checkbox", "data-field": `${number}.hyperfine`, checked: one.hyperfine, onchange: (event) => { const box = event.target; this.do({ do: "species", species: Number(number), hyperfine: box.checked }).then((answer) => { if (!answer) box.checked = one.hyperfine; }); } }), "spins"),
+    const add = h("input", { placeholder: "add: DeltaJ, …", "aria-label": "Constant to add", "data-field": `${number}.add`,
+      style: "width:9em" });
+    return h("details", { open: true, class: "species" }, h("summary", {}, this.swatch(number), one.name,
+      h("span", { class: "quiet" }, ` ${lines} lines${one.fit ? `, rms ${fixed(1e3 * one.fit.rms_mhz, 1)} kHz` : ""}`)),
+      h("div", { class: "row" }, h("label", {}, h("input", { type: "checkbox", "data-field": `${number}.visible`, checked: one.visible,
+        onchange: (event) => this.do({ do: "species", species: Number(number), visible: event.target.checked }) }), "shown"),
+        h("label", {}, "colour ", h("select", { "data-field": `${number}.colour`,
+          onchange: (event) => this.do({ do: "species", species: Number(number), colour: Number(event.target.value) }) },
+          ["blue", "orange", "green", "purple", "ochre", "teal",
+          "grey"].map((name, i) => h("option", { value: i, selected: i === one.colour }, name)))),
+        h("label", {}, "slider ± ", h("select", { "data-field": `${number}.reach`,
+          onchange: (event) => { this.spans[number] = Number(event.target.value); this.panels(); } },
+          [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1].map((r) => h("option", { value: r, selected: r === reach },
+          `${Number((r * 100).toPrecision(1))} %`)))),
+        h("label", { title: "lines split by nuclear spins, where the source has their constants" },
+          h("input", { type: "checkbox", "data-field": `${number}.hyperfine`, checked: one.hyperfine,
+          onchange: (event) => { const box = event.target; this.do({ do: "species", species: Number(number),
+          hyperfine: box.checked }).then((answer) => { if (!answer) box.checked = one.hyperfine; }); } }), "spins"),
         h("button", { type: "button", onclick: () => this.do({ do: "remove_species", species: Number(number) }) }, "Remove")),
-      h("table", { class: "constants" }, h("thead", {}, h("tr", {}, h("th", { class: "narrow" }, "free"), h("th", { class: "name" }, ""), h("th", {}, "MHz"), h("th", { class: "number" }, "error, moved"))), h("tbody", {}, rows)),
-      h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); if (add.value.trim()) this.do({ do: "free", species: Number(number), free: [...one.free, add.value.trim()] }); } }, add, h("button", {}, "Free it")),
+      h("table", { class: "constants" }, h("thead", {}, h("tr", {}, h("th", { class: "narrow" }, "free"), h("th", { class: "name" }, ""),
+        h("th", {}, "MHz"), h("th", { class: "number" }, "error, moved"))), h("tbody", {}, rows)),
+      h("form", { class: "row", onsubmit: (event) => { event.preventDefault();
+        if (add.value.trim()) this.do({ do: "free", species: Number(number), free: [...one.free, add.value.trim()] }); } }, add,
+        h("button", {}, "Free it")),
       small("T", one.temperature_k, one.temperature_k * 0.9, (next) => ({ do: "species", temperature_k: Math.max(next, 0.1) }), 1, "K"),
       small("height", one.scale, one.scale * 0.95, (next) => ({ do: "species", scale: Math.max(next, 1e-3) }), 2, ""),
-      dipole.map((value, i) => small(axes[i], value, Math.max(Math.abs(value), 0.5), (next) => ({ do: "species", dipole_abc_debye: dipole.map((old, k) => (k === i ? next : old)) }), 3, "D")),
-      this.settings.emission && [small("lg N", Math.log10(one.column_per_cm2), 2, (next) => ({ do: "species", column_per_cm2: 10 ** next }), 2, "cm⁻²"), small("velocity", one.velocity_km_s, 20, (next) => ({ do: "species", velocity_km_s: next }), 2, "km/s"), small("width", one.fwhm_km_s, one.fwhm_km_s * 0.9, (next) => ({ do: "species", fwhm_km_s: Math.max(next, 0.01) }), 2, "km/s")]);
+      dipole.map((value, i) => small(axes[i], value, Math.max(Math.abs(value), 0.5),
+        (next) => ({ do: "species", dipole_abc_debye: dipole.map((old, k) => (k === i ? next : old)) }), 3, "D")),
+      this.settings.emission && [small("lg N", Math.log10(one.column_per_cm2), 2,
+        (next) => ({ do: "species", column_per_cm2: 10 ** next }), 2, "cm⁻²"),
+        small("velocity", one.velocity_km_s, 20, (next) => ({ do: "species", velocity_km_s: next }), 2, "km/s"),
+        small("width", one.fwhm_km_s, one.fwhm_km_s * 0.9, (next) => ({ do: "species", fwhm_km_s: Math.max(next, 0.01) }), 2, "km/s")]);
   }
   panelSeries() {
     const now = this.settings.series, first = Object.keys(this.species)[0], number = String(now?.species ?? first ?? "");
-    const names = this.quanta[number]?.names ?? [], c = this.offered ? [...this.offered.marked].map((i) => this.offered.candidates[i])[0] : this.line != null ? this.lines[this.line] : null;
-    const guess = names.map((name) => (["j", "n", "kc", "f", "f1"].includes(name) ? (this.quanta[number].halves.includes(name) ? 2 : 1) : 0));
+    const names = this.quanta[number]?.names ?? [],
+      c = this.offered ? [...this.offered.marked].map((i) => this.offered.candidates[i])[0] : this.line != null ? this.lines[this.line] : null;
+    const guess = names.map((name) => (["j", "n", "kc", "f",
+      "f1"].includes(name) ? (this.quanta[number].halves.includes(name) ? 2 : 1) : 0));
     const head = names.map((name) => HEAD[name] ?? name).join(" ");
-    const field = (key, label, value) => h("label", { class: "wide" }, label, h("input", { "data-field": `series.${key}`, value: (value ?? []).join(" "), placeholder: head }));
-    const species = h("select", { "aria-label": "Species", "data-field": "series.species" }, Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === number }, one.name)));
+    const field = (key, label, value) => h("label", { class: "wide" }, label,
+      h("input", { "data-field": `series.${key}`, value: (value ?? []).join(" "), placeholder: head }));
+    const species = h("select", { "aria-label": "Species", "data-field": "series.species" },
+      Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === number }, one.name)));
     const from = c && String(c.species) === number ? c : now?.upper?.length ? now : null;
-    const upper = field("upper", "upper level", from?.upper), lower = field("lower", "lower level", from?.lower), step = field("step", "step of each row", now?.step?.length ? now.step : guess);
+    const upper = field("upper", "upper level", from?.upper), lower = field("lower", "lower level", from?.lower),
+      step = field("step", "step of each row", now?.step?.length ? now.step : guess);
     const show = (series) => this.do({ do: "series", series }).then((answer) => { if (answer) { this.showPane("wood"); } });
     const read = (label) => ints(label.querySelector("input").value);
-    const frequencies = h("input", { "data-field": "series.frequencies", value: (now?.frequencies_mhz?.length ? now.frequencies_mhz : this.measured).map((f) => f.toFixed(4)).join(" "), placeholder: "two or three frequencies (MHz)", "aria-label": "Frequencies" });
+    const frequencies = h("input", { "data-field": "series.frequencies",
+      value: (now?.frequencies_mhz?.length ? now.frequencies_mhz : this.measured).map((f) => f.toFixed(4)).join(" "),
+      placeholder: "two or three frequencies (MHz)", "aria-label": "Frequencies" });
     const guarded = (action) => (event) => { event.preventDefault(); try { action(); } catch (error) { this.say(error.message, true); } };
-    return [h("h3", {}, "Loomis-Wood rows from the model"), h("form", { onsubmit: guarded(() => show({ species: Number(species.value), upper: read(upper), lower: read(lower), step: read(step) })) }, h("label", { class: "wide" }, "species", species), upper, lower, step, h("button", { class: "main" }, "Show rows")),
-      h("h3", {}, "From two or three lines, extrapolated"), h("form", { onsubmit: guarded(() => { const f = frequencies.value.trim().split(/[\s,]+/).map(Number); if (f.length < 2 || f.some((one) => !isFinite(one))) throw new Error("two or three frequencies in MHz are needed"); show({ frequencies_mhz: f }); }) }, h("label", { class: "wide" }, "frequencies", frequencies), h("button", {}, "Show rows")),
-      h("p", { class: "quiet" }, "Shift and drag over a peak of a row fits it and offers the line of the row. The last fitted peaks stand in the field.")];
+    return [h("h3", {}, "Loomis-Wood rows from the model"), h("form",
+      { onsubmit: guarded(() => show({ species: Number(species.value), upper: read(upper), lower: read(lower), step: read(step) })) },
+      h("label", { class: "wide" }, "species", species), upper, lower, step, h("button", { class: "main" }, "Show rows")),
+      h("h3", {}, "From two or three lines, extrapolated"), h("form",
+        { onsubmit: guarded(() => { const f = frequencies.value.trim().split(/[\s,]+/).map(Number);
+        if (f.length < 2 || f.some((one) => !isFinite(one))) throw new Error("two or three frequencies in MHz are needed");
+        show({ frequencies_mhz: f }); }) }, h("label", { class: "wide" }, "frequencies", frequencies), h("button", {}, "Show rows")),
+      h("p", { class: "quiet" },
+        "Shift and drag over a peak of a row fits it and offers the line of the row. The last fitted peaks stand in the field.")];
   }
   async loadLevels() {
     const out = {};
-    for (const number of Object.keys(this.species)) { try { out[number] = await this.transport.call({ do: "levels", species: Number(number) }); } catch (error) { this.say(error.message, true); } }
+    for (const number of Object.keys(this.species)) { try { out[number] = await this.transport.call({ do: "levels",
+      species: Number(number) }); } catch (error) { this.say(error.message, true); } }
     this.levels = out;
     if (this.tab === "Levels") this.panels();
   }
   panelLevels() {
     if (!this.levels || this.levelsOf !== this.session.revision) { this.levelsOf = this.session.revision; this.loadLevels(); }
-    return Object.entries(this.levels ?? {}).filter(([number]) => this.species[number]).map(([number, { levels, differences }]) => h("section", {}, h("h3", {}, this.swatch(number), this.species[number].name),
+    return Object.entries(this.levels ?? {}).filter(([number]) => this.species[number]).map(([number,
+      { levels, differences }]) => h("section", {}, h("h3", {}, this.swatch(number), this.species[number].name),
       levels.length ? null : h("p", {}, "No line assigned."),
-      levels.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "level"), h("th", { class: "number" }, "E/hc (cm⁻¹)"), h("th", { class: "number" }, "lines"))), h("tbody", {}, levels.map((one) => h("tr", {}, h("td", {}, one.label), h("td", { class: "number" }, fixed(one.energy_cm, 6)), h("td", { class: "number" }, one.lines))))) : null,
-      differences.length ? [h("h3", {}, "Combination differences"), h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "levels (by)"), h("th", { class: "number" }, "observed (MHz)"), h("th", { class: "number" }, "o−c (kHz)"))), h("tbody", {}, differences.map((one) => h("tr", {}, h("td", {}, `${one.levels.join(" − ")} (${one.by})`), h("td", { class: "number" }, fixed(one.observed_mhz, 4)), h("td", { class: "number" }, fixed(1e3 * one.difference_mhz, 1))))))] : null));
+      levels.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "level"), h("th", { class: "number" }, "E/hc (cm⁻¹)"),
+        h("th", { class: "number" }, "lines"))), h("tbody", {},
+        levels.map((one) => h("tr", {}, h("td", {}, one.label), h("td", { class: "number" }, fixed(one.energy_cm, 6)),
+        h("td", { class: "number" }, one.lines))))) : null,
+      differences.length ? [h("h3", {}, "Combination differences"),
+        h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "levels (by)"), h("th", { class: "number" }, "observed (MHz)"),
+        h("th", { class: "number" }, "o−c (kHz)"))), h("tbody", {},
+        differences.map((one) => h("tr", {}, h("td", {}, `${one.levels.join(" − ")} (${one.by})`),
+        h("td", { class: "number" }, fixed(one.observed_mhz, 4)),
+        h("td", { class: "number" }, fixed(1e3 * one.difference_mhz, 1))))))] : null));
   }
 
   // Keys
@@ -867,12 +1037,18 @@ export class App {
     const w = this.active, span = w.last - w.first, control = event.ctrlKey || event.metaKey;
     const move = (part) => w.go(w.first + part * span, w.last + part * span);
     const keys = {
-      ArrowLeft: () => move(event.shiftKey ? -1 : -0.1), ArrowRight: () => move(event.shiftKey ? 1 : 0.1), "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2),
-      ArrowUp: () => this.zoom(0.8), ArrowDown: () => this.zoom(1.25), 0: () => w.go(...this.info.band_mhz), Home: () => w.go(...this.info.band_mhz), n: () => this.stepPredicted(1), p: () => this.stepPredicted(-1),
-      "]": () => this.stepAssigned(1), "[": () => this.stepAssigned(-1), f: () => this.fitMiddle(), Enter: () => this.assign(), a: () => this.choose(!this.choosing), x: () => this.reject(), Delete: () => this.remove(),
-      r: () => this.refit(), u: () => this.do({ do: "undo" }), y: () => this.do({ do: "redo" }), w: () => this.twoWindows(), m: () => this.do({ do: "settings", overlaid: !this.settings.overlaid }),
-      s: () => { this.autoscale = !this.autoscale; for (const one of this.windows) one.draw(); }, l: () => this.showPane(this.pane === "wood" ? "residuals" : "wood"), t: () => this.turn(), "?": () => this.help(),
-      Escape: () => { this.offered = null; for (const one of this.windows) { one.chosen.visible = false; one.cursor.visible = false; } this.choose(false); this.panels(); },
+      ArrowLeft: () => move(event.shiftKey ? -1 : -0.1), ArrowRight: () => move(event.shiftKey ? 1 : 0.1), "+": () => this.zoom(0.5),
+        "=": () => this.zoom(0.5), "-": () => this.zoom(2),
+      ArrowUp: () => this.zoom(0.8), ArrowDown: () => this.zoom(1.25), 0: () => w.go(...this.info.band_mhz),
+        Home: () => w.go(...this.info.band_mhz), n: () => this.stepPredicted(1), p: () => this.stepPredicted(-1),
+      "]": () => this.stepAssigned(1), "[": () => this.stepAssigned(-1), f: () => this.fitMiddle(), Enter: () => this.assign(),
+        a: () => this.choose(!this.choosing), x: () => this.reject(), Delete: () => this.remove(),
+      r: () => this.refit(), u: () => this.do({ do: "undo" }), y: () => this.do({ do: "redo" }), w: () => this.twoWindows(),
+        m: () => this.do({ do: "settings", overlaid: !this.settings.overlaid }),
+      s: () => { this.autoscale = !this.autoscale; for (const one of this.windows) one.draw(); },
+        l: () => this.showPane(this.pane === "wood" ? "residuals" : "wood"), t: () => this.turn(), "?": () => this.help(),
+      Escape: () => { this.offered = null; for (const one of this.windows) { one.chosen.visible = false; one.cursor.visible = false;
+        } this.choose(false); this.panels(); },
     };
     TABS.forEach((name, i) => { keys[String(i + 1)] = () => this.showTab(name); });
     let action = keys[event.key];
@@ -897,7 +1073,8 @@ export default {
 const place = globalThis.document?.querySelector("[data-rotor-view]");
 if (place) {
   const data = document.querySelector("#rotor-data");
-  const transport = data ? new StaticTransport(JSON.parse(data.textContent)) : new SocketTransport(location.href.replace(/^http/, "ws").replace(/[^/]*$/, "socket"));
+  const transport = data ? new StaticTransport(JSON.parse(data.textContent)) : new SocketTransport(location.href.replace(/^http/,
+    "ws").replace(/[^/]*$/, "socket"));
   const app = new App(document.body, transport);
   globalThis.rotorView = app;
   app.start().catch((error) => { place.textContent = `rotor view: ${error.message}`; });
