@@ -193,3 +193,35 @@ def test_constants_of_spins_without_spins(shared: Path, option: list[str], capsy
         assert (
             f"note: parameter {code} is left out, as SPCAT does: spin 1 is not among the 0 that SPIND names" in said.err
         )
+
+
+def test_a_file_that_is_read_as_a_top_notes_its_range_of_k(call, folder):
+    """`rotor levels case.var` has every K, whatever KNMAX says, and had no word for it."""
+    text = "a top\n 3 0 0 0\na 1 1 0 {knmax} 0 1 1 1 0 1 0\n 10000 30000.0 0\n 20000 9000.0 0\n 30000 8000.0 0\n"
+    (folder / "cut.var").write_text(text.format(knmax=5))
+    (folder / "whole.var").write_text(text.format(knmax=99))
+    code, _, err = call("levels", "cut.var", "--jmax", "2")
+    assert code == 0
+    assert "note: KNMAX = 5 of state 0 in cut.var: constants alone are read from it here, and every K to N is" in err
+    assert call("levels", "whole.var", "--jmax", "2")[2] == ""
+
+
+def test_names_of_levels_that_mix_are_noted(call, folder):
+    """Names of mixed levels are a choice: SPCAT's search for one may end elsewhere, as of states 4 and 5 of 18 (QNFMT 1404)."""
+    source = Path(__file__).parent / "oracles" / "kinds" / "eighteen_states"
+    strong = {
+        "407": "1500000.0",
+        "40000405": "900000.0",
+    }  # MHz: a coupling of the size of what lies between the states, and an axis
+    for suffix in (".int", ".var"):
+        lines = (source / f"eighteen_states{suffix}").read_text().splitlines()
+        codes = [line.split()[0] if line.split() else "" for line in lines]
+        changed = [
+            f" {code} {strong[code]} 0" if code in strong else line for code, line in zip(codes, lines, strict=True)
+        ]
+        (folder / f"mixed{suffix}").write_text("\n".join(changed) + "\n")
+    code, out, err = call("spectrum", "mixed.int", "--top", "0")
+    assert code == 0
+    assert re.search(
+        r"note: \d+ levels from J = 1 on are mixed by more than 50 %: what names a level has less than half", err + out
+    )

@@ -144,9 +144,10 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
     become uncertainties.
     """
-    from rotor.formats.spcat.hamiltonian.states import has_one_state
+    from rotor.formats.spcat.hamiltonian.states import has_one_state, states_of
     from rotor.formats.spcat.model import top_of
     from rotor.formats.spcat.names.named_top import named_top
+    from rotor.formats.spcat.prediction_notes import notes_of_range
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
     from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
@@ -161,7 +162,8 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
     if light is not None and light.request.flags >= FROM:
         file, light = files_in_mhz(file, light)
-    return top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
+    top = top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
+    return replace(top, notes=(*top.notes, *notes_of_range(states_of(file), parameters.name)), symmetry_checked=False)
 
 
 def _read_standard_input(isotopes: Isotopes | None) -> Top:

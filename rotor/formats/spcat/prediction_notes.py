@@ -168,3 +168,17 @@ def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[
         f"{_limits_of(state)} is lifted by --full-basis: every K to N is in the basis, which is not what the file says"
         for state in lifted
     ]
+
+
+MOST_K = 99  # in the quantum numbers of a catalogue
+
+
+def notes_of_range(states: Iterable[StateOptions], name: str) -> list[str]:
+    """A note for files that are read as a top, whose basis has every K whatever KNMIN and KNMAX say."""
+    cut = [_limits_of(state) for state in states if state.with_k_to(MOST_K).is_cut]
+    if not cut:
+        return []
+    return [
+        f"{', '.join(cut)} in {name}: constants alone are read from it here, and every K to N is in the basis; rotor spectrum FILE.int "
+        "keeps to the range of the file"
+    ]
