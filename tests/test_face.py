@@ -103,6 +103,13 @@ def test_names_that_moved_warn_and_say_where_they_are(name):
         assert getattr(rotor, name) is getattr(api, name)
 
 
+@pytest.mark.parametrize("name", sorted(api.FURTHER))
+def test_further_building_blocks_are_in_one_place(name):
+    assert callable(getattr(api, name))
+    assert name in dir(api)
+    assert api.FURTHER[name].startswith(getattr(api, name).__module__.rpartition(".")[0])
+
+
 def test_unknown_names_are_no_surprise():
     with pytest.raises(AttributeError, match="did you mean"):
         rotor.spektrum  # noqa: B018

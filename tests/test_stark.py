@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import obl_cv
 
-from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, Stark, stark_map
+from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.chains import chain_states, is_chain
 from rotor.quantum.fields.solver import reduced_basis, solve_fields
@@ -298,11 +298,6 @@ def test_bad_input(change, message):
     arguments = {"top": OCS, "fields_kv_per_cm": [0.0, 10.0], "j_highest": 1, **change}
     with pytest.raises(ValueError, match=message):
         stark_map(arguments.pop("top"), arguments.pop("fields_kv_per_cm"), **arguments)
-
-
-def test_the_effect_knows_its_size():
-    assert Stark(1.0).size_mhz(OCS, 0) == pytest.approx(3.5524, rel=1e-4)  # μ²E²/6B
-    assert Stark(1.0).size_mhz(CH3CN, 1) == pytest.approx(987.18, rel=1e-4)  # μE/2
 
 
 # Chains

@@ -8,7 +8,7 @@ import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 from toy_spin_tensor import SpinTensor
 
-from rotor.quantum.effect import effect_sizes, named_effect
+from rotor.quantum.effect import effect_sizes
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
@@ -101,7 +101,6 @@ def test_sizes_and_names():
         "tensor on an artificial spin",
         False,
     )
-    assert named_effect("tensor on an artificial spin").__name__ == SpinTensor.__name__
     plain = solve_levels(top_in(), 4)
     split = solve_levels(top_in(), 4, effects=(*SEMI_RIGID, effect))
     rows = plain.rows_of(j=split.quanta["n"], ka=split.quanta["ka"], kc=split.quanta["kc"])

@@ -1,4 +1,4 @@
-"""The face of a quantum effect, and the registry of effects by name.
+"""The face of a quantum effect: what one says of itself, and sizes of several.
 
 The Hamiltonian is a sum over effects, each a sum over named parameters,
 
@@ -24,13 +24,11 @@ if TYPE_CHECKING:
     from rotor.quantum.wang.j_operators import JOperator
     from rotor.tops.top import Top
 
-EFFECTS: dict[str, type[QuantumEffect]] = {}
-
 
 class QuantumEffect(ABC):
     """A part of the rotational Hamiltonian, linear in its named parameters.
 
-    name: how files, reports and errors call it; a subclass with a name is entered into `EFFECTS`.
+    name: how files, reports and errors call it.
     conserved: quantum numbers that stay good under it, of "j" (the rotational angular momentum), "species" (the parities of
     Ka and Kc) and "m" (the projection in space). What is not named is taken as mixed.
 
@@ -47,10 +45,6 @@ class QuantumEffect(ABC):
     name: ClassVar[str] = ""
     conserved: ClassVar[frozenset[str]] = frozenset({"j", "species", "m"})
     resolves_m: ClassVar[bool] = False
-
-    def __init_subclass__(cls) -> None:
-        if cls.name:
-            EFFECTS[cls.name] = cls
 
     @abstractmethod
     def parameters(self, top: Top) -> dict[str, float]:
@@ -174,16 +168,3 @@ def effect_sizes(
 def k_limits_of(top: Top, effects: Iterable[QuantumEffect]) -> dict[int, tuple[int, int]]:
     """The limits of K that the effects set, by states."""
     return {v: limits for effect in effects for v, limits in effect.k_limits(top).items()}
-
-
-def named_effect(name: str) -> type[QuantumEffect]:
-    """The class of the effect with this name.
-
-    Raises ValueError, with the names that there are, for another one.
-    """
-    from rotor.quantum import effects
-
-    effects.load_all()
-    if name not in EFFECTS:
-        raise ValueError(f"effect {name!r}: known are {', '.join(sorted(EFFECTS))}")
-    return EFFECTS[name]

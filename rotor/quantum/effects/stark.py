@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,38 +44,6 @@ DEFAULT_TOLERANCE_MHZ = 1e-6
 Z = (0.0, 0.0, 1.0)
 # 2π I/(c h) in MHz for 1 Å³ and 1 W/cm²
 MHZ_ANGSTROM3_W_PER_CM2 = 2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S) * 1e-6
-
-
-@dataclass(frozen=True)
-class Stark(QuantumEffect):
-    """The field as an effect: its size for the list of what a calculation leaves out, and what it conserves.
-
-    >>> from rotor.tops.top import Top
-    >>> round(Stark(1.0).size_mhz(Top.from_constants("B=6081.5 MHz", dipole_abc_debye=(0.7, 0, 0)), 0), 1)
-    3.4
-    """
-
-    name: ClassVar[str] = "static electric field"
-    conserved: ClassVar[frozenset[str]] = frozenset({"m"})
-    resolves_m: ClassVar[bool] = True
-
-    field_kv_per_cm: float = 1.0
-
-    def parameters(self, top: Top) -> dict[str, float]:
-        """No constant of the free top: energies in a field have M, and are those of `stark_map`."""
-        return {}
-
-    def size_mhz(self, top: Top, j: int) -> float:
-        """Second order at J = 0, first order (K = M = J) where ±K coincide."""
-        first = (
-            units.MHZ_PER_DEBYE_KV_PER_CM
-            * abs(self.field_kv_per_cm)
-            * float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
-        )
-        b = min(x for x in top.rotational_constants_mhz if math.isfinite(x))
-        if top.kind in ("prolate", "oblate") and j:
-            return first * j / (j + 1)
-        return min(first**2 / (6 * b), first)
 
 
 def stark_map(
