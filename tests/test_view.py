@@ -441,6 +441,38 @@ def test_species_of_many_kinds_are_predicted_and_labelled(service):
         assert number in window["sticks"]
 
 
+def test_lines_split_by_spins_have_their_quantum_numbers(service, tmp_path):
+    text = 'name = "spin"\n[constants]\nB = 6e3\n[dipole]\na = 1.0\n[spins.14N]\nchi_aa = -4.2\n'
+    (tmp_path / "spin.toml").write_text(text)
+    done(service, "add_species", source="spin.toml", temperature_k=3.0)
+    assert service.facts()["quanta"]["2"]["names"] == ["j"]
+    target = {"species": 2, "upper": [1], "lower": [0]}
+    done(service, "assign", frequency_mhz=12000.0, error_mhz=0.01, to=[target])
+    answer = service.answer({"do": "species", "species": 2, "hyperfine": True})
+    assert "1 line is assigned by j, not by n, f; remove such lines first" in answer["error"]
+    assert service.facts()["lines"]["1"]["calculated_mhz"] == pytest.approx(12000.0)
+    done(service, "undo")
+    done(service, "species", species=2, hyperfine=True)
+    assert service.facts()["quanta"]["2"]["names"] == ["n", "f"]
+    window = done(service, "window", first_mhz=11990, last_mhz=12010, pixels=100)["sticks"]["2"]
+    assert sorted(upper[1] for upper in window["upper"]) == [0, 1, 2]  # J = 1 of a spin 1
+    target = {"species": 2, "upper": window["upper"][0], "lower": window["lower"][0]}
+    done(service, "assign", frequency_mhz=window["x"][0], error_mhz=0.01, to=[target])
+    done(service, "undo")
+    done(service, "species", species=2, hyperfine=False)
+    assert service.facts()["quanta"]["2"]["names"] == ["j"]
+    assert "no constants of spins" in service.answer({"do": "species", "species": 1, "hyperfine": True})["error"]
+
+
+def test_a_session_whose_molecule_is_gone_is_refused_and_stays(service, tmp_path):
+    before = (tmp_path / "spectrum.view.json").read_bytes()
+    service.session.release()
+    (tmp_path / NAME).rename(tmp_path / "elsewhere.toml")
+    with pytest.raises(ValueError, match=NAME):
+        open_session("spectrum.csv")
+    assert (tmp_path / "spectrum.view.json").read_bytes() == before
+
+
 def test_constants_as_text_are_a_species(service):
     answer = service.answer({"do": "add_species", "source": "A=2458.69 B=490.43 C=408.87 MHz", "temperature_k": 3.0})
     assert "dipole not known, 1 D along each axis assumed" in answer["notes"][0]

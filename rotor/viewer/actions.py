@@ -15,6 +15,7 @@ import numpy as np
 
 from rotor.assignment.peaks import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
+from rotor.table import counted
 from rotor.viewer.fits import lines_from, refitted
 from rotor.viewer.loomis_wood import centres_of
 from rotor.viewer.peak_fit import Peak, fit_peak
@@ -315,9 +316,21 @@ def species(state: State, message: Message, context: Context) -> tuple[str, dict
     made = msgspec.structs.replace(record, **values)
     if "hyperfine" in message:
         made = with_hyperfine(made, bool(message["hyperfine"]), context.predictions.top)
+        _refuse_other_labels(state, number, made, context)
         values["hyperfine"] = made.hyperfine
     context.predictions.lines(made)  # refuses a temperature or a dipole that cannot be
     return f"change {', '.join(values)} of {record.name}", {species_key(number): made}
+
+
+def _refuse_other_labels(state: State, number: int, record: Species, context: Context) -> None:
+    """ValueError where lines are assigned with other quantum numbers than the changed species has."""
+    names, lines = context.predictions.model(record).quanta, state.lines_of(number)
+    before = context.predictions.model(state.species[number]).quanta
+    if lines and names != before:
+        those = counted(len(lines), "line is", "lines are")
+        raise ValueError(
+            f"{record.name}: {those} assigned by {', '.join(before)}, not by {', '.join(names)}; remove such lines first"
+        )
 
 
 def add_species(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:
@@ -400,6 +413,7 @@ def import_lines(
     record = before
     if not before.hyperfine and names_sums(path, len(model.quanta)):
         record = with_hyperfine(before, True, context.predictions.top)
+        _refuse_other_labels(state, species_number, record, context)
         model = context.predictions.model(record)
     read, remarks = read_assigned_lines(path, model.quanta, model.halves)
     _refuse_many(state, len(read))

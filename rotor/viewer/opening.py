@@ -120,6 +120,7 @@ def open_session(
         _bind(made, stated, where, file.parent, len(spectrum), resumed)
         service = Service(made, spectrum, peaks_of_list(where, spectrum))
         _fill(service, molecules, lines, temperature_k, note)
+        service.facts()  # every molecule of the session can be read
         made.save()
     except BaseException:
         made.release()
