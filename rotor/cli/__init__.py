@@ -91,8 +91,8 @@ Examples:
   rotor new spectrum > s.toml && rotor run s.toml"""
 
 
-def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
-    """The command with some of its verbs."""
+def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer.Typer:
+    """The command with some of its verbs. listed: their names and lines of help alone, whose modules are not loaded."""
     app = typer.Typer(
         cls=PlainGroup,
         add_completion=False,
@@ -111,9 +111,16 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pass
 
     for verb in verbs:
+        if listed and VERBS[verb]:
+            app.command(verb, short_help=VERBS[verb])(_listed)
+            continue
         command, class_, examples = _command(verb)
         app.command(verb, cls=class_, short_help=VERBS[verb] or verb_of(verb).about, epilog=folded(examples))(command)
     return app
+
+
+def _listed() -> None:
+    """A verb in a list of verbs."""
 
 
 def _command(name: str) -> tuple[Any, Any, str]:
@@ -178,10 +185,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
-    verbs = words[:1] if words[:1] and words[0] in VERBS else VERBS  # what is not asked for is not loaded
+    known = bool(words) and words[0] in VERBS
+    verbs = words[:1] if known else VERBS  # what is not asked for is not loaded
     if words[:1] and words[0] in ONE_THREAD:
         process.one_thread_of_blas(_jmax(arguments))
-    command = typer.main.get_command(_application(verbs))
+    command = typer.main.get_command(_application(verbs, listed=not known))
     provenance = _printable(shlex.join(["rotor", *arguments]))
     try:
         with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:

@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from rotor.cli.shared.inputs import json_option
 from rotor.cli.shared.options import argument, grouped
 from rotor.cli.shared.output import Files, Table, deliver, plain, show_facts, show_table
+
+if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+    from rotor.tops.top import Top
 
 WIDEST_NAME = 24
 
@@ -34,7 +38,8 @@ class Options:
 def command(context: typer.Context, options: Options) -> None:
     """Molecules known by name: kind, κ, dipole, and where the numbers are from."""
     files = Files.of(options)
-    records = [record(path) for path in _paths(options.name)]
+    whole = options.name is not None or options.json is not None
+    records = [record(path, symmetry=whole) for path in _paths(options.name)]
     text = "[\n" + ",\n".join(dumps(one, ensure_ascii=False, allow_nan=False) for one in records) + "\n]\n"
     deliver(files, {}, lambda: text, lambda: _show(records, alone=options.name is not None))
 
@@ -60,13 +65,12 @@ def _paths(name: str | None) -> list[Path]:
     return sorted(set(names().values()), key=lambda path: (order.index(path.parent), path.stem.casefold()))
 
 
-def record(path: Path) -> dict[str, Any]:
-    """What a molecule file says, by the keys of docs/command_line.md."""
+def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
+    """What a molecule file says, by the keys of docs/command_line.md. symmetry: whether the point group of the geometry is looked for."""
     from rotor.formats.molecules.molecule_file import read_molecule_file
-    from rotor.formats.read_write import top_of_file
 
     file = read_molecule_file(path)
-    top = top_of_file(file)
+    top = _top_of(file) if symmetry or file.constants is None else _top_of_constants(file)
     return {
         "name": file.name,
         "names": list(file.names),
@@ -88,6 +92,22 @@ def record(path: Path) -> dict[str, Any]:
         "file": str(path),
         "own": _is_own(path),
     }
+
+
+def _top_of(file: MoleculeFile) -> Top:
+    from rotor.formats.read_write import top_of_file
+
+    return top_of_file(file)
+
+
+def _top_of_constants(file: MoleculeFile) -> Top:
+    """The top without its geometry, whose symmetry takes longer than all else."""
+    from dataclasses import replace
+
+    from rotor.tops.top import Top
+
+    assert file.constants is not None
+    return replace(Top.from_constants(file.constants), dipole_abc_debye=file.dipole_abc_debye)
 
 
 def _is_own(path: Path) -> bool:
