@@ -139,3 +139,14 @@ def test_refusals(call, options, said):
 
 def test_constants_alone_have_no_electrons():
     assert electronic_states_of(Top.from_constants("B=10 GHz").molecule) == ElectronicStates()
+
+
+def test_a_linear_doublet_notes_orbital_momentum(call):
+    """S of NO by the spin alone is 5.6 J/(mol K) below the published one, and had no word for it."""
+    said = "with orbital angular momentum (a Π or Δ state) its functions are twice as many"
+    thermo = "thermo", "NO", "--gas", "--temperature", "298.15"
+    assert said in call(*thermo)[2]
+    assert said not in call(*thermo, "--electronic", "2,2@121.1")[2]
+    assert said not in call("thermo", "NO2", *thermo[2:])[2]
+    assert said not in call("thermo", "O2", *thermo[2:])[2]
+    assert said not in call("thermo", "NO", "--temperature", "298.15")[2]

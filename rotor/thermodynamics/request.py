@@ -154,6 +154,18 @@ class ThermoAnswer(TextOf):
         parameters = dict.fromkeys(name for effect in effects for name in effect.parameters(top))
         return q_budget(self.functions, j, every_limit(top, j, effects), tuple(parameters))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Functions of the electrons that the degeneracy of a linear radical's spin leaves out."""
+        gas, top = self.functions.gas, self.functions.top
+        doublet = gas is not None and self.request.electronic is None and gas.electronic.degeneracies == (2,)
+        if not doublet or top.kind != "linear":
+            return ()
+        return (
+            "the doublet of a linear radical is counted by its spin alone: with orbital angular momentum (a Π or Δ state) its functions "
+            "are twice as many, split by spin-orbit coupling; give them, as those of NO: electronic 2,2@121.1",
+        )
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         functions = self.functions

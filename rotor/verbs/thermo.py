@@ -155,6 +155,7 @@ VERB = Verb(
     table=lambda answer: answer.functions,
     rows="functions",
     show=show,
+    notes=lambda answer: answer.notes,
     outputs=(
         Output("csv", (".csv",), "Write the table as CSV, in full precision", example="out.csv"),
         Output("parquet", (".parquet",), "Write the table as Parquet", example="out.parquet"),
