@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.basis.state_elements import StateElements, Vertex
+from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
 from rotor.quantum.coupled import connected_parts, names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
@@ -65,7 +65,8 @@ def labelled_states(
     vertices = {
         j: [(v, cut) for v in states for block in whole[j] if (cut := _within(block, limits.get(v)))] for j in of_j
     }
-    elements = StateElements(top, effects, names, representation, vertices)
+    terms = StateTerms.of(top, effects, names, representation)
+    elements = StateElements(terms, len(names), representation, vertices)
     blocks, inside = list[NamedBlock](), list[Ints]()
     for j, rows in sorted(of_j.items(), reverse=True):
         here = elements.of_j(j)

@@ -21,12 +21,16 @@ from rotor.quantum.linear_stacks import LinearBlock, numbered
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _LOOKED_AT = 3  # J at which all pairs of Wang blocks are tried
 Vertex = tuple[int, WangBlock]
+Summed = tuple[
+    int, int, OperatorOfJ, Sequence[tuple[str, OperatorOfJ]]
+]  # states, the sum of operators, and each by its name
 
 
 class WangElements(NamedTuple):
@@ -39,12 +43,13 @@ class WangElements(NamedTuple):
 
 
 class _Link(NamedTuple):
-    """What one parameter multiplies between two states or within one: its operator of J, and the unit matrix that it makes."""
+    """An operator of J between two states or within one, the unit matrix that it makes, and what it is the sum of, by name."""
 
     unit: int
     bra: int
     ket: int
     operator: OperatorOfJ
+    named: Sequence[tuple[str, OperatorOfJ]]
 
 
 class StateTerms(NamedTuple):
@@ -81,11 +86,23 @@ class StateTerms(NamedTuple):
         for name, bra, ket, operator in _links(top, effects, representation):
             if name not in place:
                 continue
-            links.append(_Link(len(first) * len(powers) + len(links), bra, ket, operator))
+            links.append(_Link(len(first) * len(powers) + len(links), bra, ket, operator, [(name, operator)]))
             terms.append((links[-1].unit, place[name], 0, 1.0))
         rows, columns, p = np.array([term[:3] for term in terms], dtype=np.int64).reshape(-1, 3).T
         factors = np.array([term[3] for term in terms], dtype=float)
         return cls(powers, first, rows, columns, p, factors, tuple(links))
+
+    @classmethod
+    def of_values(cls, states: Mapping[int, Operators], links: Sequence[Summed], representation: str) -> StateTerms:
+        """Of one parameter, H itself: operators of every state by v with their values, and sums of couplings."""
+        powers = ((0, 0), *sorted({(q, n) for own in states.values() for _, q, n in own} - {(0, 0)}))
+        first = {v: i * len(powers) for i, v in enumerate(states)}
+        found = [(first[v] + powers.index((q, n)), p, c) for v, own in states.items() for (p, q, n), c in own.items()]
+        units = range(len(first) * len(powers), len(first) * len(powers) + len(links))
+        found += [(unit, 0, 1.0) for unit in units]
+        rows, p, factors = (np.array(column) for column in zip(*found, strict=True))
+        made = tuple(_Link(unit, *link) for unit, link in zip(units, links, strict=True))
+        return cls(powers, first, rows, np.zeros_like(rows), p, factors, made)
 
     def mix(self, j: int, count: int) -> Floats:
         """How much of each unit matrix each parameter has at one J, (units, count)."""
@@ -162,24 +179,38 @@ class _Joining:
             for i, up, of_up in of_state.get(link.bra, ()):
                 for k, low, of_low in of_state.get(link.ket, ()):
                     kind = (link.unit, link.bra, of_up, link.ket, of_low)
-                    if (everywhere or kind in self._kinds) and (one := _linked(link, operator, up, low, least)):
+                    if (everywhere or kind in self._kinds) and (
+                        one := _linked(link, operator, (up, low), least, self._representation)
+                    ):
                         self._kinds.add(kind)
                         found.append((i, k, one))
         return found
 
 
-def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock, least: float) -> WangElements | None:
+def _linked(
+    link: _Link, operator: JOperator, blocks: tuple[WangBlock, WangBlock], least: float, representation: str
+) -> WangElements | None:
     """Elements between two Wang blocks; None where all are below `least`."""
+    up, low = blocks
     between = between_blocks(up, low, operator)
     size = np.abs(between)
     if not size.max() > least:
         return None
     if np.abs(between.imag).max() > least:
-        raise ValueError(
-            f"parameter of states {link.bra} and {link.ket}: the operator is not invariant under time reversal"
-        )
+        _refuse_imaginary(link, up, low, representation)
     rows, columns = np.nonzero(size)
     return WangElements(rows, columns, np.full(len(rows), link.unit), between.real[rows, columns])
+
+
+def _refuse_imaginary(link: _Link, up: WangBlock, low: WangBlock, representation: str) -> None:
+    """ValueError with the name of the coupling, of those added up, that has an imaginary element."""
+    for name, operator in link.named:
+        between = between_blocks(up, low, operator(low.j, representation))
+        if np.abs(between.imag).max() > NOTHING * np.abs(between).max():
+            raise ValueError(
+                f"{name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
+                "between two states only, with the factor i"
+            )
 
 
 def _shifted(elements: WangElements, part: Part, first: int) -> WangElements:
@@ -201,15 +232,10 @@ class StateElements:
     """Linear blocks over Wang blocks of states: `vertices` by J, each a state v and one of its Wang blocks."""
 
     def __init__(
-        self,
-        top: Top,
-        effects: Sequence[QuantumEffect],
-        names: Sequence[str],
-        representation: str,
-        vertices: Mapping[int, Sequence[Vertex]],
+        self, terms: StateTerms, count: int, representation: str, vertices: Mapping[int, Sequence[Vertex]]
     ) -> None:
-        """names: parameters of the effects, in the order of their values."""
-        self.terms, self._count = StateTerms.of(top, effects, names, representation), len(names)
+        """count: of the parameters."""
+        self.terms, self._count = terms, count
         self._vertices, self._joining = vertices, _Joining(self.terms.links, representation)
         self._elements = wang_elements({block for some in vertices.values() for _, block in some}, self.terms.powers)
 
@@ -258,7 +284,8 @@ def linear_blocks_of(
     for number, block in enumerate(blocks):
         by_j.setdefault(vertices_of(block)[0][1].j, []).append(number)
     vertices = {j: [vertex for i in numbers for vertex in vertices_of(blocks[i])] for j, numbers in by_j.items()}
-    elements = StateElements(top, levels.effects, names, str(levels.representation), vertices)
+    terms = StateTerms.of(top, levels.effects, names, str(levels.representation))
+    elements = StateElements(terms, len(names), str(levels.representation), vertices)
     out: dict[int, LinearBlock] = {}
     for j in sorted(by_j, reverse=True):
         here, start = elements.of_j(j), 0

@@ -1,0 +1,243 @@
+"""Interacting states: levels of all states v whose Wang blocks couplings connect.
+
+The matrices are those of `basis.state_elements`, which fits and derivatives have too, with one parameter: H itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.quantum.basis.state_elements import StateElements, StateTerms
+from rotor.quantum.coupled import CoupledBlock, connected_parts, names_of_states, parts_of
+from rotor.quantum.effect import QuantumEffect, k_limits_of
+from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.states import Coupling, OperatorOfJ, State
+from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
+from rotor.quantum.wang.j_operators import JOperator
+from rotor.tops.operators import Operators
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz, and the representation."""
+
+    states: dict[int, Operators]
+    couplings: tuple[tuple[float, Coupling], ...]
+    representation: str
+    limits: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+
+def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
+    """The states and couplings that the effects bring, beside the operators of the top's own state.
+
+    Parameters
+    ----------
+    top : Top
+        Gives the values of the parameters.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    operators : Operators
+        Coefficients in MHz of the top's own state v = 0, by powers (p, q, n).
+    representation : str
+        Which principal axes are x, y, z: "Ir", "IIIl", ...
+
+    Returns
+    -------
+    Model
+        Operators by state, couplings with their values in MHz, and limits of K.
+
+    Raises
+    ------
+    ValueError
+        For a coupling to a state that no effect defines, and for two effects that define the same state.
+    """
+    states, couplings = {0: operators}, []
+    for effect in effects:
+        values = effect.parameters(top)
+        couplings += [(values[coupling.name], coupling) for coupling in effect.couplings(top)]
+        couplings += [
+            (value, _own_coupling(top, effect, name))
+            for name, value in values.items()
+            if effect.j_operator(top, name, 1, representation) is not None
+        ]
+        states |= {state.v: state.operators(values) for state in effect.states(top)}
+    extra_states(top, effects)
+    for _, coupling in couplings:
+        for v in (coupling.bra, coupling.ket):
+            if v not in states:
+                raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
+    return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
+
+
+def _own_coupling(top: Top, effect: QuantumEffect, name: str) -> Coupling:
+    def operator(j: int, representation: str) -> JOperator:
+        found = effect.j_operator(top, name, j, representation)
+        assert found is not None
+        return found
+
+    return Coupling(name, 0, 0, operator)
+
+
+def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
+    """The states that effects bring; ValueError where two have one number."""
+    found = [state for effect in effects for state in effect.states(top)]
+    numbers = [0, *(state.v for state in found)]
+    if len(set(numbers)) < len(numbers):
+        raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
+    return found
+
+
+def coupled_levels(
+    top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int, executor: Executor | None = None
+) -> Levels:
+    """All levels of a coupled calculation, by quantum numbers j, ka, kc and, of several states, v.
+
+    Parameters
+    ----------
+    top : Top
+        Kind, spin weights and constants.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of; the levels remember it.
+    model : Model
+        States and couplings, from `model_of`.
+    jmin, jmax : int
+        Lowest and highest rotational angular momentum.
+    executor : Executor, optional
+        J are spread over it.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz with eigenvectors, labels and mixing: the squared overlap of each state with the function that
+        names it.
+
+    Raises
+    ------
+    ValueError
+        For a Hamiltonian that overflows, a coupling that is not invariant under time reversal, and states that mix
+        levels of different spin weight.
+    """
+    every_j = range(jmin, jmax + 1)
+    pieces = [(model, [j]) for j in every_j] if executor else [(model, every_j)]
+    solved = (
+        executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
+    )
+    blocks = tuple(_placed(block for of_some_j in solved for block in of_some_j))
+
+    labels = np.concatenate([block.labels for block in blocks])
+    quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
+    j = np.repeat([block.j for block in blocks], [len(block.energies_mhz) for block in blocks])
+    levels = Levels(
+        kind=top.kind,
+        representation=model.representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=quanta | {"j": j, "ka": labels[:, 1], "kc": labels[:, 2]},
+        multiplicity=2 * j + 1,
+        components=np.ones_like(j),
+        weight=np.ones_like(j),
+        effects=effects,
+        blocks=blocks,
+        mixing=np.concatenate([block.mixing for block in blocks]),
+    )
+    weighted = replace(levels, weight=_weights(top, effects, levels))
+    _refuse_mixed_weights(weighted)
+    return weighted
+
+
+def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in extra_states(top, effects):
+        if state.spin_weights is not None:
+            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return weight
+
+
+def _refuse_mixed_weights(levels: Levels) -> None:
+    """States of one block have one symmetry, so that their nuclear-spin weights are one number.
+
+    The functions of a Wang block of a symmetric top differ in K, and where nothing connects it to another they do not mix.
+    """
+    for block in levels.blocks:
+        if len(block.parts) == 1 and levels.kind in ("prolate", "oblate"):
+            continue
+        found = levels.weight[block.start : block.start + len(block.energies_mhz)]
+        if len(found) and (found != found[0]).any():
+            row = block.start + int(np.argmax(found != found[0]))
+            raise ValueError(
+                f"an effect mixes levels of nuclear-spin weights {found[0]} and {levels.weight[row]} "
+                f"({', '.join(levels.quanta)} = {levels.labels(np.array([block.start]))[0].strip()} and "
+                f"{levels.labels(np.array([row]))[0].strip()}): symmetry forbids that; check the effect or the spin weights"
+            )
+
+
+def _placed(solved: Iterator[CoupledBlock]) -> Iterator[CoupledBlock]:
+    start = 0
+    for block in solved:
+        yield replace(block, start=start)
+        start += len(block.energies_mhz)
+
+
+def solve_coupled(model: Model, every_j: Sequence[int]) -> list[CoupledBlock]:
+    """The coupled blocks of some J, in the order of J."""
+    vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in every_j}
+    terms = StateTerms.of_values(model.states, _links(model), model.representation)
+    elements = StateElements(terms, 1, model.representation, vertices)
+    found: dict[int, list[CoupledBlock]] = {}
+    for j in sorted(every_j, reverse=True):
+        here = elements.of_j(j)
+        zero = float(
+            here.mix[terms.first[0], 0]
+        )  # the part that is one number for J: taken out of the matrices for the sake of digits
+        here.mix[list(terms.first.values())] -= zero
+        found[j] = []
+        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
+            block = here.block(members)
+            matrix = np.zeros((block.size, block.size))
+            matrix[block.rows, block.columns] = (block.factors @ block.mix).sum(axis=1)
+            if not np.isfinite(matrix).all():
+                raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
+            energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
+            parts = parts_of([vertices[j][i] for i in members])
+            labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
+            found[j].append(CoupledBlock(j, parts, energies + zero, vectors, labels, mixing))
+    return [block for j in every_j for block in found[j]]
+
+
+def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, OperatorOfJ]]]]:
+    """The couplings of two states added up, with each by its name."""
+
+    def summed(couplings: list[tuple[float, Coupling]]) -> OperatorOfJ:
+        def operator(j: int, representation: str) -> JOperator:
+            first, *others = [value * coupling.operator(j, representation) for value, coupling in couplings]
+            for other in others:
+                first = first + other
+            return first
+
+        return operator
+
+    by_states = _by_states(model.couplings).items()
+    return [(*v, summed(own), [(one.name, one.operator) for _, one in own]) for v, own in by_states]
+
+
+def blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
+    whole = wang_blocks(j, model.representation)
+    return [part for b in whole if (part := limited(b, *model.limits[v]))] if v in model.limits else whole
+
+
+def _by_states(couplings: Iterable[tuple[float, Coupling]]) -> dict[tuple[int, int], list[tuple[float, Coupling]]]:
+    """Couplings by the states that they connect."""
+    found: dict[tuple[int, int], list[tuple[float, Coupling]]] = {}
+    for value, coupling in couplings:
+        found.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
+    return found
