@@ -13,6 +13,7 @@ import pytest
 
 import rotor
 from rotor.assignment.answer import AssignAnswer
+from rotor.assignment.families import Bounds
 from rotor.assignment.peaks import PeakList, peak_list, spurs
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.assignment.rigid_table import PARAMETERS
@@ -81,6 +82,12 @@ def test_lines_and_what_is_left(answer: AssignAnswer) -> None:
     columns = answer.table.columns
     assert (columns["species"] == 1).sum() == len(np.unique(one.peak))
     assert answer.unexplained.sum() > 30  # most of the foreign peaks
+    assigned = columns["species"] > 0
+    np.testing.assert_allclose(
+        columns["residual_mhz"][assigned], (columns["frequency_mhz"] - columns["calculated_mhz"])[assigned], atol=1e-9
+    )
+    assert np.abs(columns["residual_mhz"][assigned]).max() < 0.05  # ten times the errors of 5 kHz
+    assert np.isnan(columns["residual_mhz"][~assigned]).all()
 
 
 def test_lines_are_ready_for_a_fit(answer: AssignAnswer, tmp_path: Path) -> None:
@@ -111,6 +118,7 @@ def test_two_species() -> None:
     assert found.species[1].kind == "a"
 
 
+PROLATE = {"A": 8636.7, "B": 703.9, "C": 650.8, "DJ": 3e-5, "DJK": 3e-4, "DK": 8e-3, "d1": -2e-6, "d2": -3e-7}
 LIGHT = {"A": 6746.8, "B": 4959.3, "C": 3354.3, "DJ": 7.4e-3, "DJK": 1.3e-2, "DK": 3.4e-2, "d1": -2.6e-3, "d2": -5e-5}
 
 
@@ -149,6 +157,38 @@ def test_a_guess_is_enough_where_the_search_is_narrow() -> None:
     guess = tuple(TRUTH[name] * factor for name, factor in zip("ABC", (1.02, 0.98, 1.015), strict=True))
     found = answer_assign(AssignRequest(spectrum(seed=8), guess_mhz=guess, temperature_k=2.0, seconds=120))
     assert is_right(found, 0, TRUTH)
+
+
+@pytest.mark.parametrize(
+    ("truth", "dipole"),
+    [(SECOND, (1.0, 0.0, 0.0)), (PROLATE, (0.0, 0.0, 1.0))],
+)
+def test_a_guess_of_a_near_prolate_top(truth: dict[str, float], dipole: tuple[float, float, float]) -> None:
+    """Three rigid lines leave A some per cent off; roots are looked for beyond the error of the guess, species are not."""
+    f, i = lines_of(truth, dipole, 100.0)
+    strong = i > 3.0
+    peaks = peak_list(
+        f[strong] + 0.004 * np.random.default_rng(2).normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND
+    )
+    guess = tuple(truth[name] * factor for name, factor in zip("ABC", (0.975, 0.98, 1.02), strict=True))
+    found = answer_assign(AssignRequest(peaks, guess_mhz=guess, seconds=120))
+    assert is_right(found, 0, truth)
+    far = tuple(truth[name] * 1.2 for name in "ABC")
+    assert answer_assign(AssignRequest(peaks, guess_mhz=far, seconds=120)).word == "not found"
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 1.0])
+def test_points_of_kappa_that_bounds_leave(step: float) -> None:
+    """Every top within bounds has its κ between the first and the last point, and few points are left by narrow bounds."""
+    kappa = np.linspace(-1, 1, 401)
+    centre = np.array([3614.2, 1811.4, 902.9])
+    bounds = Bounds(centre * (1 - 0.1 * step), centre * (1 + 0.1 * step))
+    part = kappa[bounds.points(kappa)]
+    a, b, c = centre[:, None] * np.random.default_rng(1).uniform(1 - 0.1 * step, 1 + 0.1 * step, (3, 2000))
+    values = (2 * b - a - c) / (a - c)
+    assert (values >= part[0]).all()
+    assert (values <= part[-1]).all()
+    assert len(part) < 401 * (0.1 + 0.9 * step)
 
 
 def redrawn(peaks: PeakList, seed: int) -> PeakList:

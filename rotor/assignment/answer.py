@@ -115,6 +115,11 @@ class AssignedPeaks(Table):
     calculated_mhz: Floats
 
     @property
+    def residual_mhz(self) -> Floats:
+        """Observed minus calculated (n,); nan where no line is assigned."""
+        return self.frequency_mhz - self.calculated_mhz
+
+    @property
     def columns(self) -> dict[str, NDArray[Any]]:
         """All columns; -1 and nan where no line is assigned."""
         labels = {
@@ -125,6 +130,7 @@ class AssignedPeaks(Table):
         return {
             "frequency_mhz": self.frequency_mhz, "intensity": self.intensity, "uncertainty_mhz": self.uncertainty_mhz,
             "species": self.species, "spur": self.spur.astype(np.int64), **labels, "calculated_mhz": self.calculated_mhz,
+            "residual_mhz": self.residual_mhz,
         }  # fmt: skip
 
 

@@ -53,6 +53,14 @@ class Bounds:
         """A low, A high, B low, ... (6,)."""
         return np.column_stack([self.low, self.high]).ravel()
 
+    def points(self, kappa: Floats) -> slice:
+        """Part of a rising grid of κ = (2B-A-C)/(A-C) that the bounds leave; κ rises with B and falls with A and C."""
+        (a, b, c), (a2, b2, c2) = self.low, self.high
+        lowest = (2 * b - a2 - c2) / (a2 - c2) if a2 > c2 else -1.0
+        highest = (2 * b2 - a - c) / (a - c) if a > c else 1.0
+        first, last = np.searchsorted(kappa, [lowest, highest])
+        return slice(max(int(first) - 1, 0), min(int(last) + 2, len(kappa)))
+
 
 def sample_tops(bounds: Bounds, count: int, rng: np.random.Generator) -> Floats:
     """A, B, C (count, 3): A and B log-uniform, C between that of a planar molecule and B."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,11 @@ from rotor.assignment.rigid_table import JMAX, rigid_table
 from rotor.assignment.search import Field
 from rotor.assignment.species import (
     FIRST_STAGES,
+    GUESS_STAGES,
     NEXT_STAGES,
     STRONG_STAGES,
     Clock,
+    Stage,
     compiled,
     explained,
     next_species,
@@ -38,7 +40,8 @@ LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # o
 COLDEST_K, HOTTEST_K = 0.7, 12.0
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
 GUESS_ERROR = 0.033  # of a guess: 3 % and a little
-SAMPLES_OF_GUESS = 300
+SAMPLES_OF_GUESS = 120
+ROOT_MARGINS = (0.15, 0.03, 0.03)  # of A, B, C of roots beyond the error of a guess
 STRONG, MANY = 20, 6  # so many of the strongest peaks without a species: a stronger one may be there
 HIGH, FEW_HIGH = 0.4, 3  # and so many peaks higher than this share of the strongest species
 MOST_EXTRA = 3  # species beyond those of the request
@@ -113,6 +116,22 @@ class AssignRequest:
         return Bounds(centre * (1 - GUESS_ERROR), centre * (1 + GUESS_ERROR))
 
     @property
+    def root_bounds(self) -> Bounds:
+        """Of the constants of roots: of three lines the rigid A of a near-prolate top may be some per cent off."""
+        if self.guess_mhz is None:
+            return self._range
+        margin = np.array(ROOT_MARGINS)
+        return Bounds(self.bounds.low * (1 - margin), self.bounds.high * (1 + margin))
+
+    def allows(self, grown: Grown) -> bool:
+        """Whether constants are those of the guess within its error, or five of theirs."""
+        if self.guess_mhz is None:
+            return True
+        errors = 5 * np.sqrt(np.diag(grown.covariance)[:3])
+        values = grown.constants[:3]
+        return bool((values + errors > self.bounds.low).all() and (values - errors < self.bounds.high).all())
+
+    @property
     def _range(self) -> Bounds:
         return Bounds(np.array(self.low_mhz or LOWEST_MHZ), np.array(self.high_mhz or HIGHEST_MHZ))
 
@@ -181,7 +200,7 @@ class _Search:
 
     def main_species(self) -> None:
         """Species with structure of their own: as many as the request says, and stronger ones."""
-        extra = MOST_EXTRA
+        extra = MOST_EXTRA if self.request.guess_mhz is None else 0
         while len(self.species) < self.request.species or (extra and self._stronger_may_be_left()):
             extra -= len(self.species) >= self.request.species
             if not self._one_more():
@@ -189,12 +208,11 @@ class _Search:
 
     def _one_more(self) -> bool:
         """Whether a further species was found, split lines as their centres where single ones show none."""
-        stages = FIRST_STAGES if not self.species else STRONG_STAGES if self._strong_left() >= MANY else NEXT_STAGES
         rows = np.flatnonzero(self.left)
         if len(rows) < 5:
             return False
         peaks = self.request.peaks.where(self.left)
-        rivals = self._rivals(peaks, stages)
+        rivals = self._rivals(peaks, self._stages())
         if rivals:
             centres, members = with_centres(peaks, alone=True)
             doublets = self._as_doublets(centres, rivals) if excess_scatter(rivals[0], peaks) else []
@@ -211,21 +229,31 @@ class _Search:
             self._add(centres, rows[members], rivals)
         return bool(rivals)
 
+    def _stages(self) -> tuple[Stage, ...]:
+        """Families and peaks to try for the next species."""
+        if self.request.guess_mhz is not None:
+            return GUESS_STAGES
+        if not self.species:
+            return FIRST_STAGES
+        return STRONG_STAGES if self._strong_left() >= MANY else NEXT_STAGES
+
     def _as_doublets(self, centres: PeakList, rivals: list[Grown]) -> list[Grown]:
         """The species grown on centres of doublets, where its lines scatter less about these."""
-        seen = Field(centres, self.table, self.request.bounds, self.request.temperatures)
+        seen = Field(centres, self.table, self.request.root_bounds, self.request.temperatures)
         anew = [again for again in grown_anew(seen, rivals[0]) if again.rms_mhz < rivals[0].rms_mhz / 2]
         return sorted((again for again in anew if again.evidence > 0), key=lambda again: -again.evidence)[:1]
 
-    def _rivals(self, peaks: PeakList, stages: Any) -> list[Grown]:
-        seen = Field(peaks, self.table, self.request.bounds, self.request.temperatures)
-        rivals = next_species(seen, self.families, stages, self.clock)
+    def _rivals(self, peaks: PeakList, stages: Sequence[Stage]) -> list[Grown]:
+        seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
+        rivals = [
+            grown for grown in next_species(seen, self.families, stages, self.clock) if self.request.allows(grown)
+        ]
         return rivals if rivals and word(probability(rivals[0])) != "not found" else []
 
     def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> None:
         """Take the first of the rivals, and what it explains from the peaks."""
         best = rivals[0]
-        seen = Field(peaks, self.table, self.request.bounds, self.request.temperatures)
+        seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
         refined = refine(best, peaks, self.table)
         twins = tuple(
             (other.constants[:3], other.evidence) for other in rivals[1:] if other.evidence > best.evidence - 10

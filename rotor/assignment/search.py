@@ -84,11 +84,12 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     lines = family.lines[np.argsort(-np.abs(_change_of_jj(field, family.lines)), kind="stable")]
     upper, lower = table.upper[lines], table.lower[lines]
     further, below = table.upper[family.companions], table.lower[family.companions]
-    energies = table.levels[:, :, 0]
+    points = field.bounds.points(table.kappa)
+    energies = table.levels[points, :, 0]
     out = np.empty((4000, 5))
     low, high = field.peaks.band_mhz
     found, _ = _kernels.sweep(
-        np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa,
+        np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa[points],
         np.ascontiguousarray((energies[:, further] - energies[:, below]).T), field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
         field.bounds.array, need, out,

@@ -48,6 +48,7 @@ STRONG_STAGES = (
     Stage(60, 0, 120),
     Stage(60, 120, 420),
 )  # of a further species, while several of the strongest peaks are left
+GUESS_STAGES = (Stage(60, 0, 60), Stage(180, 0, 90), Stage(60, 60, 200), Stage(400, 0, 60))  # within narrow bounds
 NEXT_STAGES = (Stage(60, 0, 120),)
 SCARCE = 45  # peaks up to which all families are tried: a family costs as the third power of their number
 
@@ -89,7 +90,8 @@ def next_species(
             grown += _grown(seen, candidates, tried, PER_CHUNK)
             if max((one.evidence for one in grown if one.determined), default=0.0) > clear:
                 return _finished(seen, grown, candidates)
-        if max((one.evidence for one in grown if one.determined), default=0.0) > clear / 8:
+        best = max(grown, key=lambda one: one.evidence, default=None)
+        if best is not None and best.determined and best.evidence > clear / 8:
             break
     return _finished(seen, grown, [])
 
