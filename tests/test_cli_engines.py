@@ -9,6 +9,7 @@ import pytest
 from ase.io import read
 
 VAPOUR = ("fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff", "4", "--step", "1fs", "--every", "5")
+VAPOUR += ("--equilibration", "50fs")  # long enough to show that it happens before the engine starts
 
 
 @pytest.mark.parametrize("engine", ["openmm", "lammps"])

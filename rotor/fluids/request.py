@@ -235,6 +235,10 @@ def answer_fluid(
     equilibration = None
     if not resume and request.equilibration_ps != 0:
         atoms = atoms if isinstance(request.box, NewBox) else _with_calculator(atoms, settings, request.threads)
+        if not own:
+            from rotor.fluids.engines.follow import check_engine
+
+            check_engine(request.engine, atoms, settings, outputs, request.threads)
         with progress_bar(0, progress) as shown:
             equilibration = equilibrate(atoms, settings, request.equilibration_ps, shown)
         start += f"; {equilibration.text}"

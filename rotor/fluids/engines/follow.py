@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,16 +58,41 @@ def follow_engine(
     RunStopped
         Where it stops before the end.
     """
+    engine_input, frames = _frames_of(engine, atoms, settings, outputs, threads)
+    with _engine_errors():
+        return _follow(frames, engine_input, atoms, settings, outputs, on_start)
+
+
+def check_engine(engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int = 1) -> None:
+    """Start an engine with a box and stop it after the first frame: what it cannot run is refused before any long work.
+
+    Raises the same errors as `follow_engine`.
+    """
+    _, frames = _frames_of(engine, atoms, settings, outputs, threads)
+    with _engine_errors(), closing(frames):
+        next(frames)
+
+
+def _frames_of(
+    engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int
+) -> tuple[EngineInput, Generator[Frame]]:
+    """The box in the form of the engine, and its frames, which start when the first is taken."""
     frames_every = outputs.frames_every or settings.every
     if outputs.trajectories and frames_every % settings.every:
         raise ValueError(
             f"frames_every {frames_every}: with {engine} expected a multiple of the {settings.every} steps between rows"
         )
     engine_input = engine_input_of(atoms, settings)
+    options: dict[str, Any] = {THREAD_OPTIONS[engine]: threads, "accuracy": settings.ewald_tolerance}
+    with _engine_errors():
+        return engine_input, engine_frames(engine, engine_input, settings, **options)
+
+
+@contextmanager
+def _engine_errors() -> Iterator[None]:
+    """Errors of an engine as those of a run: not installed is wrong input, a stop on the way is `RunStopped`."""
     try:
-        options: dict[str, Any] = {THREAD_OPTIONS[engine]: threads, "accuracy": settings.ewald_tolerance}
-        frames = engine_frames(engine, engine_input, settings, **options)
-        return _follow(frames, engine_input, atoms, settings, outputs, on_start)
+        yield
     except ModuleNotFoundError as error:
         raise ValueError(str(error)) from error
     except RuntimeError as error:

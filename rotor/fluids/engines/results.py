@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -65,7 +65,7 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
     )
 
 
-def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Iterator[Frame]:
+def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Generator[Frame]:
     """The frames of an engine by its name, each checked to be finite.
 
     Parameters
