@@ -473,6 +473,24 @@ def test_a_session_whose_molecule_is_gone_is_refused_and_stays(service, tmp_path
     assert (tmp_path / "spectrum.view.json").read_bytes() == before
 
 
+def test_what_is_remembered_of_a_species_follows_its_record(service):
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    done(service, "free", species=1, free=["A"])
+    done(service, "refit", species=1)
+    record = service.session.state.species[1]
+    assert [*record.errors] == ["A"]
+    assert record.constants["B"] == pytest.approx(TRUE["B"] - 0.01, abs=1e-9)  # stays as the file has it
+    message = {"first_mhz": 9000, "last_mhz": 17000, "pixels": 100}
+    once = done(service, "window", **message)["sticks"]["1"]["height"]
+    done(service, "species", species=1, scale=2.0)
+    assert done(service, "window", **message)["sticks"]["1"]["height"] == pytest.approx(
+        [2 * one for one in once], abs=1e-4
+    )
+    moved = done(service, "window", **message, preview={"species": 1, "scale": 4.0})["sticks"]["1"]["height"]
+    assert moved == pytest.approx([4 * one for one in once], abs=1e-4)
+
+
 def test_constants_as_text_are_a_species(service):
     answer = service.answer({"do": "add_species", "source": "A=2458.69 B=490.43 C=408.87 MHz", "temperature_k": 3.0})
     assert "dipole not known, 1 D along each axis assumed" in answer["notes"][0]

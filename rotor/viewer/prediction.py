@@ -246,7 +246,8 @@ class Predictions:
 
     def model(self, record: Species) -> Model:
         """The model of a record."""
-        return _remembered(self._models, _key(record, temperature=False), lambda: self._model(record))
+        known = _remembered(self._models, _key(record, temperature=False), lambda: self._model(record))
+        return known if known.record == record else replace(known, record=record)
 
     def _model(self, record: Species) -> Model:
         return replace(model_of_species(record, self.top), file=self.located(record.source) if record.source else "")
@@ -256,7 +257,9 @@ class Predictions:
 
         The highest J is that of the constants with which the species came, so that it does not change while constants move.
         """
-        return _remembered(self._lists, _key(record), lambda: self._predicted(self.model(record)))
+        model = self.model(record)
+        known = _remembered(self._lists, _key(record), lambda: self._predicted(model))
+        return known if known.model.record == record else replace(known, model=model)
 
     def _predicted(self, model: Model) -> Predicted:
         record = model.record
