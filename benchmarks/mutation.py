@@ -3,8 +3,8 @@
     python benchmarks/mutation.py ../mutants --mutants 300 --seed 24      # goes on where it was stopped
     python benchmarks/mutation.py ../mutants --survivors                  # what is left, and the share killed
 
-The folder gets a copy of the checkout (beside it, so that ../shared is found). Each mutant is written into the copy, and test files run,
-the likeliest to see it first (`Selection`), until a test is red. It survives if no test is red within its budget of processor time;
+The folder gets a copy of the checkout (beside it, so that ../shared is found). Each mutant is written into the copy, and tests run, the
+likeliest to see it first (`Selection`), until a test is red. It survives if no test is red within its budget of processor time;
 `--budget 200` later goes on with the survivors where they stopped. State: mutants.jsonl and results.jsonl in the folder, a line each.
 
 mutmut 3 changes the package as a whole, one trampoline a function, and leaves decorated functions alone, the compiled kernels among
@@ -36,6 +36,7 @@ from mutants import Mutant, sample
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
 WORD = re.compile(r"\w+")
+FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",
     "-n",
@@ -47,6 +48,12 @@ QUIET = (
     "-W",
     "ignore::pytest.PytestAssertRewriteWarning",
 )
+
+
+LIBRARIES = (
+    "numpy", "scipy.linalg", "scipy.optimize", "scipy.stats", "scipy.interpolate", "numba", "matplotlib.pyplot", "pytest", "hypothesis",
+    "typer", "ase.io", "ase.build", "rdkit.Chem.AllChem", "qutip", "mpmath", "pandas",
+)  # fmt: skip
 
 
 def rows(path: Path) -> list[dict[str, Any]]:
@@ -80,16 +87,28 @@ def prepared(folder: Path, checkout: Path, count: int, seed: int) -> list[Mutant
 
 
 class Selection:
-    """Test files in the order in which they are likely to see a change.
+    """Test functions in the order in which they are likely to see a change.
 
-    The names of a change are its function, class and module, those of the functions that call it (half the weight), and of their callers
-    (a quarter). A test file counts the names that stand in it, each by its rarity among the test files, and modules that it imports.
+    The words of a change are the names of its function, class and module, of the functions that call it (half the weight), and of their
+    callers (a quarter); and the words of the messages beside it. A test function counts those that stand in it, each by its rarity among
+    the tests, and adds a third of the count of its file.
     """
 
     def __init__(self, folder: Path) -> None:
-        files = sorted((folder / "tests").glob("test_*.py"))
-        self.words = {str(path.relative_to(folder)): set(WORD.findall(path.read_text("utf-8"))) for path in files}
-        self.frequency = Counter(word for words in self.words.values() for word in words)
+        self.files: dict[str, set[str]] = {}
+        self.tests: dict[str, set[str]] = {}
+        for path in sorted((folder / "tests").glob("test_*.py")):
+            file, text = str(path.relative_to(folder)), path.read_text("utf-8")
+            self.files[file] = set(WORD.findall(text)) | set(WORD.findall(path.stem.replace("_", " ")))
+            for node in ast.parse(text).body:
+                slow = isinstance(node, ast.FunctionDef) and any(
+                    "slow" in ast.unparse(one) for one in node.decorator_list
+                )
+                if isinstance(node, ast.FunctionDef) and node.name.startswith("test") and not slow:
+                    self.tests[f"{file}::{node.name}"] = set(
+                        WORD.findall(ast.unparse(node).replace("_", " ") + ast.unparse(node))
+                    )
+        self.frequency = Counter(word for words in self.tests.values() for word in words)
         self.trees = {
             str(p.relative_to(folder)): ast.parse(p.read_bytes()) for p in sorted((folder / "rotor").rglob("*.py"))
         }
@@ -101,14 +120,20 @@ class Selection:
                         name = one.id if isinstance(one, ast.Name) else getattr(one, "attr", "")
                         self.callers[name] |= {node.name, Path(file).stem}
 
-    def names(self, mutant: Mutant) -> dict[str, float]:
-        """Names of a change with their weights."""
-        inside = {mutant.file.removesuffix(".py").rpartition("/")[2]: 1.0, **dict.fromkeys(mutant.names, 1.0)}
+    def words(self, mutant: Mutant) -> dict[str, float]:
+        """Words of a change with their weights."""
+        stem = Path(mutant.file).stem
+        inside = {stem: 1.0, **dict.fromkeys(mutant.names, 1.0)}
+        messages: set[str] = set()
         for node in ast.walk(self.trees[mutant.file]):
-            if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.lineno <= mutant.line <= (
-                node.end_lineno or 0
-            ):
+            at_it = getattr(node, "lineno", 0) <= mutant.line <= (getattr(node, "end_lineno", 0) or 0)
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and at_it:
                 inside[node.name] = 1.0
+            if isinstance(node, ast.Raise | ast.If) and at_it:
+                texts = [
+                    one.value for one in ast.walk(node) if isinstance(one, ast.Constant) and isinstance(one.value, str)
+                ]
+                messages |= {word for text in texts for word in WORD.findall(text) if len(word) > 3}
         edge, weight = set(inside), 1.0
         for _ in range(2):
             weight /= 2
@@ -116,24 +141,28 @@ class Selection:
                 inside
             )
             inside |= dict.fromkeys(edge, weight)
-        return inside
+        for word in stem.strip("_").split("_"):
+            inside.setdefault(word, 0.4)
+        for word in messages:
+            inside.setdefault(word, 0.6)
+        return {name: weight for name, weight in inside.items() if len(name) > 2}
 
-    def files(self, mutant: Mutant) -> list[str]:
-        """The module itself, for its doctests, and the test files with a score, the highest first."""
-        names, folder = self.names(mutant), Path(mutant.file).parent.name
-        scores = {}
-        for file, words in self.words.items():
-            rarity = {
-                name: weight / (3 + self.frequency[name])
-                for name, weight in names.items()
-                if name in words and len(name) > 2
-            }
-            # a name's share falls with its rank: many callers do not outweigh the function
-            score = sum(value / (1 + rank) for rank, value in enumerate(sorted(rarity.values(), reverse=True)))
-            scores[file] = score + 0.02 * (Path(mutant.file).stem.strip("_") in file) + 0.001 * (folder in words)
-        best = sorted((file for file, score in scores.items() if score > 0), key=lambda file: -scores[file])
-        doctests = [mutant.file] if b">>>" in ast.unparse(self.trees[mutant.file]).encode() else []
-        return doctests + best
+    def ranked(self, mutant: Mutant) -> list[str]:
+        """The module itself, for its doctests, and the test functions with a score, the highest first."""
+        words = self.words(mutant)
+        of_file = {file: self.score(words, known) for file, known in self.files.items()}
+        scores = {
+            test: self.score(words, known) + of_file[test.split("::")[0]] / 3 for test, known in self.tests.items()
+        }
+        best = sorted((test for test, score in scores.items() if score > 0), key=lambda test: -scores[test])
+        return ([mutant.file] if ">>>" in ast.unparse(self.trees[mutant.file]) else []) + best
+
+    def score(self, words: dict[str, float], known: set[str]) -> float:
+        """How rare the words are that a text shares; each further one counts less, so that many callers do not outweigh the function."""
+        rare = sorted(
+            (weight / (2 + self.frequency[word]) for word, weight in words.items() if word in known), reverse=True
+        )
+        return sum(value / (1 + rank) for rank, value in enumerate(rare))
 
 
 def restored(folder: Path, files: Iterable[str]) -> None:
@@ -172,13 +201,13 @@ def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float) -> N
         if time.time() > until or (last and (last["result"] == "killed" or last["budget"] >= budget)):
             continue
         started = time.time()
-        files = [file for file in selection.files(mutant) if not last or file not in last["files"]]
+        tests = [test for test in selection.ranked(mutant) if not last or test not in last["tests"]]
         try:
             (folder / mutant.file).write_bytes(mutant.applied((folder / "original" / mutant.file).read_bytes()))
-            row = judged(folder, mutant, files, budget)
+            row = judged(folder, mutant, tests, budget)
         finally:
             restored(folder, [mutant.file])
-        row["files"] = (last["files"] if last else []) + row["files"]
+        row["tests"] = (last["tests"] if last else []) + row["tests"]
         append(
             folder / "results.jsonl",
             {"number": number, **row, "budget": budget, "wall": round(time.time() - started, 1)},
@@ -200,11 +229,11 @@ def finished(folder: Path) -> dict[int, dict[str, Any]]:
     return {row["number"]: row for row in rows(folder / "results.jsonl")}
 
 
-def judged(folder: Path, mutant: Mutant, files: list[str], budget: float) -> dict[str, Any]:
-    """Whether a test is red, the likeliest files first, up to the budget."""
+def judged(folder: Path, mutant: Mutant, tests: list[str], budget: float) -> dict[str, Any]:
+    """Whether a test is red, the likeliest first, up to the budget."""
     caches = stale_caches(folder, mutant) if mutant.compiled else {}
     before, ran = processor_time(), []
-    batches = [files[:2], *([file] for file in files[2:])]
+    batches = [tests[:FIRST], *(tests[k : k + NEXT] for k in range(FIRST, min(len(tests), MOST), NEXT))]
     try:
         for batch in filter(None, batches):
             left = budget - (processor_time() - before)
@@ -213,13 +242,14 @@ def judged(folder: Path, mutant: Mutant, files: list[str], budget: float) -> dic
             code = forked(folder, ["-x", *batch], left + (240 if mutant.compiled else 0))
             ran += batch
             if code == -signal.SIGXCPU and len(ran) > len(batch):
-                break  # the budget is over inside a later file: nothing is known
+                ran = ran[: -len(batch)]
+                break  # the budget is over inside a later batch: nothing is known
             if code not in (0, 5):
-                return {"result": "killed", "by": culprit(folder) if code > 0 else f"signal {-code}", "files": ran}
+                return {"result": "killed", "by": culprit(folder) if code > 0 else f"signal {-code}", "tests": ran}
     finally:
         for path, content in caches.items():
             path.write_bytes(content)
-    return {"result": "survived", "by": "", "files": ran}
+    return {"result": "survived", "by": "", "tests": ran}
 
 
 def check(folder: Path) -> list[str]:
@@ -272,7 +302,7 @@ def summary(folder: Path, mutants: list[Mutant]) -> str:
         mutant = mutants[row["number"]]
         if row["result"] != "killed":
             texts.append(f"{row['number']} {mutant.file}:{mutant.line} [{mutant.operator}] {mutant.before!r} -> {mutant.after!r} "
-                         f"({len(row['files'])} files: {' '.join(row['files'][:3])} ...)")  # fmt: skip
+                         f"({len(row['tests'])} tests: {' '.join(row['tests'][:3])} ...)")  # fmt: skip
     return "\n".join(texts)
 
 
@@ -310,16 +340,7 @@ def main() -> None:
     if given.check:
         print("red without a mutant:", check(folder))
     elif not given.survivors:
-        for library in (
-            "numpy",
-            "scipy.linalg",
-            "scipy.optimize",
-            "scipy.stats",
-            "numba",
-            "matplotlib.pyplot",
-            "pytest",
-            "hypothesis",
-        ):
+        for library in LIBRARIES:
             __import__(library)  # once, before children are forked
         run(folder, mutants, given.minutes, given.budget)
     print(summary(folder, mutants))
