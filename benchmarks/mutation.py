@@ -31,6 +31,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mutants import Mutant, sample
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -50,6 +51,12 @@ QUIET = (
 )
 
 
+NEAR = (
+    0.25,
+    0.1,
+    0.05,
+    0.08,
+)  # worth of an import of the module, its folder, the folder above; of a word in the file's name
 LIBRARIES = (
     "numpy", "scipy.linalg", "scipy.optimize", "scipy.stats", "scipy.interpolate", "numba", "matplotlib.pyplot", "pytest", "hypothesis",
     "typer", "ase.io", "ase.build", "rdkit.Chem.AllChem", "qutip", "mpmath", "pandas",
@@ -86,20 +93,32 @@ def prepared(folder: Path, checkout: Path, count: int, seed: int) -> list[Mutant
 # Which tests come first
 
 
+def imported(text: str) -> set[str]:
+    """Modules and names that a file imports, with their paths."""
+    out = set(re.findall(r"\brotor(?:\.\w+)+", text))
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            out |= {f"{node.module}.{one.name}" for one in node.names}
+    return out
+
+
 class Selection:
     """Test functions in the order in which they are likely to see a change.
 
     The words of a change are the names of its function, class and module, of the functions that call it (half the weight), and of their
     callers (a quarter); and the words of the messages beside it. A test function counts those that stand in it, each by its rarity among
-    the tests, and adds a third of the count of its file.
+    the tests, and adds a third of the count of its file,
+    and what the file imports beside the change.
     """
 
     def __init__(self, folder: Path) -> None:
         self.files: dict[str, set[str]] = {}
         self.tests: dict[str, set[str]] = {}
+        self.imports: dict[str, set[str]] = {}
         for path in sorted((folder / "tests").glob("test_*.py")):
             file, text = str(path.relative_to(folder)), path.read_text("utf-8")
             self.files[file] = set(WORD.findall(text)) | set(WORD.findall(path.stem.replace("_", " ")))
+            self.imports[file] = imported(text)
             for node in ast.parse(text).body:
                 slow = isinstance(node, ast.FunctionDef) and any(
                     "slow" in ast.unparse(one) for one in node.decorator_list
@@ -150,12 +169,22 @@ class Selection:
     def ranked(self, mutant: Mutant) -> list[str]:
         """The module itself, for its doctests, and the test functions with a score, the highest first."""
         words = self.words(mutant)
-        of_file = {file: self.score(words, known) for file, known in self.files.items()}
-        scores = {
-            test: self.score(words, known) + of_file[test.split("::")[0]] / 3 for test, known in self.tests.items()
-        }
+        of_file = {file: self.score(words, known) / 3 + self.near(mutant, file) for file, known in self.files.items()}
+        scores = {test: self.score(words, known) + of_file[test.split("::")[0]] for test, known in self.tests.items()}
         best = sorted((test for test, score in scores.items() if score > 0), key=lambda test: -scores[test])
         return ([mutant.file] if ">>>" in ast.unparse(self.trees[mutant.file]) else []) + best
+
+    def near(self, mutant: Mutant, file: str) -> float:
+        """How near the modules are that a test file imports: the module itself, its folder, the folder above."""
+        module = mutant.file.removesuffix(".py").replace("/", ".")
+        folder = module.rpartition(".")[0]
+        top = ".".join(module.split(".")[:2])
+        inside = [
+            any(name == part or name.startswith(f"{part}.") for name in self.imports[file])
+            for part in (module, folder, top)
+        ]
+        named = any(word in Path(file).stem.split("_") for word in module.split(".")[1:])
+        return float(np.dot([*inside, named], NEAR))
 
     def score(self, words: dict[str, float], known: set[str]) -> float:
         """How rare the words are that a text shares; each further one counts less, so that many callers do not outweigh the function."""

@@ -79,6 +79,9 @@ def test_correlation_functions_in_the_file_and_in_json(call, folder):
         assert abs(row["c2"] - c2) < 4 * row["c2_error"]
     start = short_time(ocs.moments_u_angstrom2, kt)
     assert printed["short_time_per_ps2"]["c1"] == pytest.approx(start.m2 / ASE_TIME_PS**2, rel=1e-12)
+    assert printed["short_time_per_ps2"]["c2"] == pytest.approx(
+        6 * kt / moment / ASE_TIME_PS**2, rel=1e-12
+    )  # l(l + 1) kT/I
     assert printed["c1_plateau"] == 0.0
     assert printed["vector_source"] == "the dipole"
     provenance = json.loads((folder / "ocs.csv.provenance.json").read_text(encoding="utf-8"))
