@@ -273,6 +273,8 @@ def judged(folder: Path, mutant: Mutant, tests: list[str], budget: float) -> dic
             if code == -signal.SIGXCPU and len(ran) > len(batch):
                 ran = ran[: -len(batch)]
                 break  # the budget is over inside a later batch: nothing is known
+            if code == -signal.SIGXCPU:
+                return {"result": "undecided", "by": "a loop without an end, or slow tests", "tests": []}
             if code not in (0, 5):
                 return {"result": "killed", "by": culprit(folder) if code > 0 else f"signal {-code}", "tests": ran}
     finally:

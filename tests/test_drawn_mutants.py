@@ -1,4 +1,4 @@
-"""Tests for mutants that others let pass (benchmarks/mutation.py, docs/validation/mutants_and_fuzz.md): each goes red for its mutant."""
+"""Tests for mutants that others let pass (benchmarks/mutation.py): each goes red for its mutant."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ def test_temperatures_beyond_molecules_are_refused(call, text):
 
 def test_a_folder_without_catalogues_is_named(call):
     Path("none").mkdir()
-    Path("s.txt").write_text("".join(f"{100000 + k} {np.exp(-((k - 50) ** 2)) + 0.01 * np.sin(7.0 * k):.6f}\n" for k in range(100)))
+    Path("s.txt").write_text(
+        "".join(f"{100000 + k} {np.exp(-((k - 50) ** 2)) + 0.01 * np.sin(7.0 * k):.6f}\n" for k in range(100))
+    )
     code, _, err = call("identify", "s.txt", "--catalogue", "none", "--width", "2")
     assert code == 2
     assert "none: no .cat file in this folder" in err
@@ -104,3 +106,69 @@ def test_a_cost_proportional_to_the_work_is_extrapolated_exactly():
     assert _extrapolated(lambda call: call(), lambda n: 10.0 + 3.0 * n, float, (4, 8), 6) == 28.0
     falling = _extrapolated(lambda call: call(), lambda n: 10.0 - n, float, (4, 8), 100)
     assert falling == 2.0  # noise of a clock: no cost falls with the work
+
+
+def test_the_steps_are_chosen_by_the_block_with_the_largest_population(monkeypatch):
+    """What hardly any molecule is in says little about the steps that the cosines need."""
+    from types import SimpleNamespace
+
+    from rotor.alignment import steps
+
+    weights = {"even": [0.1, 0.05], "odd": [0.5, 0.2], "none": None, "rest": [0.15]}
+    tasks = {
+        name: None if w is None else SimpleNamespace(name=name, weights=np.array(w), columns=np.arange(len(w)))
+        for name, w in weights.items()
+    }
+    monkeypatch.setattr(steps, "task_of", lambda problem, block, plan, before: tasks[block])
+    monkeypatch.setattr(steps, "Plan", lambda windows, passages: None)
+    problem = SimpleNamespace(m_values=lambda space: [0, 1], windows=(), begins_before=True)
+    space = SimpleNamespace(blocks=lambda m: list(weights) if m == 0 else [])
+    task, whole = steps.pilot_task(problem, space)
+    assert (task.name, whole) == ("odd", False)
+
+
+def test_a_line_is_seen_above_the_noise_and_above_half_its_height():
+    """Of three expected lines of 10, 10 and 4 σ the spectrum shows 8, 4 (less than half) and 2.5 σ (in the noise)."""
+    from rotor.observed.identify import _lines_seen
+    from rotor.observed.spectrum import ObservedSpectrum
+
+    expected, shown = np.zeros(40), np.zeros(40)
+    for channel, height, seen in ((5, 10.0, 8.0), (15, 10.0, 4.0), (25, 4.0, 2.5)):
+        expected[channel - 1 : channel + 2] = [0.5 * height, height, 0.5 * height]
+        shown[channel] = seen
+    spectrum = ObservedSpectrum(1e5 + np.arange(40.0), shown, np.ones(40))
+    assert _lines_seen(spectrum, expected) == (3, 1)
+
+
+def test_an_energy_of_the_only_state_moves_no_line():
+    """A parameter of code 0 beside B has no name in a top: the file is computed as it stands, and only energies move."""
+    from rotor.formats.spcat.fits.fit_input import _named_constants
+    from rotor.formats.spcat.predict import predict
+    from rotor.formats.spcat.text.int_file import read_int
+    from rotor.formats.spcat.text.par import read_par
+
+    expected = read_int(b"OCS\n 0 60503 1028.6 0 3 -9 -9 99 300\n 1 0.71519\n")
+    alone = predict(read_par(b"OCS\n 1 0 0 0\nl -1 1 0 0\n 100 6081.492 0\n"), expected)
+    file = read_par(b"OCS\n 2 0 0 0\nl -1 1 0 0\n 100 6081.492 0\n 0 29979.2458 0\n")
+    moved = predict(file, expected)
+    assert _named_constants(file) is None  # a fit takes the codes themselves
+    assert moved.catalogue.frequency_mhz == pytest.approx(
+        alone.catalogue.frequency_mhz, abs=1e-9
+    )  # round-off of 36 GHz
+    assert moved.catalogue.energy_lower_cm == pytest.approx(
+        alone.catalogue.energy_lower_cm + 1.0, abs=1e-4
+    )  # written with 4 digits
+
+
+@pytest.mark.parametrize(
+    ("status", "iterations", "goes_on"), [("stalled", 3, True), ("interrupted", 3, False), ("stalled", 20, False)]
+)
+def test_a_fit_tries_another_way_while_it_may(status, iterations, goes_on):
+    """Neither after Ctrl-C nor when its iterations are over."""
+    from types import SimpleNamespace
+
+    from rotor.fitting import strategies
+
+    search = SimpleNamespace(options=SimpleNamespace(most_iterations=20))
+    reached = {"stalled": strategies.STALLED, "interrupted": strategies.INTERRUPTED}[status]
+    assert strategies._is_open(search, SimpleNamespace(status=reached, iterations=[None] * iterations)) is goes_on
