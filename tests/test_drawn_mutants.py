@@ -31,7 +31,7 @@ def test_a_molecule_without_a_geometry_is_refused_by_assign(call):
 def test_temperatures_beyond_molecules_are_refused(call, text):
     code, out, err = call("info", "CO", "--temperature", text)
     assert (code, out) == (2, "")
-    assert "expected temperatures up to 1e+06 K" in err
+    assert "up to 1e+06 K; no molecule lasts beyond" in err
 
 
 def test_a_folder_without_catalogues_is_named(call):
@@ -172,3 +172,18 @@ def test_a_fit_tries_another_way_while_it_may(status, iterations, goes_on):
     search = SimpleNamespace(options=SimpleNamespace(most_iterations=20))
     reached = {"stalled": strategies.STALLED, "interrupted": strategies.INTERRUPTED}[status]
     assert strategies._is_open(search, SimpleNamespace(status=reached, iterations=[None] * iterations)) is goes_on
+
+
+@pytest.mark.parametrize(("jmax", "compared"), [(5, 5), (90, 30)])
+def test_the_truncation_of_a_torsion_is_compared_at_a_bounded_j(monkeypatch, jmax, compared):
+    """A plan of J = 90 would otherwise solve J = 90 twice before anything is computed."""
+    from types import SimpleNamespace
+
+    from rotor.quantum.internal_rotation import levels, truncation
+    from rotor.scenes.plan_parts import MOST_J_COMPARED, _torsional_parts
+
+    monkeypatch.setattr(levels, "turning_tops", lambda top, constants: None)
+    monkeypatch.setattr(truncation, "truncation_mhz", lambda model, j, vt_max, count: 1e-3 * j)
+    texts = dict(_torsional_parts(None, SimpleNamespace(functions=9, tops=1, vt_max=0), jmax))
+    assert MOST_J_COMPARED[1] == 30
+    assert texts["truncation"] == f"at most {1e-3 * compared:.1g} MHz at J = {compared}, v_t up to 0"
