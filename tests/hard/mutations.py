@@ -245,6 +245,51 @@ MUTATIONS = (
         "    counts, kinetic = (degrees.total,) * 3, Kinetic(kinetic.total_ev / 2, kinetic.total_ev / 2)\n",
         "tests/hard/test_safeguards.py::test_rotation_has_a_temperature_of_its_own",
     ),
+    Mutation(
+        20, "rotor/thermodynamics/classical_limit.py",
+        "(middle**3 / 100 + of_asymmetry)", "(middle**3 / 100)",
+        "tests/test_thermo_functions.py::test_the_next_quantum_correction_is_bounded",
+    ),
+    Mutation(
+        20, "rotor/thermodynamics/level_sums.py",
+        "    return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))", "    return 0 * tail",
+        "tests/test_thermo.py::test_error_is_below_what_was_asked",
+    ),
+    Mutation(
+        20, "rotor/thermodynamics/level_sums.py",
+        "        done = errors.max(axis=0) < enough[0]\n", "        done = errors.max(axis=0) < np.inf\n",
+        "tests/test_thermo.py::test_error_is_below_what_was_asked",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/truncation.py",
+        " - np.abs(np.transpose(powers)) @ np.array(radii)", "",
+        "tests/test_field_bounds.py::test_the_bound_in_small_cases",
+    ),
+    Mutation(
+        24, "rotor/alignment/align.py",
+        "        if given is not None:\n            raise BasisTooSmallError(", "        if given is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
+        "tests/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
+    ),
+    Mutation(
+        24, "rotor/alignment/steps.py",
+        "        if error <= goal:\n", "        if True:\n",
+        "tests/test_alignment.py::test_tolerance_is_kept_by_sequences_and_crossed_pulses",
+    ),
+    Mutation(
+        27, "rotor/classical/step_errors.py",
+        "if other.steps >= TRIPLED * motion.steps", "if other",
+        "tests/test_stated_bounds.py::test_cases_that_were_understated",
+    ),
+    Mutation(
+        29, "rotor/fluids/budgets.py",
+        "    if settings.every > 1:\n", "    if False:\n",
+        "tests/test_error_budgets.py::test_the_steps_of_a_fluid_are_counted_about_the_mean",
+    ),
+    Mutation(
+        30, "rotor/classical/free/budget.py",
+        "    if shift < 1.0:\n", "    if True:\n",
+        "tests/hard/test_hard_cases.py::test_flips_near_the_separatrix_are_not_claimed_after_1e10_periods",
+    ),
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""docs/hard_cases.md: 29 cases, and every test that it names exists."""
+"""docs/hard_cases.md: 38 cases, and every test that it names exists."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NAMED = re.findall(r"`((?:hard/)?test_\w+\.py)::(test_\w+)`", PAGE)
 
 
 def test_every_case_has_its_row():
-    assert [int(number) for number in re.findall(r"^\| (\d+)\*? ", PAGE, re.MULTILINE)] == list(range(1, 30))
+    assert [int(number) for number in re.findall(r"^\| (\d+)\*? ", PAGE, re.MULTILINE)] == list(range(1, 39))
 
 
 def test_every_test_named_exists():
