@@ -267,7 +267,8 @@ MUTATIONS = (
     ),
     Mutation(
         24, "rotor/alignment/align.py",
-        "        if given is not None:\n            raise BasisTooSmallError(", "        if given is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
+        "        if given is not None:\n            raise BasisTooSmallError(",
+        "        if given is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
         "tests/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
     ),
     Mutation(
