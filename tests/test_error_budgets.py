@@ -442,3 +442,17 @@ def test_steps_that_are_not_made_a_second_time_are_not_estimated(monkeypatch):
     term = answer_driven(request).errors.truncation
     assert term.value is None
     assert "not made a second time" in term.source
+
+
+def test_fixed_steps_longer_than_the_times_are_apart_have_an_error():
+    """A quarter of such a step makes the same motion: shorter ones are compared."""
+    from rotor.classical.driven import DrivenRequest, answer_driven, motion_of
+    from rotor.classical.effects.gravity import GravityAboutPivot
+    from rotor.classical.step_errors import apart
+
+    weight = GravityAboutPivot(1.0, (0.1, 0.2, 0.3), (0.0, 0.0, -1.0))
+    times = tuple(np.linspace(0.0, 3.0, 61).tolist())
+    request = DrivenRequest((1.0, 1.5, 2.0), times, (weight,), angular_velocity=(2.0, 1.0, -1.0), step=0.3)
+    answer = answer_driven(request)
+    actual = apart(answer.motion, motion_of(replace(request, step=None, tolerance=1e-14)))
+    assert 1e-12 < actual <= answer.errors.truncation.value < 3 * actual

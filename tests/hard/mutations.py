@@ -274,12 +274,12 @@ MUTATIONS = (
     Mutation(
         24, "rotor/alignment/steps.py",
         "        if error <= goal:\n", "        if True:\n",
-        "tests/test_alignment.py::test_tolerance_is_kept_by_sequences_and_crossed_pulses",
+        "tests/hard/test_safeguards.py::test_the_steps_of_a_pulse_are_halved_until_they_agree",
     ),
     Mutation(
         27, "rotor/classical/step_errors.py",
         "if other.steps >= TRIPLED * motion.steps", "if other",
-        "tests/test_stated_bounds.py::test_cases_that_were_understated",
+        "tests/test_error_budgets.py::test_fixed_steps_longer_than_the_times_are_apart_have_an_error",
     ),
     Mutation(
         29, "rotor/fluids/budgets.py",

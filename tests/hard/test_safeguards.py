@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from slow_matrix import watson_matrix
 
-from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2
+from rotor.alignment.align import align
+from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, GaussianPulse
+from rotor.alignment.steps import FIRST_STEPS
 from rotor.classical.lyapunov import body_flow, lyapunov_exponents
 from rotor.fluids.motion.thermometers import Kinetic, temperatures
 from rotor.molecules.molecule import Molecule
@@ -91,3 +93,11 @@ def test_rotation_has_a_temperature_of_its_own():
     """Case 29: rotations with 1.5 times the energy a degree of translations are 1.5 times as hot, not the mean of both."""
     hot = temperatures(Kinetic(3.0, 1.5 * 3.0), Degrees(bodies=10, translation=30, rotation=30))
     assert hot.rotation_k / hot.translation_k == pytest.approx(1.5, rel=1e-12)  # round-off
+
+
+def test_the_steps_of_a_pulse_are_halved_until_they_agree():
+    """Case 24: the first number of steps is far from enough for 1e-8, and what is found of the steps is within the tolerance."""
+    top = Top.from_constants("B=6081.492 MHz", polarizability_abc_angstrom3=((7.8, 0, 0), (0, 3.7, 0), (0, 0, 3.7)))
+    trace = align(top, GaussianPulse(3e12, 0.3), np.linspace(-1, 20, 5), temperature_k=2.0, tolerance=1e-8)
+    assert trace.step_error <= 1e-8
+    assert max(trace.steps) > FIRST_STEPS
