@@ -148,7 +148,6 @@ def test_constants_of_an_internal_rotor_on_the_command_line(call):
 @pytest.mark.parametrize(
     "command",
     [
-        ("stark", "--field", "0:50kV/cm:3"),
         ("zeeman", "--g", "0,0,0.1", "--field", "0:1T"),
         ("convert", "case.var"),
     ],
@@ -168,6 +167,15 @@ def test_a_plan_states_what_the_truncation_of_the_torsion_costs(acetaldehyde, ca
     assert code == 0
     assert "9 torsional functions for each K" in out
     assert re.search(r"truncation +at most \S+ MHz at J = 3", out)
+
+
+def test_a_stark_map_on_the_command_line_has_species(acetaldehyde, call):
+    code, out, _ = call("stark", str(acetaldehyde), "--field", "0:5kV/cm:3", "--states", "1")
+    assert code == 0
+    assert "E 0 1 0 1" in out
+    code, _, err = call("stark", str(acetaldehyde), "--field", "0:5kV/cm:3", "--states", "1", "--lines", "lines.csv")
+    assert code == 2
+    assert "lines in a field are not computed with internal rotation" in err
 
 
 def test_a_field_on_a_molecule_with_spins_is_refused_too(acetaldehyde, call):

@@ -172,6 +172,10 @@ def map_request(
     names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
     contractions = tuple(one for one in (dipole, light) if one is not None)
     space: Callable[[int], FieldSpace] = partial(field_space, top, contractions=contractions)
+    if top.internal_rotation is not None and not effects:
+        from rotor.quantum.fields.torsion_fields import torsion_field_space
+
+        space = partial(torsion_field_space, top, contractions=contractions)
     if effects:
         from rotor.quantum.fields.spin_fields import spin_field_space
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.torsion_fields import TorsionFieldBlock
 from rotor.quantum.fields.wang_blocks import WangBlockInField
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.symmetric_top_elements import coupling
@@ -61,6 +62,10 @@ def dipole_elements(up: FieldBlock, low: FieldBlock, dipole_abc: Sequence[float]
         return _of_axial(up, low if low.k == up.k else replace(low, k=up.k), float(dipole_abc[up.axis]))
     if isinstance(up, WangBlockInField) and isinstance(low, WangBlockInField):
         return _of_wang(up, low, body_tensor(dipole_abc, 1, up.space.representation))
+    if isinstance(low, TorsionFieldBlock):
+        raise ValueError(
+            "lines in a field are not computed with internal rotation; leave its constants out for those of a rigid top"
+        )
     raise ValueError("lines need states with a good M: a field along Z alone, or light along it")
 
 

@@ -154,7 +154,7 @@ def torsion_rotation_levels(
     ValueError
         For a top that is not asymmetric in the representation Iʳ.
     """
-    _refuse_axes(top)
+    refuse_axes(top)
     model = turning_tops(top, constants)
     blocks: list[TorsionBlock] = []
     quanta: dict[str, list[NDArray[Any]]] = {}
@@ -189,7 +189,7 @@ def energies_alone(
 
     Functions that lie above `below_mhz` with all that they couple to are left out.
     """  # fmt: skip
-    _refuse_axes(top)
+    refuse_axes(top)
     model, pieces, energies = turning_tops(top, constants), [], []
     for name in model.species:
         blocks = species_blocks(model, name, jmin, jmax, constants.functions)
@@ -236,7 +236,7 @@ def _table(
     )
 
 
-def _refuse_axes(top: Top) -> None:
+def refuse_axes(top: Top) -> None:
     """ValueError for a top whose constants are not those of an asymmetric one with a along z."""
     if top.kind != "asymmetric" or top.constants.representation != REPRESENTATION:
         raise ValueError(
