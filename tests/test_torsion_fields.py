@@ -64,7 +64,7 @@ def direct_product(sigma, m, jmax, strength, waves=10):
 def test_levels_in_a_field_are_those_of_the_direct_product(sigma, m):
     strength = 5000.0  # MHz/D: 10 kV/cm
     along = Contraction(DIPOLE, (0.0, 0.0, 1.0))
-    space = torsion_field_space(turning(vt_max=18, functions=20), 3, [along])
+    space = torsion_field_space(turning(vt_max=18, functions=20), 3, [along], together=True)
     blocks = [block for block in space.blocks(abs(m)) if block.species.name == "AE"[sigma]]
     if sigma:
         blocks = [block for block in blocks if block.m == m]
@@ -123,3 +123,16 @@ def test_maps_do_not_depend_on_the_frame():
 def test_a_field_at_an_angle_is_refused():
     with pytest.raises(ValueError, match="along Z alone"):
         rotor.api.stark_map(turning(), [1.0], j_highest=1, direction=(1.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_elements_between_torsional_states_move_levels_by_less_than_is_said(sigma):
+    strength = 503.4  # MHz/D: 1 kV/cm
+    along = Contraction(DIPOLE, (0.0, 0.0, 1.0))
+    lowest = []
+    for together in (True, False):
+        space = torsion_field_space(turning(v3=400.0, vt_max=1), 3, [along], together=together)
+        blocks = [block for block in space.blocks(1) if block.species.name == "AE"[sigma] and block.m == 1]
+        energies = [np.linalg.eigvalsh(np.diag(b.energies_mhz) - strength * b.matrix(along)) for b in blocks]
+        lowest.append(np.sort(np.concatenate(energies))[:15])
+    assert np.abs(lowest[0] - lowest[1]).max() < 0.1

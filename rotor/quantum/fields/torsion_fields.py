@@ -6,7 +6,8 @@ functions, and along Z (Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq
     ⟨J τ M|T^k_0|J' τ' M⟩ = (-1)^(J-M) (J k J'; -M 0 M) ⟨J τ‖T^k‖J' τ'⟩.
 
 No static field connects species. E levels are no pairs of parities: K has a sign, (σ, M) is like (-σ, -M), and the effect is linear.
-Left out are elements with states of v_t > vt_max: levels move by at most (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
+Maps leave out elements between states of different v_t, whose overlaps are small: levels move by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm
+for 1 D and 100 cm⁻¹.
 """
 
 from __future__ import annotations
@@ -70,8 +71,8 @@ class TorsionFieldBlock(FieldBlock):
 
     @property
     def label(self) -> str:
-        """Species, and for A the lowest level."""
-        return self.species.name if self.species.components > 1 else f"from {self.levels.label(int(self.rows[0]))}"
+        """The lowest level."""
+        return f"from {self.levels.label(int(self.rows[0]))}"
 
     @property
     def levels(self) -> FreeLevels:
@@ -103,12 +104,13 @@ class SpeciesInField:
 
     def matrix(self, contraction: Contraction, m: int, states: Ints) -> NDArray[np.complex128]:
         """A contraction along Z between chosen states of one M (n, n), Hermitian."""
-        j = self.quanta["j"][states].astype(float)
+        numbers, place = np.unique(self.quanta["j"][states], return_inverse=True)
+        j = numbers.astype(float)
         rank, space = contraction.rank, contraction.space
         size = space[2] if rank == 1 else (2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6)
         sign = np.where((j - m) % 2, -1.0, 1.0)
         projected = size * sign[:, None] * three_j(j[:, None], rank, j, -m, 0, m)
-        found = projected * self._reduced(contraction)[np.ix_(states, states)]
+        found = projected[np.ix_(place, place)] * self._reduced(contraction)[np.ix_(states, states)]
         found[np.diag_indices(len(states))] += contraction.scalar
         return np.asarray((found + found.conj().T) / 2)
 
@@ -147,29 +149,39 @@ class SpeciesInField:
 
 @dataclass(frozen=True)
 class TorsionFieldSpace(FieldSpace):
-    """Levels of every species with J up to J max; first: the row of the first level of each."""
+    """Levels of every species with J up to J max.
+
+    first: the row of the first level of each species. together: whether states of different v_t are solved together.
+    """
 
     levels: TorsionFreeLevels = field(repr=False)
     jmax: int
     species: tuple[SpeciesInField, ...] = field(repr=False)
     first: tuple[int, ...]
     contractions: tuple[Contraction, ...] = field(repr=False)
+    together: bool = False
 
     def blocks(self, m: int) -> list[FieldBlock]:
         """Connected states of ±M, M ≥ 0; of species with σ ≠ 0 those of M and of -M, each standing for (-σ, -M) too."""
         out: list[FieldBlock] = []
         for species, first in zip(self.species, self.first, strict=True):
-            present = np.flatnonzero(species.quanta["j"] >= m)
-            if not len(present):
-                continue
+            for vt in (-1,) if self.together else np.unique(species.quanta["vt"]).tolist():
+                out += self._blocks_of(species, first, m, vt)
+        return out
+
+    def _blocks_of(self, species: SpeciesInField, first: int, m: int, vt: int) -> list[FieldBlock]:
+        """Blocks of one species and v_t; of all v_t where it is -1."""
+        out: list[FieldBlock] = []
+        present = np.flatnonzero((species.quanta["j"] >= m) & ((vt < 0) | (species.quanta["vt"] == vt)))
+        if len(present):
             if species.components > 1:
+                signs = (1, -1) if m else (1,)
+                out += [TorsionFieldBlock(sign * m, 2, first + present, present, species, self) for sign in signs]
+            else:
                 out += [
-                    TorsionFieldBlock(sign * m, 2, first + present, present, species, self)
-                    for sign in ((1, -1) if m else (1,))
+                    TorsionFieldBlock(m, 2 if m else 1, first + states, states, species, self)
+                    for states in self._parts(species, present, m)
                 ]
-                continue
-            for states in self._parts(species, present, m):
-                out.append(TorsionFieldBlock(m, 2 if m else 1, first + states, states, species, self))
         return out
 
     def _parts(self, species: SpeciesInField, present: Ints, m: int) -> list[Ints]:
@@ -182,8 +194,10 @@ class TorsionFieldSpace(FieldSpace):
         return [present[part == number] for number in np.unique(part).tolist()]
 
 
-def torsion_field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> TorsionFieldSpace:
-    """The levels of a top with internal rotation up to J max, for fields along Z.
+def torsion_field_space(
+    top: Top, jmax: int, contractions: Sequence[Contraction], together: bool = False
+) -> TorsionFieldSpace:
+    """The levels of a top with internal rotation up to J max, for fields along Z; with `together` all v_t of a species in one block.
 
     Raises ValueError for fields at an angle with Z.
     """
@@ -210,7 +224,7 @@ def torsion_field_space(top: Top, jmax: int, contractions: Sequence[Contraction]
         names=tuple(model.species),
     )
     first = tuple(np.cumsum([0, *counts[:-1]]).tolist())
-    return TorsionFieldSpace(free, jmax, tuple(species), first, tuple(contractions))
+    return TorsionFieldSpace(free, jmax, tuple(species), first, tuple(contractions), together)
 
 
 def _turned(body: Floats, angle: float) -> Floats:
