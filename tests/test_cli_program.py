@@ -45,7 +45,10 @@ def test_debug_shows_where_a_mistake_was_found(call):
     assert call("spectrum", "no-such-molecule", "--debug") == (2, "", err)  # where one adds it after an error
 
 
-@pytest.mark.parametrize(("words", "found"), [("rotor spec", "spectrum"), ("rotor levels --uni", "--unit")])
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [("rotor spec", "spectrum"), ("rotor levels --uni", "--unit"), ("rotor levels formam", "formamide")],
+)
 def test_a_shell_can_complete_words(words, found):
     environment = os.environ | {
         "PYTHONPATH": str(ROOT), "_ROTOR_COMPLETE": "complete_bash", "COMP_WORDS": words,

@@ -125,13 +125,26 @@ def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]
 def _signature_of(one: Parameter) -> inspect.Parameter:
     kind: Any = bool if one.kind is bool else list[str] if one.many else str
     if not one.flag.startswith("-"):
-        default = typer.Argument(None, show_default=False, metavar=one.flag, help=f"{one.help}.")
+        words = molecules_and_files if one.flag == "SOURCE" else None
+        default = typer.Argument(None, show_default=False, metavar=one.flag, help=f"{one.help}.", autocompletion=words)
     else:
         names = f"{one.flag}/--no-{one.flag[2:]}" if one.off else one.flag
         settings: dict[str, Any] = {} if one.kind is bool else {"metavar": one.metavar}
         panel = f"{'' if one.common else '+'}{one.panel}"
         default = typer.Option(None, names, show_default=False, help=f"{one.help}.", rich_help_panel=panel, **settings)
     return inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
+
+
+def molecules_and_files(incomplete: str) -> list[str]:
+    """Names of the library and files that begin like a word, for a shell that completes it."""
+    from glob import escape, glob
+
+    from rotor.formats.molecules.library import names
+
+    files = [f"{path}/" if os.path.isdir(path) else path for path in glob(f"{escape(incomplete)}*")]
+    stems = {path.stem.casefold(): path.stem for path in names().values()}
+    known = {**{name: name for name in names() if " " not in name}, **stems}
+    return sorted(text for name, text in known.items() if name.startswith(incomplete.casefold())) + sorted(files)
 
 
 def _texts(by_name: Mapping[str, Parameter], typed: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
