@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
-from rotor.quantum.fields.torsion_fields import TorsionFieldBlock
 from rotor.quantum.fields.wang_blocks import WangBlockInField
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.symmetric_top_elements import coupling
@@ -62,6 +61,8 @@ def dipole_elements(up: FieldBlock, low: FieldBlock, dipole_abc: Sequence[float]
         return _of_axial(up, low if low.k == up.k else replace(low, k=up.k), float(dipole_abc[up.axis]))
     if isinstance(up, WangBlockInField) and isinstance(low, WangBlockInField):
         return _of_wang(up, low, body_tensor(dipole_abc, 1, up.space.representation))
+    from rotor.quantum.fields.torsion_fields import TorsionFieldBlock  # with all that internal rotation needs
+
     if isinstance(low, TorsionFieldBlock):
         raise ValueError(
             "lines in a field are not computed with internal rotation; leave its constants out for those of a rigid top"
