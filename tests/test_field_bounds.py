@@ -166,3 +166,19 @@ def test_the_basis_grows_until_its_error_is_within_the_tolerance():
     assert first is not None
     rough = [np.linalg.eigvalsh(first.T @ (fixed + x * terms[1]) @ first)[:4] for x in fields]
     assert np.abs(np.subtract(rough, whole)).max() > 1e-3
+
+
+def test_enough_free_states_are_taken_at_the_strongest_field():
+    """A chain of 150 states that a field spreads over: too few of them lower no energy as far as all do."""
+    size, tolerance = 150, 1e-3
+    fixed, slope = (
+        np.diag(0.3 * np.arange(size)),
+        np.diag(np.full(size - 1, 1.0), 1) + np.diag(np.full(size - 1, 1.0), -1),
+    )
+    problem, fields = BlockProblem(fixed, slope, {}), np.array([0.0, 250.0])
+    places = block_states.enough_states(problem, np.arange(size), 3, fields, tolerance)
+    whole = np.linalg.eigvalsh(fixed + 250.0 * slope)[:3]
+    inside = np.linalg.eigvalsh((fixed + 250.0 * slope)[np.ix_(places, places)])[:3]
+    assert np.abs(inside - whole).max() <= tolerance
+    few = block_states.enough_states(problem, np.arange(size), 3, fields, 1e9)
+    assert len(few) < len(places)

@@ -197,7 +197,7 @@ MUTATIONS = (
     Mutation(
         23, "rotor/quantum/fields/block_states.py",
         "max() <= PART_OF_TOLERANCE * tolerance_mhz:", "max() <= np.inf:",
-        "tests/test_field_bounds.py::test_stated_errors_are_bounds",
+        "tests/test_field_bounds.py::test_enough_free_states_are_taken_at_the_strongest_field",
     ),
     Mutation(
         23, "rotor/quantum/fields/solver.py",
