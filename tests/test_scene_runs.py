@@ -263,7 +263,7 @@ def test_a_sweep_is_every_combination():
         (LevelsScene(molecule="CO", sweep={"observables.j": [1]}), "[observables] has no key 'j'"),
         (LevelsScene(molecule="CO", sweep={"observables.jmax": []}), "expected at least one value"),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(csv="a.csv")),
+            LevelsScene(molecule="CO", sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(egy="a.egy")),
             "put {jmax} into its name",
         ),
         (
