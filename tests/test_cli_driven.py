@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotor.classical.driven import BODY_EFFECTS
+from rotor.classical.effects.torques import ConstantTorque
 from rotor.requests.field import all_fields
 
 CONTRACT = Path(__file__).resolve().parents[1] / "docs" / "command_line.md"
@@ -36,6 +37,13 @@ def test_every_effect_is_read_from_a_line_and_written_down_again():
         assert type(again) is type(effect)
         assert BODY_EFFECTS.write([again]) == tables
         assert BODY_EFFECTS.read(BODY_EFFECTS.line(effect))[0].__class__ is type(effect)
+
+
+def test_a_variant_of_an_effect_does_not_take_its_name():
+    class Doubled(ConstantTorque):
+        """A class of a user that states no name."""
+
+    assert BODY_EFFECTS.load()[Doubled.name] is ConstantTorque
 
 
 def test_the_contract_names_every_effect_and_parameter():

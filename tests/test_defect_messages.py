@@ -135,3 +135,14 @@ def test_an_int_file_has_a_temperature_above_0(call, case, temperature, basis):
     assert code == 2
     assert "TEMP" in err
     assert not Path("x.cat").exists()
+
+
+def test_an_intensity_that_underflows_has_a_bound(call, folder):
+    """At 1.8 mK the lines of CO from J = 1 on have exp(-3000) of the intensity of the first: no number on the screen is infinite."""
+    code, out, _ = call(
+        "spectrum", "CO", "--temperature", "0.0018K", "--min-lgint", "none", "--jmax", "3", "--csv", "a.csv"
+    )
+    assert code == 0
+    assert "inf" not in out.split("in order of frequency")[1].split("sources")[0]
+    assert out.count("<-300") == 2
+    assert "inf" not in (folder / "a.csv").read_text(encoding="utf-8").split("frequency_mhz")[1]

@@ -118,10 +118,13 @@ def frame_field() -> Any:
 
 
 def named_effects() -> dict[str, type[ClassicalEffect]]:
-    """Every effect that has a name, by it: those of `rotor.classical.effects`, and those of modules that are imported already."""
+    """Every effect that has a name, by it: those of `rotor.classical.effects`, and those of modules that are imported already.
+
+    A class without a name in its own body, such as a user's variant of a named effect, does not take the place of that effect.
+    """
     for path in sorted((Path(__file__).parent / "effects").glob("[a-z]*.py")):
         import_module(f"rotor.classical.effects.{path.stem}")
-    return {one.name: one for one in _subclasses(ClassicalEffect) if one.name}
+    return {kind.name: kind for kind in _subclasses(ClassicalEffect) if vars(kind).get("name")}
 
 
 def _subclasses(base: type[ClassicalEffect]) -> Iterator[type[ClassicalEffect]]:

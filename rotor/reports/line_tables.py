@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotor.reports.screen import Table
@@ -65,6 +66,13 @@ _COLUMNS = (
 )
 
 
+def _printed(value: float, form: str) -> str:
+    """A number of the table; nothing where it is not known, and a bound for the logarithm of an intensity that underflows."""
+    if math.isinf(value):
+        return "<-300"
+    return "" if math.isnan(value) else form.format(value)
+
+
 def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
     from rotor.quantum import quanta
@@ -73,9 +81,7 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     names = quanta.headings(lines.quanta_names)
     values = shown.columns
     present = [column for column in _COLUMNS if column.name in values]
-    cells = [
-        ["" if x != x else column.form.format(x) for x in values[column.name]] for column in present
-    ]  # nan: not known
+    cells = [[_printed(x, column.form) for x in values[column.name]] for column in present]
     headings = [column.heading for column in present]
     if depth is not None:
         headings.append("τ")

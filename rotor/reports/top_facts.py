@@ -202,5 +202,5 @@ def weights_text(mapping: Mapping[str, int]) -> str:
 
 def q_text(record: Mapping[str, Any], classical: bool = True) -> str:
     """Q and what is known about it; classical: whether the constants of the top give its classical limit."""
-    limit = f"; classical limit {record['classical']:.6g}" if classical else ""
+    limit = f"; classical limit {record['classical']:.6g}" if classical and record["classical"] else ""
     return f"{record['q']:.6g}, {record['source']}{limit}"

@@ -21,11 +21,17 @@ _KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
 def partition_facts(
     top: Top, partition: PartitionFunction, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> dict[str, Any]:
-    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md; both count the spins of the effects."""
+    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md; both count the spins of the effects.
+
+    No classical limit beside internal rotation: that of the rigid top has no torsional states.
+    """
+    classical = None
+    if top.internal_rotation is None:
+        classical = spin_functions(top, effects) * classical_partition_function(top, partition.temperature_k)
     return {
         "temperature_k": partition.temperature_k,
         "q": partition.q,
-        "classical": spin_functions(top, effects) * classical_partition_function(top, partition.temperature_k),
+        "classical": classical,
         "jmax": partition.jmax,
         "relative_error": partition.relative_error,
         "source": partition.source,

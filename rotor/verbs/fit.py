@@ -22,6 +22,7 @@ from rotor.formats.fit_request import (
     write_fitted_toml,
 )
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
@@ -258,8 +259,8 @@ def show(answer: FitAnswer, report: Report) -> None:
             show_table(_trial_table(what, trials))
     if answer.suggestions:
         show_table(_suggestion_table(fit, answer.suggestions))
-    if not far_off(fit):
-        show_facts([("lines", "none is more than 3 errors off")])
+    close = [] if far_off(fit) else [("lines", "none is more than 3 errors off")]
+    show_facts([*close, *error_facts(report.content)])
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
