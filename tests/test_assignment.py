@@ -199,7 +199,7 @@ def redrawn(peaks: PeakList, seed: int) -> PeakList:
     return peak_list(f, peaks.intensity, peaks.uncertainty_mhz, band_mhz=peaks.band_mhz)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_redrawn_frequencies_hold_no_species(seed: int) -> None:
     assert answer_assign(AssignRequest(redrawn(spectrum(), seed), seconds=120)).word == "not found"
 

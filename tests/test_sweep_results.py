@@ -11,6 +11,13 @@ from rotor.scenes.scene_file import parse_scene
 from rotor.scenes.sweep import run_sweep
 
 MEASURED = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,20000.0,0.01\n2,1,40000.0,0.01\n3,2,60000.0,0.01\n"
+FAMILY = """name = "carbon monoxide"
+[geometry]
+atoms = [["C", 0.0, 0.0, 0.0], ["O", 0.0, 0.0, 1.13]]
+[[isotopologue]]
+name = "CO"
+constants = "B=57635.968 MHz"
+"""
 SMALL = {
     "assign": ('spectrum = { file = "peaks.csv" }\n', {"species", "peaks", "unexplained"}),
     "spectrum": ('molecule = "CO"\n[numerics]\njmax = 2\n', {"lines", "strongest_mhz", "strongest_lgint", "q", "jmax"}),
@@ -31,6 +38,12 @@ SMALL = {
     "torsion": (
         'molecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n',
         {"barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2", "cv_over_r"},
+    ),
+    "info": ('molecule = "water"\n', {"a_mhz", "b_mhz", "c_mhz", "mass_u", "kappa"}),
+    "isotopologues": ('molecule = "water"\n', {"isotopologues"}),
+    "structure": (
+        '[observables]\nmethod = ["r0"]\n[family]\nfile = "family.toml"\n',
+        {"coordinates", "rms_u_angstrom2"},
     ),
     "tumble": ('molecule = "water"\n', {"energy", "period", "turning_rate"}),
     "gas": ('molecule = "water"\n[numerics]\nmolecules = 100\n', {"p_value", "chi2"}),
@@ -61,6 +74,7 @@ def test_every_kind_is_here():
 @pytest.mark.parametrize("kind", SMALL)
 def test_a_point_of_each_kind_has_its_results(folder, kind):
     Path("lines.csv").write_text(MEASURED)
+    Path("family.toml").write_text(FAMILY)
     Path("peaks.csv").write_text("".join(f"{7000 + 131.7 * n**1.5:.3f},{1 + n % 5}\n" for n in range(20)))
     text, names = SMALL[kind]
     result = run_sweep(parse_scene(f'schema = 1\nkind = "{kind}"\ntitle = "a"\nsweep = {{ title = ["b"] }}\n{text}'))

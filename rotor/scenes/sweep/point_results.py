@@ -122,8 +122,25 @@ def _assign(answer: Any) -> Numbers:
     return numbers | ({"probability": facts["species"][0]["probability"]} if facts["species"] else {})
 
 
+def _info(answer: Any) -> Numbers:
+    """Rotational constants, mass and Ray's parameter."""
+    facts = answer.facts()
+    constants = dict(zip(("a_mhz", "b_mhz", "c_mhz"), facts["rotational_constants_mhz"], strict=True))
+    return constants | {name: facts[name] for name in ("mass_u", "kappa")}
+
+
+def _isotopologues(answer: Any) -> Numbers:
+    return {"isotopologues": len(answer.facts()["isotopologues"])}
+
+
+def _structure(answer: Any) -> Numbers:
+    """How many coordinates there are, and the residuals of the fit of r0 where one was made."""
+    fitted = answer.facts()["r0"]
+    return {"coordinates": len(answer.table)} | ({"rms_u_angstrom2": fitted["rms_u_angstrom2"]} if fitted else {})
+
+
 _RESULTS: Mapping[str, Callable[[Any], Numbers]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _field_map, "zeeman": _field_map,
     "align": _align, "fit": _fit, "emission": _emission, "gas": _gas, "fluid": _fluid, "tumble": _tumble, "torsion": _torsion,
-    "assign": _assign,
+    "assign": _assign, "info": _info, "isotopologues": _isotopologues, "structure": _structure,
 }  # fmt: skip
