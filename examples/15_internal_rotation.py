@@ -113,4 +113,4 @@ figure.tight_layout()
 # %% [markdown]
 # What is left follows from terms that are not free here: the barrier that changes with J and K, V6, the next orders. With 77 constants
 # 8587 lines of v_t = 0 and 1 up to J = 20 come within three errors of the catalogue, all but 3 % of them
-# ([docs/internal_rotation.md](../docs/internal_rotation.md)).
+# (`docs/internal_rotation.md`).
