@@ -5,9 +5,12 @@ A case is a function of a seed. Angles in rad, energies in MHz, Q relative, cosi
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from typing import NamedTuple
 
+import mpmath
 import numpy as np
+from test_free_proof import DIGITS, Truth
 
 import rotor
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -276,7 +279,101 @@ def fluid(seed: int) -> Case:
     return Case(stated, actual, answer.errors.rounding.value)
 
 
+def free_body(rng: np.random.Generator) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Ascending moments and an angular momentum, one in five within 1e-9 of the unstable axis."""
+    moments = np.sort(10 ** rng.uniform(-1, 1, 3))
+    rates = rng.normal(size=3)
+    if rng.random() < 0.2:
+        rates[[0, 2]] *= 1e-9
+    return tuple(moments.tolist()), tuple((moments * rates).tolist())
+
+
+def tumble(seed: int) -> Case:
+    """Attitude of a free body after up to 1e6 units of time, its axes in any cyclic order, against the closed form to 50 digits."""
+    from rotor.classical.tumble import TumbleRequest, answer_tumble
+
+    rng = rng_of(14, seed)
+    moments, momentum = free_body(rng)
+    times, shift = (0.0, 10 ** rng.uniform(-1, 6)), int(rng.integers(3))
+    turned = [tuple(np.roll(numbers, shift).tolist()) for numbers in (moments, momentum)]
+    answer = answer_tumble(TumbleRequest(*turned, times=times))
+    with mpmath.workdps(DIGITS):
+        true = Truth(moments, momentum).at(times[1])[1]
+        scalar, *vector = answer.table.attitude[-1].tolist()
+        actual = angle_apart(true, (scalar, *np.roll(vector, -shift).tolist()))
+    return Case(answer.errors.numerical, actual, answer.errors.rounding.value)
+
+
+def angle_apart(true, found) -> float:
+    """The angle between two attitudes, rad; the difference of quaternions that are close is half of it."""
+    same = 1 if mpmath.fdot(true, found) > 0 else -1
+    return float(2 * mpmath.sqrt(sum((one - same * other) ** 2 for one, other in zip(true, found, strict=True))))
+
+
+def gas(seed: int) -> Case:
+    """C1 and C2 of a few molecules against the closed form to 50 digits, or their temperature against exact sums, by turns."""
+    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+
+    rng = rng_of(15, seed)
+    top, kelvin, count = random_top(rng, linear=0.0), 10 ** rng.uniform(0.5, 3), int(rng.integers(2, 6))
+    times = (0.0, 10 ** rng.uniform(-1, 3)) if seed % 2 else None
+    answer = answer_gas(GasRequest(top, count, kelvin, seed, times_ps=times))
+    actual = temperature_apart(answer) if times is None else curves_apart(answer)
+    return Case(answer.errors.numerical, actual, answer.errors.rounding.value)
+
+
+def temperature_apart(answer) -> float:
+    """Departure of the temperature from that of the molecules as they were drawn, summed as fractions, K."""
+    from rotor.classical.gas.ensembles import thermal_ensemble
+
+    request = answer.request
+    top, rng = request.top, np.random.default_rng(request.seed)
+    start = thermal_ensemble(top.moments_u_angstrom2, request.kt, request.molecules, rng=rng, mass=top.mass_u)
+    moments = [Fraction(one) for one in top.moments_u_angstrom2]
+    rows = start.momentum.tolist()
+    energy = sum(Fraction(part) ** 2 / moment for row in rows for part, moment in zip(row, moments, strict=True))
+    true = energy / (3 * request.molecules * Fraction(request.kt))
+    found = np.mean([degree.mean for degree in answer.test.degrees])
+    return request.temperature_k * abs(float(Fraction(float(found)) - true))
+
+
+def curves_apart(answer) -> float:
+    """Largest departure of C1 and C2 from those of the same molecules by their exact motion."""
+    from rotor import units
+    from rotor.classical.gas.ensembles import Probe, thermal_momenta
+
+    request, probes = answer.request, answer.probes
+    moments, curves = request.top.moments_u_angstrom2, answer.correlations
+    (source,) = np.random.default_rng([request.seed, 1]).spawn(1)
+    momenta, probe = (
+        thermal_momenta(moments, request.kt, request.molecules, rng=source),
+        Probe.of(probes.vector, probes.tensor),
+    )
+    with mpmath.workdps(DIGITS):
+        late = mpmath.mpf(request.times_ps[1]) / mpmath.mpf(units.ASE_TIME_PS)
+        vector = mpmath.matrix(probe.vector.tolist())
+        tensor = mpmath.matrix((probe.axes.T @ np.diag(probe.beta) @ probe.axes).tolist())
+        first = second = mpmath.mpf(0)
+        for momentum in momenta:
+            turn = matrix_of(Truth(tuple(moments), tuple(momentum)).at(late)[1])
+            first += (vector.T * turn * vector)[0]
+            rotated = turn * tensor * turn.T
+            second += sum(tensor[i, k] * rotated[i, k] for i in range(3) for k in range(3))
+        count = request.molecules
+        return float(max(abs(first / count - float(curves.c1[1])), abs(second / count - float(curves.c2[1]))))
+
+
+def matrix_of(quaternion):
+    """The rotation of a unit quaternion, scalar first, to all digits."""
+    w, x, y, z = quaternion
+    return mpmath.matrix([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
 CASES: dict[str, Callable[[int], Case]] = {
     "driven": driven, "spins": spins, "thermo": thermo, "field_map": field_map, "magnetic_map": magnetic_map, "aligned": aligned,
-    "emission": emission, "torsion": torsion, "fluid": fluid, "fitted": fitted,
+    "emission": emission, "torsion": torsion, "fluid": fluid, "fitted": fitted, "tumble": tumble, "gas": gas,
 }  # fmt: skip

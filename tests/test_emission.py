@@ -161,3 +161,22 @@ def test_a_library_molecule_in_a_band():
     seen = emission(lines, source, source_grid(low, high, source))
     assert 0 < seen.brightness_k.max() < 17.0
     assert list(seen.columns) == ["frequency_mhz", "optical_depth", "brightness_k"]
+
+
+def test_a_line_beyond_the_edge_shows_its_wing():
+    """A range that begins one half width above the centre of CO 1-0, against a range that holds the line."""
+    from rotor.spectra.emission_request import EmissionRequest, answer_emission
+
+    source, half = Source(1e16, 20.0, 10.0), 115271.2 * 5.0 / 299792.458
+    edge = 115271.2021 + half
+    molecule = rotor.read("CO")
+    part, whole = (
+        answer_emission(EmissionRequest((molecule,), (source,), (low, 115300.0))) for low in (edge, 115200.0)
+    )
+    assert len(part.lines) == 0
+    assert part.peak is None
+    there = np.interp(part.spectrum.frequency_mhz, whole.spectrum.frequency_mhz, whole.spectrum.brightness_k)
+    assert part.spectrum.brightness_k[0] == pytest.approx(0.5 * whole.peak.brightness_k, rel=0.1)  # thin at its centre
+    assert (
+        np.abs(part.spectrum.brightness_k - there).max() < 0.01 * whole.peak.brightness_k
+    )  # of the grid, 8 points a width

@@ -1,6 +1,7 @@
 """Error budgets of fits: constants in standard errors, predicted frequencies in MHz, with a confidence that is met."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -43,7 +44,11 @@ def test_constants_and_predictions_have_the_same_terms():
     assert lines.data.value == pytest.approx(sigma)
     assert lines.truncation.value == pytest.approx(sigma * constants.truncation.value)
     assert constants.statistics.value == pytest.approx(1 / math.sqrt(2 * fit.degrees_of_freedom))
-    assert lines.model.value == pytest.approx(0.01 * constants.model.value)
+    assert constants.model.value == lines.model.value == 0.0
+    assert constants.model.source.startswith(
+        f"no misfit: reduced chi {fit.reduced_chi:.3g}; its scatter would hide one"
+    )
+    assert "left out" not in lines.line()
 
 
 def test_a_model_that_misses_the_lines_is_the_largest_error():
@@ -52,6 +57,23 @@ def test_a_model_that_misses_the_lines_is_the_largest_error():
     fit = fit_lines(co_lines(np.random.default_rng(2))[1], rigid, parameters(rigid, ["B"]))
     assert next(iter(dict(constants_budget(fit).shown()))) == "left out"
     assert constants_budget(fit).model.value == pytest.approx(fit.reduced_chi, rel=1e-3)
+
+
+def test_a_misfit_is_stated_where_it_is_significant():
+    """Of 300 fits of the right model one in 40 by chance; with lines off by 1.5 errors more, in most."""
+    stated = {0.0: [], 1.5: []}
+    for extra, terms in stated.items():
+        for seed in range(300):
+            rng = np.random.default_rng([28, seed])
+            lines = co_lines(rng, count=30)[1]
+            off = replace(lines, frequency_mhz=lines.frequency_mhz + 0.01 * extra * rng.normal(size=30))
+            budget = predictions_budget(fit_lines(off, CO, parameters(CO, ["B", "D"])))
+            terms.append(budget.model.value)
+    assert (
+        np.mean(np.array(stated[0.0]) > 0) < 0.07
+    )  # χ² of 28 degrees of freedom is above its mean by two deviations in 3.6 %
+    assert np.mean(np.array(stated[1.5]) > 0) > 0.95
+    assert np.median(stated[1.5]) == pytest.approx(0.015, rel=0.2)  # MHz
 
 
 def test_what_nothing_checks_is_not_estimated():

@@ -113,7 +113,7 @@ class Truth:
         return self.g / own * t + self.sign * (drift + angle)
 
     def at(self, t):
-        t = mp.mpf(float(t))
+        t = mp.mpf(t)
         if self.steady:
             size = mp.sqrt(sum(w * w for w in self.omega))
             if not size:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import rotor
 from rotor.spectra import profiles, spectrum
 from rotor.spectra.spectrum import Spectrum, line_widths, resolving_grid
+from rotor.tops.top import Top
 
 SHAPES = [
     {"profile": "gaussian", "fwhm_mhz": 300.0},
@@ -145,3 +146,19 @@ def test_csv_holds_the_columns_and_where_they_are_from(lines, tmp_path):
 def test_columns_of_unlike_length_are_refused():
     with pytest.raises(ValueError, match="both must be"):
         Spectrum(np.zeros(3), np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    "shape", [{"profile": "lorentzian", "fwhm_mhz": 20.0}, {"profile": "gaussian", "fwhm_mhz": 300.0}]
+)
+def test_lines_beyond_the_edges_of_a_range_show_their_wings(shape):
+    """CO between its lines, against the same part of a wider range; the list itself has no line there."""
+    from rotor.spectra.request import SpectrumRequest, answer_spectrum
+
+    top = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11, 0, 0))
+    answer = answer_spectrum(SpectrumRequest(top, range_mhz=(115_400.0, 115_900.0), **shape))
+    grid = answer.spectrum.frequency_mhz
+    whole = Spectrum.from_lines(answer_spectrum(SpectrumRequest(top)).lines, grid, **shape)
+    assert len(answer.lines) == 0
+    assert answer.spectrum.intensity.max() > 0
+    assert np.allclose(answer.spectrum.intensity, whole.intensity, rtol=0, atol=1e-6 * whole.intensity.max())

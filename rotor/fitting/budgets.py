@@ -7,7 +7,7 @@ standard error, since (JᵀJ)⁻¹ is the covariance (Cauchy and Schwarz).
 |---|---|---|
 | rounding | √Σ (δν/σ_i)², δν of the energies | δν, and that times σ(ν) |
 | truncation | twice the step that would follow: the last ones halve it at least | that times σ(ν) |
-| model | √(χ²/f - 1) of f degrees of freedom, at least what its scatter √(2/f) hides | that times the error of a line |
+| model | √(χ²/f - 1) where χ²/f, f degrees of freedom, is two deviations √(2/f) above 1; else 0 | times the error of a line |
 | data | 1: the errors of the lines | σ(ν) |
 | statistics | 1/√(2f): errors from the scatter of the lines are known no better | that times σ(ν) |
 """
@@ -23,6 +23,7 @@ from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
 CONFIDENCE = 0.95
+SIGNIFICANT = 2.0  # standard deviations of χ²/f above 1: by chance in 2 % of fits
 CONSTANTS = "constants"
 TIGHTER, LINES = "a smaller tolerance of the search", "more lines, or more precise ones"
 UNCHECKED = "as many frequencies as constants: nothing checks the model"
@@ -76,7 +77,13 @@ def _misfit(fit: Fit, line: float) -> ErrorTerm:
     free = fit.degrees_of_freedom
     if not free:
         return ErrorTerm(None, UNCHECKED, LINES)
-    excess = max(fit.reduced_chi**2 - 1.0, math.sqrt(2.0 / free))
+    excess, scatter = fit.reduced_chi**2 - 1.0, math.sqrt(2.0 / free)
+    if excess <= SIGNIFICANT * scatter:
+        hidden = math.sqrt(max(excess, 0.0) + SIGNIFICANT * scatter)
+        return ErrorTerm(
+            0.0,
+            f"no misfit: reduced chi {fit.reduced_chi:.3g}; its scatter would hide one below {hidden:.2g} errors of a line",
+        )
     return ErrorTerm(
         line * math.sqrt(excess),
         f"misfit of the lines beyond their errors, reduced chi {fit.reduced_chi:.3g}",

@@ -22,7 +22,9 @@ def error_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _text(term: ErrorTerm, unit: str, kind: str) -> str:
-    if not term.value:
+    if term.value is None:
         return term.text(unit)
+    if not term.value:
+        return f"{'exact' if kind == 'bound' else 'none'} ({term.source})"
     remedy = f"; {term.remedy} would lower it" if term.remedy else ""
     return f"{term.value:.2g} {unit}".rstrip() + f", {kind}: {term.source}{remedy}"

@@ -330,20 +330,25 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     grid = source_grid(*request.range_mhz, request.narrowest)
     parts = tuple(emission(lines, source, grid) for lines, source in zip(emitted, request.sources, strict=True))
     tables = [
-        _line_table(request.names, number, lines, source)
+        _line_table(request, number, lines, source)
         for number, (lines, source) in enumerate(zip(emitted, request.sources, strict=True))
     ]
     return EmissionAnswer(request, together(parts), parts, _joined(tables), emitted)
 
 
-def _line_table(names: tuple[str, ...], number: int, lines: EmittedLines, source: Source) -> EmissionLines:
-    observed, depth = lines.frequency_mhz * source.frequency_ratio, peak_depth(lines, source)
+def _line_table(request: EmissionRequest, number: int, emitted: EmittedLines, source: Source) -> EmissionLines:
+    """The lines whose centre is in the range; those beyond its edges show their wings alone."""
+    first, last = request.range_mhz
+    centres = emitted.frequency_mhz * source.frequency_ratio
+    rows = np.flatnonzero((centres >= first) & (centres <= last))
+    lines, observed = emitted.where(rows), centres[rows]
+    depth = peak_depth(lines, source)
     contrast = source.filling * contrast_k(observed, source)
     integral = np.array([_across(one) for one in depth]) * source.fwhm_km_s
     return EmissionLines(
-        names=names,
+        names=request.names,
         molecule=np.full(len(depth), number, dtype=np.int64),
-        row=np.arange(len(depth)),
+        row=rows,
         frequency_mhz=lines.frequency_mhz,
         observed_mhz=observed,
         energy_upper_k=lines.energy_upper_k,

@@ -29,6 +29,7 @@ from rotor.spectra.profiles import gaussian
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
+EDGE_WIDTHS = 5.0  # beyond the edges of a range: a Gaussian is down to exp(-69) there
 BELOW = 1e-3  # of the least optical depth: lines of less are not computed
 BETWEEN = 1.25  # the sum of Gaussians between their centres over that at a centre: 1.07 of two lines, 1.22 of many
 
@@ -133,7 +134,7 @@ def emitted_lines(
     least_depth: float,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> EmittedLines:
-    """Lines of a molecule whose centre is observed in a range and whose optical depth there is large enough.
+    """Lines of a molecule whose optical depth is large enough and whose profile is observed in a range, at least its wing.
 
     Parameters
     ----------
@@ -156,7 +157,10 @@ def emitted_lines(
     ValueError
         For a catalogue whose Q(T) does not reach to the temperature.
     """
-    first, last = (ν / source.frequency_ratio for ν in range_mhz)
+    widths = EDGE_WIDTHS * source.fwhm_km_s / KM_PER_S
+    first, last = (
+        ν / source.frequency_ratio * (1 + wing) for ν, wing in zip(range_mhz, (-widths, widths), strict=True)
+    )
     if isinstance(molecule, CatalogueLines):
         return _of_catalogue(molecule, source, (first, last), least_depth)
     return _of_top(molecule, source, (first, last), least_depth, tuple(effects))

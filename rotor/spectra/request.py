@@ -6,6 +6,7 @@ The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` is 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -238,10 +239,22 @@ class SpectrumAnswer(TextOf):
 
         first, last = self.request.range_mhz
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
-        grid = resolving_grid(self.lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
-        made = Spectrum.from_lines(self.lines, grid, **shape)
+        lines = self._lines_of_profile(shape)
+        grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
+        made = replace(Spectrum.from_lines(lines, grid, **shape), lines=self.lines)
         layer = self.request.layer
         return made if layer is None else optical_depth(made, layer.pressure_bar, layer.path_cm)
+
+    def _lines_of_profile(self, shape: Mapping[str, Any]) -> Lines:
+        """The lines of the list, and those centred beyond the edges of a finite range whose wings reach into it."""
+        from rotor.spectra.spectrum import reach_at
+
+        first, last = self.request.range_mhz
+        if type(self.request) is not SpectrumRequest or not math.isfinite(last):
+            return self.lines
+        below, above = reach_at((first, last), self.lines, **shape)
+        wider = replace(self.request, range_mhz=(max(first - below, 0.0), last + above))
+        return answer_spectrum(wider).lines
 
     def strongest(self, count: int) -> Ints:
         """Rows of the `count` most intense lines, in order of frequency."""

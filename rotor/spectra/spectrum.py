@@ -7,8 +7,8 @@ with I_i the integrated absorption in nm² MHz, so that σ is the absorption cro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -180,6 +180,21 @@ def resolving_grid(
     follow = lines.frequency_mhz[near, None] + width[near, None] * arm
     grid = np.unique(np.concatenate([np.linspace(first, last, _BACKGROUND), follow.ravel()]))
     return np.asarray(grid[(grid >= first) & (grid <= last)])
+
+
+def reach_at(
+    frequency_mhz: Sequence[float], lines: Lines, *, profile: str, fwhm_mhz: float | None
+) -> tuple[float, ...]:
+    """How far the profile of a line at each frequency reaches, MHz; lines: whose temperature and mass give Doppler's width.
+
+    >>> from rotor.spectra.lines import line_list
+    >>> from rotor.tops.top import Top
+    >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=1)
+    >>> [round(one, 1) for one in reach_at([1e5], lines, profile="gaussian", fwhm_mhz=10.0)]
+    [30.3]
+    """
+    probes = replace(lines, frequency_mhz=np.asarray(frequency_mhz, dtype=np.float64))
+    return tuple(_shape(probes, profile, fwhm_mhz).reach(_fraction(profile, None)).tolist())
 
 
 def _arm(reach: float) -> Floats:

@@ -1,8 +1,8 @@
 """Error budget of a classical gas (`rotor.requests.budget`): of C1 and C2 where there are times, else of the temperature.
 
 The kinetic energy of f N independent degrees of freedom has the relative variance 2/(f N), and the temperature that it shows with it. Free
-motion is exact at any time: an attitude is rounded by `ROUNDING` of the angle that has been turned, and C1 and C2, of slope 1 and 3/2 at
-most in that angle, by no more than twice as much.
+motion is exact at any time: an attitude is rounded as `rotor.classical.free.budget` states, with times converted from ps, and C1 and C2,
+of slope 1 and 3/2 at most in that angle, by no more than twice as much.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from statistics import NormalDist
 from typing import Any
 
 from rotor import units
+from rotor.classical.free.budget import attitude_rounding
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 EXACT_MOTION = ErrorTerm(0.0, "free motion in closed form")
@@ -51,7 +52,7 @@ def _of_curves(answer: Any) -> ErrorBudget:
     return ErrorBudget(
         of="C1 and C2",
         unit="",
-        rounding=ErrorTerm(2 * ROUNDING * (1 + turned), "attitudes at the last time"),
+        rounding=ErrorTerm(2 * attitude_rounding(turned, converted=True), "attitudes at the last time"),
         truncation=EXACT_MOTION,
         model=LEFT_OUT,
         data=ErrorTerm(None, "uncertainties of the constants are not carried to correlation functions"),

@@ -48,7 +48,7 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
         In rad.
     """
     turned = _fastest(motion) * last
-    rounding = EVALUATED + (DOUBLED + (2 * EPS if converted else 0.0)) * turned
+    rounding = attitude_rounding(turned, converted)
     how = "times and momentum converted from other units" if converted else "phases in two doubles"
     return ErrorBudget(
         of="attitude",
@@ -59,6 +59,11 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
         data=_data(motion, last, growth_rate),
         statistics=ErrorTerm(0.0, "nothing is sampled"),
     )
+
+
+def attitude_rounding(turned: float, converted: bool) -> float:
+    """Rounding of an attitude in rad after an angle; converted: whether times and momenta came in other units."""
+    return EVALUATED + (DOUBLED + (2 * EPS if converted else 0.0)) * turned
 
 
 def _fastest(motion: FreeMotion) -> float:
