@@ -26,7 +26,7 @@ PAGE, PICTURES = ROOT / "docs" / "accuracy.md", ROOT / "docs" / "pictures"
 
 HEAD = """# Accuracy and what it costs
 
-Made by `python benchmarks/accuracy.py`, from the functions behind [`rotor accuracy`](command_line.md#rotor-accuracy), which does the
+Made by `python benchmarks/accuracy.py`, from the functions behind [`rotor accuracy`](verbs/accuracy.md), which does the
 same for a scene of yours. Every picture shows error against processor time, without start-up and compilation; a setting stands
 beside its point, the usual one has a ring, and an open point shows no difference from the reference. Errors are numerical: the
 constants are taken as given, except where measured lines are named. Times are of one core of a shared machine: their ratios

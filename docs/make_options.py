@@ -1,4 +1,4 @@
-"""Write docs/options.md, the reference of the inputs of every declared verb: option, key of a scene, name in Python, unit and default.
+"""Write docs/options.md, the reference of the inputs of every verb: option, key of a scene, name in Python, unit and default.
 
 python docs/make_options.py          writes the page
 python docs/make_options.py --check  exit code 1 where the page is stale
@@ -8,38 +8,49 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
-from rotor.cli.shared.command import parameters_of
+import typer
+
+from rotor import cli
 from rotor.requests.field import PANELS, Field
 from rotor.verbs.names import declared_verbs, verb_of
-from rotor.verbs.verb import Verb
 
+EVERYWHERE = {"--json", "--save-scene", "--errors", "--sources", "--help", "--help-all"}
 PAGE = Path(__file__).parent / "options.md"
 HEAD = """# Options, keys and names
 
 One declaration makes the option of the command line, the key of a scene file and the argument in Python; this page is made from it
 (`python docs/make_options.py`). A number takes any unit of its kind. What every verb has besides: `--json FILE`, `--save-scene FILE`,
-`--help`, `--help-all`.
+`--errors`, `--sources`, `--help`, `--help-all`. A switch such as `--hyperfine` has its opposite, `--no-hyperfine`.
 """
 
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "".join(section(verb_of(name)) for name in declared_verbs())
+    return HEAD + "".join(section(name, command) for name, command in commands().items())
 
 
-def section(verb: Verb) -> str:
-    """The tables of one verb."""
-    fields = [one for one in verb.options.values() if one.name not in ("errors", "sources")]
-    rows = [*map(row, sorted(fields, key=lambda one: PANELS.index(one.heading) if one.heading in PANELS else 0))]
-    shown = {one.flag for one in fields}
+def commands() -> dict[str, Any]:
+    """The commands of the verbs, in the order of the help."""
+    application: Any = typer.main.get_command(cli._application())
+    return dict(application.commands)
+
+
+def section(name: str, command: Any) -> str:
+    """The table of one verb: declared inputs first, then what the command takes besides."""
+    verb = verb_of(name) if name in declared_verbs() else None
+    fields = [field for field in verb.options.values() if field.name not in ("errors", "sources")] if verb else []
+    rows = [*map(row, sorted(fields, key=lambda field: PANELS.index(field.heading) if field.heading in PANELS else 0))]
+    shown = {field.flag for field in fields} | EVERYWHERE
     rows += [
-        f"| `{one.flag}` | | | {cell(one.help)} |"
-        for one in parameters_of(verb)
-        if one.flag not in shown and one.flag not in ("--json", "--save-scene", "--errors", "--sources")
+        f"| `{option.opts[0]}` | | | {cell(option.help or '')} |"
+        for option in command.params
+        if option.param_type_name == "option" and not option.hidden and option.opts[0] not in shown
     ]
     head = "| option | key | in Python | |\n|---|---|---|---|\n"
-    return f"\n## {verb.name}\n\n{verb.about}\n\n{head}" + "\n".join(rows) + "\n"
+    about = verb.about if verb else (command.help or "").split("\n\n")[0].strip()
+    return f"\n## {name}\n\n{about}\n" + (f"\n{head}" + "\n".join(rows) + "\n" if rows else "")
 
 
 def row(one: Field) -> str:

@@ -25,7 +25,7 @@ sys.path.insert(0, str(DOCS / "site"))
 CONTENTS = {
     "Start": ["quick_start", "coming_from", "limitations", "conventions"],
     "Notebooks": ["notebooks/*"],
-    "Command line": ["command_line", "rotor_*"],
+    "Command line": ["command_line", "options", "verbs/*"],
     "Subjects": [],  # all pages of docs/ that no other part names
     "Data": ["library", "spcat_codes", "spin_weights"],
     "Validation": ["validation/*"],
@@ -39,20 +39,19 @@ def prepare(folder: Path) -> None:
     (folder / "api").mkdir()
     for page in sorted(DOCS.glob("*.md")):
         text = page.read_text(encoding="utf-8")
-        (folder / page.name).write_text(
-            on_the_site(_shared_part(text) if page.stem == "command_line" else text), encoding="utf-8"
-        )
+        (folder / page.name).write_text(on_the_site(text), encoding="utf-8")
     (folder / "validation").mkdir()
     for page in sorted((DOCS / "validation").glob("*.md")):
         (folder / "validation" / page.name).write_text(one_level_down(page.read_text("utf-8")), encoding="utf-8")
+    (folder / "verbs").mkdir()
+    for verb in verbs():
+        (folder / "verbs" / f"{verb}.md").write_text(one_level_down(verb_page(verb)), encoding="utf-8")
     (folder / "conventions.md").write_text(
         on_the_site((ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")), encoding="utf-8"
     )
     shutil.copytree(DOCS / "pictures", folder / "pictures")
     for notebook in sorted((ROOT / "examples").glob("[0-9][0-9]_*.ipynb")):
         shutil.copy(notebook, folder / "notebooks")
-    for verb in verbs():
-        (folder / f"rotor_{verb}.md").write_text(on_the_site(verb_page(verb)), encoding="utf-8")
     write_reference(folder / "api")
     with (folder / "index.md").open("a", encoding="utf-8") as index:
         index.write(contents(folder))
@@ -61,15 +60,13 @@ def prepare(folder: Path) -> None:
 def on_the_site(text: str) -> str:
     """Links that lead out of docs/ turned to where their target stands on the site."""
     text = re.sub(r"\]\((?:\.\./)?examples/(\d\d_\w+)\.py\)", r"](notebooks/\1.ipynb)", text)
-    text = re.sub(r"\]\(command_line\.md#rotor-(\w+)\)", r"](rotor_\1.md)", text)
     text = re.sub(r"\]\((?:\.\./)?CONVENTIONS\.md\)", "](conventions.md)", text)
     text = re.sub(r"\]\(docs/", "](", text)
     return re.sub(r"\[([^\]]+)\]\(\.\./[^)]*\)", r"\1", text)  # files that are not on the site: their name remains
 
 
 def one_level_down(text: str) -> str:
-    """Links of a page of docs/validation: to pages and pictures of the site, elsewhere the name of the file alone."""
-    text = re.sub(r"\]\(\.\./command_line\.md#rotor-(\w+)\)", r"](../rotor_\1.md)", text)
+    """Links of a page of docs/validation or docs/verbs: to pages and pictures of the site, elsewhere the name of the file alone."""
     text = re.sub(r"\]\(\.\./\.\./CONVENTIONS\.md\)", "](../conventions.md)", text)
     return re.sub(r"\[([^\]]+)\]\(\.\./\.\./[^)]*\)", r"\1", text)
 
@@ -97,24 +94,12 @@ def verbs() -> list[str]:
     return list(typer.main.get_command(cli._application()).commands)
 
 
-def _shared_part(text: str) -> str:
-    """docs/command_line.md without the parts that have pages of their own."""
-    first, *others = re.split(r"(?=^## )", text, flags=re.MULTILINE)
-    shared = "".join(part for part in others if not part.startswith("## rotor "))
-    verb_list = "\n".join(f"- [rotor {verb}](rotor_{verb}.md)" for verb in verbs())
-    return f"{first}{shared}\n## The verbs\n\n{verb_list}\n"
-
-
 def verb_page(verb: str) -> str:
-    """The part of docs/command_line.md about a verb, then its help as the command prints it."""
-    text = (DOCS / "command_line.md").read_text(encoding="utf-8")
-    found = re.search(rf"^## rotor {verb}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
-    if not found:
-        raise ValueError(
-            f"docs/command_line.md has no part '## rotor {verb}': write it, since the command has that verb"
-        )
-    body = re.sub("^###", "##", found.group(1), flags=re.MULTILINE)
-    return f"# rotor {verb}\n{body}\n## Help\n\n```text\n{_help(verb)}```\n"
+    """docs/verbs/VERB.md, then the help as the command prints it."""
+    page = DOCS / "verbs" / f"{verb}.md"
+    if not page.exists():
+        raise ValueError(f"docs/verbs/{verb}.md is missing: write it, since the command has that verb")
+    return f"{page.read_text(encoding='utf-8')}\n## Help\n\n```text\n{_help(verb)}```\n"
 
 
 def _help(verb: str) -> str:

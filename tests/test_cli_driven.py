@@ -1,4 +1,4 @@
-"""`rotor tumble --effect` keeps the contract of docs/command_line.md; its numbers against closed forms."""
+"""`rotor tumble --effect` keeps the contract of docs/verbs/tumble.md; its numbers against closed forms."""
 
 import json
 import math
@@ -11,7 +11,7 @@ from rotor.classical.driven import BODY_EFFECTS
 from rotor.classical.effects.torques import ConstantTorque
 from rotor.requests.field import all_fields
 
-CONTRACT = Path(__file__).resolve().parents[1] / "docs" / "command_line.md"
+CONTRACT = Path(__file__).resolve().parents[1] / "docs" / "verbs" / "tumble.md"
 BODY = ("tumble", "--moments", "1,2,3", "--omega", "0.1,1,0")
 LINES = {  # each effect once, as it stands on the command line
     "constant torque": "vector=0.1,0,0 frame=space",
@@ -52,7 +52,7 @@ def test_a_variant_of_an_effect_does_not_take_its_name():
 
 
 def test_the_contract_names_every_effect_and_parameter():
-    text = CONTRACT.read_text(encoding="utf-8").partition("## rotor tumble")[2].partition("\n## ")[0]
+    text = CONTRACT.read_text(encoding="utf-8")
     rows = {line.split("|")[1].strip(" `"): line.split("|")[2] for line in text.splitlines() if line.startswith("| `")}
     for name, kind in package_effects().items():
         assert all(f"`{one.last}`" in rows[name] for one in all_fields(kind).values()), name

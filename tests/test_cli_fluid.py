@@ -1,4 +1,4 @@
-"""`rotor fluid` on the command line: the contract of docs/command_line.md."""
+"""`rotor fluid` on the command line: the contract of docs/verbs/fluid.md."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""`rotor gas` keeps its contract: docs/command_line.md."""
+"""`rotor gas` keeps its contract: docs/verbs/gas.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`rotor levels` and its files keep their contract: docs/command_line.md."""
+"""`rotor levels` and its files keep their contract: docs/verbs/levels.md."""
 
 from __future__ import annotations
 

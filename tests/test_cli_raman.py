@@ -1,4 +1,4 @@
-"""`rotor raman`, and the gas in `rotor spectrum`: what docs/command_line.md promises."""
+"""`rotor raman`, and the gas in `rotor spectrum`: what docs/verbs/raman.md promises."""
 
 from __future__ import annotations
 

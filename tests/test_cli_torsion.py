@@ -1,4 +1,4 @@
-"""`rotor torsion`: what docs/command_line.md promises."""
+"""`rotor torsion`: what docs/verbs/torsion.md promises."""
 
 from __future__ import annotations
 

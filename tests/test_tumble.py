@@ -1,4 +1,4 @@
-"""`rotor tumble` keeps its contract: docs/command_line.md."""
+"""`rotor tumble` keeps its contract: docs/verbs/tumble.md."""
 
 import csv
 import json

@@ -182,7 +182,7 @@ class AlignAnswer(TextOf):
         return cosines_budget(trace, every_limit(trace.top, max(trace.ensemble.jmax, 1), effects))
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table, by the keys of docs/verbs."""
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
         return {
             **top_facts(trace.top),

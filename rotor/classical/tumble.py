@@ -113,7 +113,7 @@ class TumbleRequest:
         return equal.get((low == middle, middle == high), "asymmetric")
 
     def about(self) -> dict[str, Any]:
-        """Kind and notes of the body, by the keys of docs/command_line.md."""
+        """Kind and notes of the body, by the keys of docs/verbs."""
         return {"kind": self.kind, "notes": list(self.notes), "temperature_k": None}
 
     @property
@@ -169,7 +169,7 @@ class TumbleAnswer(TextOf):
         return attitude_budget(self.motion, last, self.stability.growth_rate, converted=factors != (1.0, 1.0))
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table, by the keys of docs/verbs."""
         request, units = self.request, self.request.units
         return {
             **request.about(),

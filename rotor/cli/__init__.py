@@ -1,6 +1,6 @@
 """The command line: one file a verb; what they share is in `inputs`, `report` and `output`.
 
-docs/command_line.md is the contract: options, columns, JSON keys, error texts, exit codes. Nothing heavy is imported
+docs/command_line.md and docs/verbs are the contract: options, columns, JSON keys, error texts, exit codes. Nothing heavy is imported
 before a verb has looked at what it was given.
 """
 

@@ -125,7 +125,7 @@ def filtered(lines: Catalogue, range_: str | None, min_lgint: str | None) -> Cat
 
 
 def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
-    """What the lines are, by the keys of docs/command_line.md."""
+    """What the lines are, by the keys of docs/verbs."""
     import numpy as np
 
     import rotor

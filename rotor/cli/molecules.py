@@ -66,7 +66,7 @@ def _paths(name: str | None) -> list[Path]:
 
 
 def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
-    """What a molecule file says, by the keys of docs/command_line.md. symmetry: whether the point group of the geometry is looked for."""
+    """What a molecule file says, by the keys of docs/verbs. symmetry: whether the point group of the geometry is looked for."""
     from rotor.formats.molecules.molecule_file import read_molecule_file
 
     file = read_molecule_file(path)

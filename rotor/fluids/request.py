@@ -167,7 +167,7 @@ class FluidAnswer(TextOf):
         return temperature_budget(self.record, self.request.settings, degrees.total, len(bodies), self._means)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table, by the keys of docs/verbs."""
         bodies, degrees, _ = self._count
         rms, drift = conserved(self.record)
         return {

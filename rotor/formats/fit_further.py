@@ -102,7 +102,7 @@ def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[
 
 
 def trial_record(trial: Trial) -> dict[str, Any]:
-    """A trial by the keys of docs/command_line.md."""
+    """A trial by the keys of docs/verbs."""
     return {
         "name": trial.name,
         "added": trial.added,

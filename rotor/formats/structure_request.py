@@ -129,7 +129,7 @@ class StructureAnswer:
         return found
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the structures, by the keys of docs/command_line.md."""
+        """Everything about the structures, by the keys of docs/verbs."""
         family = self.request.file.family
         return {
             "name": family.name,

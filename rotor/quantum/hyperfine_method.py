@@ -79,7 +79,7 @@ def used_method(levels: Levels) -> Used | None:
 
 
 def hyperfine_facts(top: Top, levels: Levels) -> dict[str, Any] | None:
-    """Method, estimate and tolerance by the keys of docs/command_line.md; None for levels without spins."""
+    """Method, estimate and tolerance by the keys of docs/verbs; None for levels without spins."""
     if not any(effect.spins(top) for effect in levels.effects):
         return None
     return asdict(used_method(levels) or Used(EXACT, 0.0, TOLERANCE_MHZ))

@@ -147,7 +147,7 @@ class LevelsAnswer(TextOf):
         return levels_budget(request.top, levels, self.table.rows, limits)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table, by the keys of docs/verbs."""
         request = self.request
         return {
             **top_facts(request.top),

@@ -34,7 +34,7 @@ def begin(command: str, text: str) -> dict[str, Any]:
 
 
 def describe(top: Top, text: str, command: str) -> dict[str, Any]:
-    """Everything about a top but its partition function, by the keys of docs/command_line.md."""
+    """Everything about a top but its partition function, by the keys of docs/verbs."""
     return {**begin(command, text), **top_facts(top)}
 
 

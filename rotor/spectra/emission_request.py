@@ -284,7 +284,7 @@ class EmissionAnswer(TextOf):
         return brightness_budget(self)
 
     def facts(self) -> dict[str, Any]:
-        """Everything but the tables, by the keys of docs/command_line.md."""
+        """Everything but the tables, by the keys of docs/verbs."""
         request, layer, peak = self.request, self.request.sources[0], self.peak
         return {
             "molecules": [self._molecule_facts(number) for number in range(len(request.molecules))],

@@ -148,7 +148,7 @@ class RamanAnswer(TextOf):
         return frequencies_budget(lines.levels, limits, lines.cross_section_cm2_per_sr, errors, source, "shifts")
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table of lines, by the keys of docs/verbs."""
         lines = self.lines
         return {
             **top_facts(lines.top),

@@ -294,7 +294,7 @@ class SpectrumAnswer(TextOf):
         return frequencies_budget(lines.levels, limits, lines.intensity_nm2_mhz, lines.error_mhz, lines.errors_from)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table of lines, by the keys of docs/verbs."""
         lines, layer = self.lines, self.request.layer
         found = {
             **top_facts(lines.top),

@@ -137,7 +137,7 @@ class GasAnswer(TextOf):
         return gas_budget(self)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table, by the keys of docs/verbs."""
         request, test = self.request, self.test
         one = count_degrees([request.top.moments_u_angstrom2])
         half_kt = 0.5 * test.kt * units.CM_PER_EV

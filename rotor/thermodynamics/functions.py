@@ -74,7 +74,7 @@ class ThermoFunctions(Table):
     jmax, relative_error: of the sums (-1 where the
     classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
     vibrational states are given. gas: with translation. hyperfine: how
-    spins were counted, by the keys of docs/command_line.md; None without spins.
+    spins were counted, by the keys of docs/verbs; None without spins.
     """
 
     top: Top

@@ -79,7 +79,7 @@ class InfoAnswer:
         return PartitionRows(self.partition)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the top, by the keys of docs/command_line.md."""
+        """Everything about the top, by the keys of docs/verbs."""
         found = {**top_facts(self.request.top), **self.sizes, "partition_function": list(self.partition)}
         return found | ({} if self.request.conformers is None else {"conformers": list(self.conformers)})
 

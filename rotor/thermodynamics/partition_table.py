@@ -21,7 +21,7 @@ _KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
 def partition_facts(
     top: Top, partition: PartitionFunction, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> dict[str, Any]:
-    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md; both count the spins of the effects.
+    """Q at one temperature beside its classical limit, by the keys of docs/verbs; both count the spins of the effects.
 
     No classical limit beside internal rotation: that of the rigid top has no torsional states.
     """

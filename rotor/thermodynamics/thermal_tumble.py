@@ -31,7 +31,7 @@ class MolecularTumble(TumbleRequest):
     temperature_k: float | None = None
 
     def about(self) -> dict[str, Any]:
-        """Everything about the top, by the keys of docs/command_line.md."""
+        """Everything about the top, by the keys of docs/verbs."""
         assert self.top is not None
         return {**top_facts(self.top), "temperature_k": self.temperature_k}
 

@@ -232,7 +232,7 @@ class TorsionAnswer(TextOf):
         )
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its tables, by the keys of docs/command_line.md."""
+        """Everything about the answer but its tables, by the keys of docs/verbs."""
         torsion, potential = self.torsion, self.torsion.potential
         moments = units.ROTATIONAL_MHZ_U_ANGSTROM2 / torsion.sampled()[1]
         wells, levels = torsion.wells(), self.levels

@@ -154,7 +154,7 @@ def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
 
 
 def json_of(spectrum: ObservedSpectrum) -> dict[str, Any]:
-    """The spectrum by the keys of docs/command_line.md."""
+    """The spectrum by the keys of docs/verbs."""
     import numpy as np
 
     return {

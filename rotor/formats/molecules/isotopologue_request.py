@@ -95,7 +95,7 @@ class IsotopologuesAnswer:
         return [f"{', '.join(labels)}: {text}" for text, labels in about.items()]
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the isotopologues, by the keys of docs/command_line.md."""
+        """Everything about the isotopologues, by the keys of docs/verbs."""
         return {"name": self.request.top.name or None, "isotopologues": [record(one) for one in self.family]}
 
 
@@ -132,7 +132,7 @@ def _substitution(text: str) -> tuple[str, str]:
 
 
 def record(one: Isotopologue) -> dict[str, Any]:
-    """One isotopologue by the keys of docs/command_line.md."""
+    """One isotopologue by the keys of docs/verbs."""
     top, symmetry = one.top, one.top.symmetry
     return {
         "formula": one.formula,

@@ -118,7 +118,7 @@ def _rank(limit: Limit) -> float:
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
-    """Sizes of effects and what is left out at one J, by the keys of docs/command_line.md.
+    """Sizes of effects and what is left out at one J, by the keys of docs/verbs.
 
     Parameters
     ----------

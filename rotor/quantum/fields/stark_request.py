@@ -152,7 +152,7 @@ class StarkAnswer(TextOf):
         return map_budget(self.states, limits, joined_data(*terms))
 
     def facts(self) -> Mapping[str, Any]:
-        """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table of states, by the keys of docs/verbs."""
         fields, request = self.states.fields, self.request
         return {
             **top_facts(request.top),

@@ -157,7 +157,7 @@ class ZeemanAnswer(TextOf):
         return map_budget(self.states, limits, joined_data(moment, constants_term(request.top, effects, j)))
 
     def facts(self) -> Mapping[str, Any]:
-        """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
+        """Everything about the answer but its table of states, by the keys of docs/verbs."""
         fields, request, magnetic = self.states.fields, self.request, self.request.magnetic
         return {
             **top_facts(request.top),
