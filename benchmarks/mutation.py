@@ -15,7 +15,6 @@ Which changes there are, and what is left out: mutants.py.
 from __future__ import annotations
 
 import argparse
-import ast
 import json
 import math
 import os
@@ -23,6 +22,7 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import sys
 import time
 from collections import Counter, defaultdict
@@ -31,12 +31,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mutants import Mutant, sample
+from mutation_ranking import WORD, Selection
+from mutation_session import Session, Unpatchable
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
-WORD = re.compile(r"\w+")
+ENOUGH, TRIED, GROUP = 5, 40, 40  # tests that reach a mutant; tests tried for it; tests of a fork
 FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",
@@ -51,12 +52,6 @@ QUIET = (
 )
 
 
-NEAR = (
-    0.25,
-    0.1,
-    0.05,
-    0.08,
-)  # worth of an import of the module, its folder, the folder above; of a word in the file's name
 LIBRARIES = (
     "numpy", "scipy.linalg", "scipy.optimize", "scipy.stats", "scipy.interpolate", "numba", "matplotlib.pyplot", "pytest", "hypothesis",
     "typer", "ase.io", "ase.build", "rdkit.Chem.AllChem", "qutip", "mpmath", "pandas",
@@ -90,110 +85,6 @@ def prepared(folder: Path, checkout: Path, count: int, seed: int) -> list[Mutant
     return [Mutant(**{**row, "names": tuple(row["names"])}) for row in rows(drawn)]
 
 
-# Which tests come first
-
-
-def imported(text: str) -> set[str]:
-    """Modules and names that a file imports, with their paths."""
-    out = set(re.findall(r"\brotor(?:\.\w+)+", text))
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            out |= {f"{node.module}.{one.name}" for one in node.names}
-    return out
-
-
-class Selection:
-    """Test functions in the order in which they are likely to see a change.
-
-    The words of a change are the names of its function, class and module, of the functions that call it (half the weight), and of their
-    callers (a quarter); and the words of the messages beside it. A test function counts those that stand in it, each by its rarity among
-    the tests, and adds a third of the count of its file,
-    and what the file imports beside the change.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.files: dict[str, set[str]] = {}
-        self.tests: dict[str, set[str]] = {}
-        self.imports: dict[str, set[str]] = {}
-        for path in sorted((folder / "tests").glob("test_*.py")):
-            file, text = str(path.relative_to(folder)), path.read_text("utf-8")
-            self.files[file] = set(WORD.findall(text)) | set(WORD.findall(path.stem.replace("_", " ")))
-            self.imports[file] = imported(text)
-            for node in ast.parse(text).body:
-                slow = isinstance(node, ast.FunctionDef) and any(
-                    "slow" in ast.unparse(one) for one in node.decorator_list
-                )
-                if isinstance(node, ast.FunctionDef) and node.name.startswith("test") and not slow:
-                    self.tests[f"{file}::{node.name}"] = set(
-                        WORD.findall(ast.unparse(node).replace("_", " ") + ast.unparse(node))
-                    )
-        self.frequency = Counter(word for words in self.tests.values() for word in words)
-        self.trees = {
-            str(p.relative_to(folder)): ast.parse(p.read_bytes()) for p in sorted((folder / "rotor").rglob("*.py"))
-        }
-        self.callers: dict[str, set[str]] = defaultdict(set)
-        for file, tree in self.trees.items():
-            for node in ast.walk(tree):
-                if isinstance(node, ast.FunctionDef):
-                    for one in ast.walk(node):
-                        name = one.id if isinstance(one, ast.Name) else getattr(one, "attr", "")
-                        self.callers[name] |= {node.name, Path(file).stem}
-
-    def words(self, mutant: Mutant) -> dict[str, float]:
-        """Words of a change with their weights."""
-        stem = Path(mutant.file).stem
-        inside = {stem: 1.0, **dict.fromkeys(mutant.names, 1.0)}
-        messages: set[str] = set()
-        for node in ast.walk(self.trees[mutant.file]):
-            at_it = getattr(node, "lineno", 0) <= mutant.line <= (getattr(node, "end_lineno", 0) or 0)
-            if isinstance(node, ast.FunctionDef | ast.ClassDef) and at_it:
-                inside[node.name] = 1.0
-            if isinstance(node, ast.Raise | ast.If) and at_it:
-                texts = [
-                    one.value for one in ast.walk(node) if isinstance(one, ast.Constant) and isinstance(one.value, str)
-                ]
-                messages |= {word for text in texts for word in WORD.findall(text) if len(word) > 3}
-        edge, weight = set(inside), 1.0
-        for _ in range(2):
-            weight /= 2
-            edge = {caller for name in edge if len(self.callers[name]) < 40 for caller in self.callers[name]} - set(
-                inside
-            )
-            inside |= dict.fromkeys(edge, weight)
-        for word in stem.strip("_").split("_"):
-            inside.setdefault(word, 0.4)
-        for word in messages:
-            inside.setdefault(word, 0.6)
-        return {name: weight for name, weight in inside.items() if len(name) > 2}
-
-    def ranked(self, mutant: Mutant) -> list[str]:
-        """The module itself, for its doctests, and the test functions with a score, the highest first."""
-        words = self.words(mutant)
-        of_file = {file: self.score(words, known) / 3 + self.near(mutant, file) for file, known in self.files.items()}
-        scores = {test: self.score(words, known) + of_file[test.split("::")[0]] for test, known in self.tests.items()}
-        best = sorted((test for test, score in scores.items() if score > 0), key=lambda test: -scores[test])
-        return ([mutant.file] if ">>>" in ast.unparse(self.trees[mutant.file]) else []) + best
-
-    def near(self, mutant: Mutant, file: str) -> float:
-        """How near the modules are that a test file imports: the module itself, its folder, the folder above."""
-        module = mutant.file.removesuffix(".py").replace("/", ".")
-        folder = module.rpartition(".")[0]
-        top = ".".join(module.split(".")[:2])
-        inside = [
-            any(name == part or name.startswith(f"{part}.") for name in self.imports[file])
-            for part in (module, folder, top)
-        ]
-        named = any(word in Path(file).stem.split("_") for word in module.split(".")[1:])
-        return float(np.dot([*inside, named], NEAR))
-
-    def score(self, words: dict[str, float], known: set[str]) -> float:
-        """How rare the words are that a text shares; each further one counts less, so that many callers do not outweigh the function."""
-        rare = sorted(
-            (weight / (2 + self.frequency[word]) for word, weight in words.items() if word in known), reverse=True
-        )
-        return sum(value / (1 + rank) for rank, value in enumerate(rare))
-
-
 def restored(folder: Path, files: Iterable[str]) -> None:
     """The files of the copy as they were, with their dates: compiled kernels are stored under these."""
     for file in files:
@@ -218,39 +109,157 @@ def forked(folder: Path, arguments: list[str], seconds: float) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
+class Fresh:
+    """A process with the libraries but without the package, which forks for every mutant that no running session can take."""
+
+    def __init__(self, folder: Path, mutants: list[Mutant]) -> None:
+        self.socket, theirs = socket.socketpair()
+        if os.fork() == 0:
+            sys.dont_write_bytecode = True
+            self.socket.close()
+            with theirs.makefile("rw") as file:
+                for line in file:
+                    request = json.loads(line)
+                    row = judged(folder, mutants[request["number"]], request["tests"], request["budget"])
+                    print(json.dumps(row), file=file, flush=True)
+            os._exit(0)
+        theirs.close()
+        self.file = self.socket.makefile("rw")
+
+    def judged(self, number: int, tests: list[str], budget: float) -> dict[str, Any]:
+        """Whether a test is red, in processes that load the package anew."""
+        print(json.dumps({"number": number, "tests": tests, "budget": budget}), file=self.file, flush=True)
+        row: dict[str, Any] = json.loads(self.file.readline())
+        return row
+
+
 # Mutants run
 
 
 def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float) -> None:
     """Run the mutants that have no result of this budget yet."""
-    selection, done = Selection(folder), finished(folder)
-    until = time.time() + 60 * minutes
-    for number, mutant in enumerate(mutants):
-        last = done.get(number)
-        if time.time() > until or (last and (last["result"] == "killed" or last["budget"] >= budget)):
-            continue
-        started = time.time()
-        tests = [test for test in selection.ranked(mutant) if not last or test not in last["tests"]]
+    import pytest
+
+    fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * minutes
+
+    def work(session: Session) -> None:
+        done = finished(folder)
+        left = {
+            number: mutant
+            for number, mutant in enumerate(mutants)
+            if number not in done or not (done[number]["result"] == "killed" or done[number]["budget"] >= budget)
+        }
+        ranked = {}
+        for number, mutant in left.items():
+            doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
+            likeliest = list(selection.ranked(mutant).items())[:MOST]
+            ranked[number] = {**dict.fromkeys(doctests, 10.0), **dict(likeliest)}
+        reach = Reach(folder / "reach.jsonl")
+        reach.search(folder, session, left, ranked)
+        for number in sorted(left, key=lambda n: (left[n].compiled or not left[n].statement, n)):
+            if time.time() > until:
+                break
+            mutant = left[number]
+            scores = reach.scores(number, ranked[number])
+            row = of_mutant(folder, mutant, number, done.get(number), budget, session, scores, fresh)
+            append(folder / "results.jsonl", row)
+            place = number, f"{mutant.file}:{mutant.line}", mutant.operator
+            note(folder, *place, row["result"], row["by"], len(row["reached"]), row["wall"])
+
+    os.chdir(folder)
+    os.environ["PYTHONPATH"] = str(folder)
+    sys.path.insert(0, str(folder))
+    plugin = Session(folder, work)
+    pytest.main([*QUIET, "tests", "rotor"], plugins=[plugin])
+    if plugin.failed:
+        raise plugin.failed
+
+
+class Reach:
+    """Which tests reach which mutants: each test runs once for all of them."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.known: dict[str, dict[str, Any]] = {}
+        self.files: dict[int, dict[str, float]] = defaultdict(lambda: defaultdict(lambda: 1.0))  # weights
+        self.hits: Counter[int] = Counter()
+        self.mutants: list[int] = []
+
+    def add(self, row: dict[str, Any]) -> None:
+        """One more test is known."""
+        self.known[row["test"]] = row
+        file = row["test"].split("::")[0]
+        self.hits.update(row["reached"])
+        for number in self.mutants:
+            self.files[number][file] *= 2.0 if number in row["reached"] else 0.8
+
+    def scores(self, number: int, ranked: dict[str, float]) -> dict[str, float]:
+        """Tests that reach come first, the quick before the slow; those that do not are left out."""
+        files = self.files[number]
+        out = {}
+        for test, score in ranked.items():
+            row = self.known.get(test)
+            if row is None:
+                out[test] = score * min(files[test.split("::")[0]], 100.0)
+            elif number in row["reached"]:
+                out[test] = 1e6 * score / (0.3 + row["seconds"])
+        return out
+
+    def search(
+        self, folder: Path, session: Session, mutants: dict[int, Mutant], ranked: dict[int, dict[str, float]]
+    ) -> None:
+        """Run tests until enough reach each mutant, or its likeliest are through."""
+        self.mutants = [number for number, mutant in mutants.items() if mutant.statement and not mutant.compiled]
+        for row in rows(self.path):
+            self.add(row)
+        sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants.values()}
+        for attempt in range(TRIED):
+            wanted: set[str] = set()
+            for number in self.mutants:
+                scores = self.scores(number, ranked[number])
+                rest = [test for test in scores if test not in self.known and test in session.items]
+                if rest and self.hits[number] < ENOUGH:
+                    wanted.add(max(rest, key=lambda test: scores[test]))
+            tests = sorted(wanted)
+            for k in range(0, len(tests), GROUP):
+                for row in session.mapped(mutants, sources, tests[k : k + GROUP]):
+                    self.add(row)
+                    append(self.path, row)
+                open_ = sum(self.hits[number] < ENOUGH for number in self.mutants)
+                note(folder, "reach", attempt, len(self.known), "tests;", open_, "mutants not reached often enough")
+
+
+def note(folder: Path, *words: object) -> None:
+    """A line on the progress; standard output belongs to pytest."""
+    with (folder / "progress.log").open("a") as file:
+        print(time.strftime("%H:%M:%S"), *words, file=file)
+
+
+def of_mutant(
+    folder: Path,
+    mutant: Mutant,
+    number: int,
+    last: dict[str, Any] | None,
+    budget: float,
+    session: Session,
+    ranked: dict[str, float],
+    fresh: Fresh,
+) -> dict[str, Any]:
+    """The result of a mutant, which is in the file on the disk meanwhile, for tests that start processes."""
+    started, before = time.time(), last or {"tests": [], "reached": []}
+    ranked = {test: score for test, score in ranked.items() if test not in before["tests"]}
+    source = (folder / "original" / mutant.file).read_bytes()
+    try:
+        (folder / mutant.file).write_bytes(mutant.applied(source))
         try:
-            (folder / mutant.file).write_bytes(mutant.applied((folder / "original" / mutant.file).read_bytes()))
-            row = judged(folder, mutant, tests, budget)
-        finally:
-            restored(folder, [mutant.file])
-        row["tests"] = (last["tests"] if last else []) + row["tests"]
-        append(
-            folder / "results.jsonl",
-            {"number": number, **row, "budget": budget, "wall": round(time.time() - started, 1)},
-        )
-        print(
-            number,
-            mutant.file,
-            mutant.line,
-            mutant.operator,
-            row["result"],
-            row["by"],
-            f"{time.time() - started:.0f} s",
-            flush=True,
-        )
+            row = session.judged(mutant, source, ranked, budget)
+        except Unpatchable:
+            row = fresh.judged(number, list(ranked), budget) | {"reached": ["?"]}
+    finally:
+        restored(folder, [mutant.file])
+    row["tests"] = before["tests"] + row["tests"]
+    row["reached"] = before["reached"] + row["reached"]
+    return {"number": number, **row, "budget": budget, "wall": round(time.time() - started, 1)}
 
 
 def finished(folder: Path) -> dict[int, dict[str, Any]]:
@@ -366,7 +375,6 @@ def main() -> None:
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    sys.dont_write_bytecode = True
     mutants = prepared(folder, given.checkout.resolve(), given.mutants, given.seed)
     if given.check:
         print("red without a mutant:", check(folder))

@@ -96,6 +96,78 @@ def test_an_atom_is_refused_as_an_atom_and_not_as_a_drawing():
         rotor.read(atom)
 
 
+@pytest.mark.parametrize(
+    "module",
+    ["rotor", "rotor.api", "rotor.formats", "rotor.scenes.scene", "rotor.scenes.sections", "rotor.thermodynamics"],
+)
+def test_modules_that_load_names_late_refuse_names_that_do_not_exist(module):
+    """Without an error hasattr is true of anything, and a misspelt function is None."""
+    from importlib import import_module
+
+    with pytest.raises(AttributeError, match="no_such_name"):
+        import_module(module).no_such_name  # noqa: B018
+
+
+def test_lines_by_other_quantum_numbers_are_not_merged():
+    """J of one list would be paired with J, Ka, Kc of the other."""
+    from rotor.fitting.assignment import assignments, merged
+
+    linear = assignments(("j",), [[1]], [[0]], [100.0], 0.1)
+    asymmetric = assignments(("j", "ka", "kc"), [[1, 0, 1]], [[0, 0, 0]], [100.0], 0.1)
+    with pytest.raises(ValueError, match="lines by j and by j, ka, kc cannot be merged"):
+        merged(linear, asymmetric)
+
+
+# Equilibration of a box
+
+
+@pytest.fixture
+def box(monkeypatch):
+    """A box whose translation is at 300 K and whose rotation at 270 K, and the times (ps) to which it was run."""
+    from types import SimpleNamespace
+
+    from rotor.fluids import equilibration
+
+    times = []
+
+    def advance(dynamics, bath, time_ps, rows, progress, longest):
+        times.append(time_ps)
+        dynamics.nsteps = round(time_ps * 1e3 / bath.step_fs)
+        rows.extend([[-1.0, 300.0, 270.0, 1.0]] * 8)
+
+    degrees = SimpleNamespace(translation=3, rotation=3)
+    dynamics = SimpleNamespace(nsteps=0, degrees=degrees, wrench=lambda: None)
+    monkeypatch.setattr(equilibration, "dynamics_of", lambda atoms, bath: dynamics)
+    monkeypatch.setattr(equilibration, "_advance", advance)
+    monkeypatch.setattr(equilibration, "is_stationary", lambda rows, kelvin: False)
+    return times
+
+
+def test_a_box_that_does_not_settle_is_run_half_as_long_again_up_to_a_limit(box):
+    from rotor.fluids.equilibration import GROWTH, LONGEST_PS, SHORTEST_PS, equilibrate
+    from rotor.fluids.settings import Settings
+
+    ran = equilibrate(None, Settings(ensemble="langevin"))
+    assert box == pytest.approx([*SHORTEST_PS * GROWTH ** np.arange(len(box) - 1), LONGEST_PS])
+    assert len(box) == 7  # 10 ps times 1.5^5 is 76 ps
+    assert (ran.time_ps, ran.stationary) == (LONGEST_PS, False)
+    assert ran.rotation_over_translation == pytest.approx(0.9)
+    assert ran.temperature_k == pytest.approx(285.0)  # as many degrees of freedom of both
+
+
+def test_a_box_that_fails_is_stopped_with_the_step(box, monkeypatch):
+    from rotor.checks import RunStopped
+    from rotor.fluids import equilibration
+    from rotor.fluids.settings import Settings
+
+    def fail(*_):
+        raise FloatingPointError("forces are not finite")
+
+    monkeypatch.setattr(equilibration, "_advance", fail)
+    with pytest.raises(RunStopped, match=r"forces are not finite \(step 1 of the equilibration\)"):
+        equilibration.equilibrate(None, Settings())
+
+
 # Costs
 
 
