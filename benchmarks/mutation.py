@@ -37,7 +37,7 @@ from mutation_session import Session, Unpatchable
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
-ENOUGH, TRIED, GROUP = 5, 40, 40  # tests that reach a mutant; tests tried for it; tests of a fork
+ENOUGH, TRIED, GROUP = 4, 4, 40  # tests that reach a mutant; rounds of looking for them; tests of a fork
 FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",

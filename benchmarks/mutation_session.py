@@ -30,7 +30,7 @@ from mutants import Mutant
 
 REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
 UNREACHED_MOST = 12  # test functions in a row that do not reach it, before the rest is left out
-SHORT = 1.0  # seconds of a test whose reach is looked for
+SHORT = 0.6  # seconds of a test whose reach is looked for
 PATIENCE = 3.0  # a test that takes so many times as long as without the change has seen it
 
 

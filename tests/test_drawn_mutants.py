@@ -118,6 +118,68 @@ def test_lines_by_other_quantum_numbers_are_not_merged():
         merged(linear, asymmetric)
 
 
+def test_standard_input_that_goes_on_for_too_long_is_refused(monkeypatch):
+    """What is cut off silently would be another molecule."""
+    import io
+    from types import SimpleNamespace
+
+    from rotor.formats import read_write
+
+    text = b"2\n\nC 0 0 0\nO 0 0 1.1283\n"
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(text)))
+    monkeypatch.setattr(read_write, "HARMLESS_BYTES", len(text))
+    assert rotor.read("-").molecule.symbols == ("C", "O")
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(text)))
+    monkeypatch.setattr(read_write, "HARMLESS_BYTES", len(text) - 1)
+    with pytest.raises(ValueError, match="standard input goes on"):
+        rotor.read("-")
+
+
+@pytest.mark.parametrize(
+    ("molecules", "rule"),
+    [
+        ([[0, 0, 1], [2, 3]], "molecule 0 lists an atom twice"),
+        ([[0, 1], [1, 2, 3]], "molecule 1 lists an atom twice, or one of another"),
+        ([[0, 1], [2]], "atom 3 is in none of the molecules"),
+        ([[0, 1], [2, 4]], "molecule 1 lists an atom that is not one of 0 to 3"),
+    ],
+)
+def test_each_atom_of_a_box_is_in_one_molecule(molecules, rule):
+    from ase import Atoms
+
+    from rotor.fluids.motion.bodies import _labels
+
+    box = Atoms("N4", positions=np.arange(12.0).reshape(4, 3))
+    assert _labels(box, [[2, 3], [0, 1]]).tolist() == [1, 1, 0, 0]
+    with pytest.raises(ValueError, match=rule):
+        _labels(box, molecules)
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [[0.0, 1.0, 2.0]]])
+def test_moments_by_time_need_rising_times(times):
+    """Of two moments at one time neither is the right one."""
+    from rotor.classical.effects.changing_inertia import MomentsByTime
+
+    rows = [[1.0, 2.0, 2.5]] * 3
+    assert MomentsByTime([0.0, 1.0, 2.0], rows).rows.shape == (3, 3)
+    with pytest.raises(ValueError, match="expected rising times"):
+        MomentsByTime(times, rows)
+
+
+def test_lines_that_no_dipole_makes_are_named_and_others_are_not():
+    """Moments along a, b and c change Kc, both, or Ka by odd numbers (1_01, 1_11 and 1_10 from 0_00), and J by 0 or 1."""
+    from rotor.fitting.assignment import assignments
+    from rotor.fitting.fit import _unlikely
+
+    def said(upper, lower):
+        return _unlikely(assignments(("j", "ka", "kc"), [upper], [lower], [1e4], 0.1))
+
+    for upper in ([1, 0, 1], [1, 1, 1], [1, 1, 0]):
+        assert said(upper, [0, 0, 0]) == []
+    assert "J changes by more than 1" in said([2, 0, 2], [0, 0, 0])[0]
+    assert "Ka and Kc both change by even numbers" in said([2, 2, 1], [1, 0, 1])[0]
+
+
 # Equilibration of a box
 
 

@@ -111,8 +111,9 @@ def test_wrong_requests_are_refused():
         block_objects(OCS, [PULSE], jmax=10).state("1")
     with pytest.raises(ValueError, match="not linear"):
         linear_objects(Top.from_constants("A=10 B=6 C=4 MHz"), 3)
-    with pytest.raises(ValueError, match="rate"):
-        linear_objects(OCS, 2).collisions(-1.0)
+    for rate in (-1.0, float("inf"), float("nan")):
+        with pytest.raises(ValueError, match="rate"):
+            linear_objects(OCS, 2).collisions(rate)
 
 
 # The classical gas

@@ -83,6 +83,7 @@ def test_sine_between_states(code, of_k):
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     [
+        ("a 1 1 0 20 0 1 1 1 0 1 0 80\n", 100, "XOPT = 80"),  # the first that is no sum of its parts
         ("a 1 1 0 20 0 1 1 1 0 1 0 90\n", 100, "XOPT = 90"),
         ("a 3 1 0 20 0 1 1 1 0 1 0\n", 10_920_000, "a spin with TYP 92"),
         ("a 1 1 0 20 0 1 1 1 0 1 0\n", 1_000_830_000, "one series alone"),

@@ -120,6 +120,7 @@ def test_selected_lines_keep_their_errors():
         (("B", "D"), np.eye(3), "square"),
         (("B", "D"), [[1, 0.5], [0.2, 1]], "symmetric"),
         (("B", "D"), [[1, 2], [2, 1]], "negative variance"),
+        (("B", "D"), [[1, 2e-9], [2e-9, 1e-18]], "negative variance"),  # whatever the units are: a correlation of 2
         (("B",), [[-1]], "0 or more"),
         (("B",), [[np.nan]], "finite"),
     ],
