@@ -33,11 +33,12 @@ from typing import Any
 
 from mutants import Mutant, sample
 from mutation_ranking import WORD, Selection
-from mutation_session import Session, Unpatchable
+from mutation_session import NextTest, Session, Unpatchable
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
-ENOUGH, TRIED, GROUP = 4, 4, 40  # tests that reach a mutant; rounds of looking for them; tests of a fork
+REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
+UNREACHED_MOST = 12  # test functions in a row that do not reach it, before the rest is left out
 FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",
@@ -136,8 +137,8 @@ class Fresh:
 # Mutants run
 
 
-def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float) -> None:
-    """Run the mutants that have no result of this budget yet."""
+def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float, later: list[str]) -> None:
+    """Run the mutants that have no result of this budget yet; with test files of `later`, survivors on these alone."""
     import pytest
 
     fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * minutes
@@ -147,86 +148,80 @@ def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float) -> N
         left = {
             number: mutant
             for number, mutant in enumerate(mutants)
-            if number not in done or not (done[number]["result"] == "killed" or done[number]["budget"] >= budget)
+            if number not in done or (done[number]["result"] != "killed" and (later or done[number]["budget"] < budget))
         }
-        ranked = {}
-        for number, mutant in left.items():
-            doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
-            likeliest = list(selection.ranked(mutant).items())[:MOST]
-            ranked[number] = {**dict.fromkeys(doctests, 10.0), **dict(likeliest)}
+        sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants}
+        session.marks = session.patches(dict(enumerate(mutants)), sources)
         reach = Reach(folder / "reach.jsonl")
-        reach.search(folder, session, left, ranked)
         for number in sorted(left, key=lambda n: (left[n].compiled or not left[n].statement, n)):
             if time.time() > until:
                 break
-            mutant = left[number]
-            scores = reach.scores(number, ranked[number])
-            row = of_mutant(folder, mutant, number, done.get(number), budget, session, scores, fresh)
-            append(folder / "results.jsonl", row)
+            mutant, last = left[number], done.get(number)
+            doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
+            ranked = {**dict.fromkeys(doctests, 10.0), **selection.ranked(mutant)}
+            row = of_mutant(folder, mutant, number, last, budget, session, reach, ranked, fresh)
+            append(folder / "results.jsonl", {**row, "later": bool(later)})
             place = number, f"{mutant.file}:{mutant.line}", mutant.operator
-            note(folder, *place, row["result"], row["by"], len(row["reached"]), row["wall"])
+            note(folder, *place, row["result"], row["by"], len(row["reached"]), "of", len(row["tests"]), row["wall"])
 
     os.chdir(folder)
     os.environ["PYTHONPATH"] = str(folder)
     sys.path.insert(0, str(folder))
     plugin = Session(folder, work)
-    pytest.main([*QUIET, "tests", "rotor"], plugins=[plugin])
+    pytest.main([*QUIET, *(later or ["tests", "rotor"])], plugins=[plugin])
     if plugin.failed:
         raise plugin.failed
 
 
 class Reach:
-    """Which tests reach which mutants: each test runs once for all of them."""
+    """Which tests reach which mutants: known for all from every run of a test."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.known: dict[str, dict[str, Any]] = {}
-        self.files: dict[int, dict[str, float]] = defaultdict(lambda: defaultdict(lambda: 1.0))  # weights
-        self.hits: Counter[int] = Counter()
-        self.mutants: list[int] = []
+        for row in rows(path):
+            self.add(row, write=False)
 
-    def add(self, row: dict[str, Any]) -> None:
-        """One more test is known."""
-        self.known[row["test"]] = row
-        file = row["test"].split("::")[0]
-        self.hits.update(row["reached"])
-        for number in self.mutants:
-            self.files[number][file] *= 2.0 if number in row["reached"] else 0.8
+    def add(self, row: dict[str, Any], write: bool = True) -> None:
+        """One more run of a test; one in a process in which others ran before may find their results stored."""
+        known = self.known.setdefault(row["test"], {**row, "reached": []})
+        known["reached"] = sorted({*known["reached"], *row["reached"]})
+        if write:
+            append(self.path, row)
 
     def scores(self, number: int, ranked: dict[str, float]) -> dict[str, float]:
-        """Tests that reach come first, the quick before the slow; those that do not are left out."""
-        files = self.files[number]
+        """Tests that reach come first, the quick before the slow; then the others of their files; those that do not last."""
+        files: dict[str, float] = defaultdict(lambda: 1.0)
+        for test, row in self.known.items():
+            files[test.split("::")[0]] *= REACHED if number in row["reached"] else NOT_REACHED
         out = {}
-        for test, score in ranked.items():
-            row = self.known.get(test)
-            if row is None:
-                out[test] = score * min(files[test.split("::")[0]], 100.0)
-            elif number in row["reached"]:
-                out[test] = 1e6 * score / (0.3 + row["seconds"])
+        for test in ranked.keys() | {test for test, row in self.known.items() if number in row["reached"]}:
+            row, score = self.known.get(test, {"reached": [], "seconds": 0.3}), ranked.get(test, 1e-3)
+            if number in row["reached"]:
+                out[test] = 1e6 * (score + 0.01) / (0.3 + row["seconds"])
+            else:
+                weight = min(max(files[test.split("::")[0]], 0.05), 100.0)
+                out[test] = score * weight * (0.01 if test in self.known else 1.0)
         return out
 
-    def search(
-        self, folder: Path, session: Session, mutants: dict[int, Mutant], ranked: dict[int, dict[str, float]]
-    ) -> None:
-        """Run tests until enough reach each mutant, or its likeliest are through."""
-        self.mutants = [number for number, mutant in mutants.items() if mutant.statement and not mutant.compiled]
-        for row in rows(self.path):
-            self.add(row)
-        sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants.values()}
-        for attempt in range(TRIED):
-            wanted: set[str] = set()
-            for number in self.mutants:
-                scores = self.scores(number, ranked[number])
-                rest = [test for test in scores if test not in self.known and test in session.items]
-                if rest and self.hits[number] < ENOUGH:
-                    wanted.add(max(rest, key=lambda test: scores[test]))
-            tests = sorted(wanted)
-            for k in range(0, len(tests), GROUP):
-                for row in session.mapped(mutants, sources, tests[k : k + GROUP]):
-                    self.add(row)
-                    append(self.path, row)
-                open_ = sum(self.hits[number] < ENOUGH for number in self.mutants)
-                note(folder, "reach", attempt, len(self.known), "tests;", open_, "mutants not reached often enough")
+    def chosen(self, number: int, ranked: dict[str, float], tests: set[str]) -> NextTest:
+        """The best of some tests again and again; what one reaches changes the scores of its file."""
+        scores = {test: score for test, score in self.scores(number, ranked).items() if test in tests}
+        factors: dict[str, float] = defaultdict(lambda: 1.0)
+        missed = 0
+
+        def chosen(last: tuple[str, bool] | None) -> str | None:
+            nonlocal missed
+            if last:
+                missed = 0 if last[1] else missed + 1
+                factors[last[0].split("::")[0]] *= REACHED if last[1] else NOT_REACHED
+            if not scores or missed >= UNREACHED_MOST:
+                return None
+            best = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
+            del scores[best]
+            return best
+
+        return chosen
 
 
 def note(folder: Path, *words: object) -> None:
@@ -242,19 +237,23 @@ def of_mutant(
     last: dict[str, Any] | None,
     budget: float,
     session: Session,
+    reach: Reach,
     ranked: dict[str, float],
     fresh: Fresh,
 ) -> dict[str, Any]:
     """The result of a mutant, which is in the file on the disk meanwhile, for tests that start processes."""
     started, before = time.time(), last or {"tests": [], "reached": []}
-    ranked = {test: score for test, score in ranked.items() if test not in before["tests"]}
+    left = session.items.keys() - set(before["tests"])
     source = (folder / "original" / mutant.file).read_bytes()
     try:
         (folder / mutant.file).write_bytes(mutant.applied(source))
         try:
-            row = session.judged(mutant, source, ranked, budget)
+            row, seen = session.judged(number, mutant, source, reach.chosen(number, ranked, left), budget)
+            for one in seen:
+                reach.add(one)
         except Unpatchable:
-            row = fresh.judged(number, list(ranked), budget) | {"reached": ["?"]}
+            tests = [test for test in ranked if test not in before["tests"]]
+            row = fresh.judged(number, tests, budget) | {"reached": ["?"]}
     finally:
         restored(folder, [mutant.file])
     row["tests"] = before["tests"] + row["tests"]
@@ -365,6 +364,9 @@ def main() -> None:
     parser.add_argument(
         "--budget", type=float, default=25.0, help="seconds of processor time a mutant; a larger one resumes survivors"
     )
+    parser.add_argument(
+        "--later", nargs="+", default=[], help="files of tests written since: survivors are run on these"
+    )
     parser.add_argument("--check", action="store_true", help="run the tests that killed on the package as it is")
     parser.add_argument("--survivors", action="store_true")
     given = parser.parse_args()
@@ -381,7 +383,9 @@ def main() -> None:
     elif not given.survivors:
         for library in LIBRARIES:
             __import__(library)  # once, before children are forked
-        run(folder, mutants, given.minutes, given.budget)
+        if given.later:
+            shutil.copytree(given.checkout.resolve() / "tests", folder / "tests", dirs_exist_ok=True)
+        run(folder, mutants, given.minutes, given.budget, given.later)
     print(summary(folder, mutants))
 
 

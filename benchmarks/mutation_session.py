@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 import builtins
 import contextlib
-import functools
 import gc
 import importlib
 import json
@@ -23,15 +22,15 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import CodeType, FrameType, FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 from mutants import Mutant
 
-REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
-UNREACHED_MOST = 12  # test functions in a row that do not reach it, before the rest is left out
-SHORT = 0.6  # seconds of a test whose reach is looked for
 PATIENCE = 3.0  # a test that takes so many times as long as without the change has seen it
+
+
+NextTest = Callable[[tuple[str, bool] | None], str | None]  # given the last test and whether it reached the statement
 
 
 class Unpatchable(Exception):
@@ -110,7 +109,7 @@ class Session:
         self.items: dict[str, list[Any]] = defaultdict(list)
         self.functions: dict[tuple[str, str, int], list[FunctionType]] = {}
         self.green: dict[str, float | None] = {}  # seconds of tests without a mutant; None where red
-        self.caches: list[Any] = []
+        self.marks: list[tuple[FunctionType, CodeType]] = []  # of all mutants, without their changes
         self.failed: BaseException | None = None
 
     def pytest_collection(self, session: Any) -> None:
@@ -127,11 +126,6 @@ class Session:
         for item in session.items:
             self.items[item.nodeid.split("[")[0]].append(item)
         self.functions = functions(self.folder)
-        self.caches = [
-            one
-            for one in gc.get_objects()
-            if isinstance(one, functools._lru_cache_wrapper) and (one.__module__ or "").startswith("rotor")
-        ]
         gc.collect()
         gc.freeze()
         try:
@@ -150,45 +144,39 @@ class Session:
                 out += [(one, code) for one in loaded if len(one.__code__.co_freevars) == len(code.co_freevars)]
         return out
 
-    def mapped(self, mutants: dict[int, Mutant], sources: dict[str, bytes], tests: list[str]) -> list[dict[str, Any]]:
-        """Of tests without a change: seconds, up to SHORT, and the numbers of mutants whose statements they reach."""
-        patches = self.patches(mutants, sources)
-        return [
-            {"test": test, "seconds": value[0], "reached": value[1]}
-            if kind == "mapped"
-            else {"test": test, "seconds": 60.0, "reached": []}
-            for kind, test, value in self._forked(
-                lambda tell: _run_mapped(self, tell, tests, patches), 60.0 + SHORT * len(tests)
-            )
-        ]
-
-    def judged(self, mutant: Mutant, source: bytes, ranked: dict[str, float], budget: float) -> dict[str, Any]:
-        """Whether a test is red, the likeliest first, up to the budget of processor time."""
-        patches = self.patches({0: mutant}, {mutant.file: mutant.applied(source)})
-        if not patches:
+    def judged(
+        self, number: int, mutant: Mutant, source: bytes, next_test: NextTest, budget: float
+    ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        """Whether a test is red, up to the budget of processor time; and what its tests reach of all mutants."""
+        own = self.patches({number: mutant}, {mutant.file: mutant.applied(source)})
+        if not own:
             raise Unpatchable(mutant.file)
-        scores = {test: score for test, score in ranked.items() if test in self.items}
         row: dict[str, Any] = {"result": "survived", "by": "", "tests": [], "reached": []}
-        for kind, test, value in self._forked(lambda tell: _run(self, tell, scores, patches, budget), budget):
-            if kind == "green":
-                row["tests"].append(test)
-                if value:
-                    row["reached"].append(test)
-            elif self._sees(kind, test, value):
+        reach = []
+        events = self._forked(lambda tell: _run(self, tell, next_test, number, [*self.marks, *own], budget), budget)
+        for kind, test, value in events:
+            if kind == "time":
+                seen = self._sees(test, value)
+            else:
+                seconds, reached = value
+                reach.append({"test": test, "seconds": round(seconds, 2), "reached": reached})
+                row["reached"] += [test] if number in reached else []
+                seen = kind == "red" and self._sees(test, None)
+            if seen:
                 row |= {"result": "killed", "by": f"{test}{' (time)' if kind == 'time' else ''}"}
             else:
                 row["tests"].append(test)
-        return row
+        return row, reach
 
-    def _sees(self, kind: str, test: str, seconds: float) -> bool:
-        """Whether a test that was red, or did not end, is green and quick without the change."""
+    def _sees(self, test: str, seconds: float | None) -> bool:
+        """Whether a test that was red, or did not end in some seconds, is green and quick without the change."""
         if test not in self.green:
-            limit = max(60.0, 2 * seconds)
+            limit = max(60.0, 2 * (seconds or 0.0))
             ((_, _, self.green[test]),) = self._forked(lambda tell: _run_plain(self, tell, test), limit)[-1:] or [
                 ("", "", None)
             ]
         usual = self.green[test]
-        return usual is not None and (kind == "red" or seconds > PATIENCE * usual + 1)
+        return usual is not None and (seconds is None or seconds > PATIENCE * usual + 1)
 
     def _forked(self, work: Callable[[Callable[..., None]], None], seconds: float) -> list[tuple[str, str, Any]]:
         """What a fork tells; a test inside which the processor time was over ends it with `time`."""
@@ -244,59 +232,23 @@ def _patched(patches: list[tuple[FunctionType, CodeType]]) -> set[int]:
 def _run(
     session: Session,
     tell: Callable[..., None],
-    scores: dict[str, float],
+    next_test: NextTest,
+    number: int,
     patches: list[tuple[FunctionType, CodeType]],
     budget: float,
 ) -> None:
     """In a fork: the change, then tests until one is red."""
     reached = _patched(patches)
-    factors: dict[str, float] = defaultdict(lambda: 1.0)
-    missed, start = 0, time.process_time()
-    while scores and time.process_time() - start < budget and missed < UNREACHED_MOST:
-        test = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
-        del scores[test]
-        tell("start", test, time.process_time() - start)
-        before = time.process_time()
+    start = time.process_time()
+    test = next_test(None)
+    while test and (before := time.process_time()) - start < budget:
+        tell("start", test, before - start)
         reached.clear()
         result = _test(session, test)
+        tell(result, test, [time.process_time() - before, sorted(reached)])
         if result == "red":
-            tell("red", test, time.process_time() - before)
             return
-        tell("green", test, len(reached))
-        missed = 0 if reached else missed + 1
-        factors[test.split("::")[0]] *= REACHED if reached else NOT_REACHED
-
-
-class _TimeUp(BaseException):
-    """A test has taken long enough for what is wanted of it."""
-
-
-def _run_mapped(
-    session: Session, tell: Callable[..., None], tests: list[str], patches: list[tuple[FunctionType, CodeType]]
-) -> None:
-    """In a fork: tests, each up to SHORT seconds and what it is compiling then, and the marks that they pass."""
-    reached = _patched(patches)
-
-    def over(_: int, frame: FrameType | None) -> None:
-        while frame:
-            if "/numba/" in frame.f_code.co_filename:
-                signal.setitimer(signal.ITIMER_PROF, 0.3)
-                return
-            frame = frame.f_back
-        raise _TimeUp
-
-    signal.signal(signal.SIGPROF, over)
-    for test in tests:
-        reached.clear()
-        for cache in session.caches:
-            cache.cache_clear()
-        started = time.process_time()
-        tell("start", test, 0.0)
-        signal.setitimer(signal.ITIMER_PROF, SHORT)
-        with contextlib.suppress(_TimeUp):
-            _test(session, test)
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        tell("mapped", test, [round(time.process_time() - started, 2), sorted(reached)])
+        test = next_test((test, number in reached))
 
 
 def _run_plain(session: Session, tell: Callable[..., None], test: str) -> None:
