@@ -167,6 +167,7 @@ def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float, late
     os.chdir(folder)
     os.environ["PYTHONPATH"] = str(folder)
     sys.path.insert(0, str(folder))
+    sys.dont_write_bytecode = False  # until the mutants begin
     plugin = Session(folder, work)
     pytest.main([*QUIET, *(later or ["tests", "rotor"])], plugins=[plugin])
     if plugin.failed:

@@ -180,6 +180,45 @@ def test_lines_that_no_dipole_makes_are_named_and_others_are_not():
     assert "Ka and Kc both change by even numbers" in said([2, 2, 1], [1, 0, 1])[0]
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("mhz", 1.0), ("khz", 1e-3)])
+def test_widths_of_blends_are_read_in_their_unit(folder, unit, factor):
+    from rotor.formats.assigned_lines import read_assigned_lines
+
+    rows = "1,0,12000,0.01,7,20\n2,1,24000,0.01,7,20\n"
+    Path("lines.csv").write_text(f"j_upper,j_lower,frequency_mhz,error_mhz,blend,width_{unit}\n{rows}")
+    lines, _ = read_assigned_lines("lines.csv", ("j",))
+    assert list(lines.widths_mhz.values()) == [20.0 * factor]
+
+
+def test_infinite_numbers_are_no_values_in_tables_of_files(folder):
+    """A reader in another language would meet text in a column of numbers."""
+    import duckdb
+
+    from rotor.formats.tables import copy_columns
+
+    columns = {"x": np.array([1.5, np.inf, -np.inf, np.nan]), "n": np.arange(4), "name": np.array(["a", "b", "c", "d"])}
+    copy_columns(columns, Path("t.parquet"), "(FORMAT parquet)")
+    rows = duckdb.sql("SELECT x, n, name FROM 't.parquet'").fetchall()
+    assert [row[1:] for row in rows] == [(0, "a"), (1, "b"), (2, "c"), (3, "d")]
+    assert rows[0][0] == 1.5
+    assert all(row[0] is None or np.isnan(row[0]) for row in rows[1:])
+
+
+def test_a_sum_of_cosines_at_even_times_is_the_plain_sum_without_its_exponentials(monkeypatch):
+    """2√t exponentials a line instead of t; uneven times have no other way than the plain sum."""
+    from rotor.alignment import observables
+
+    rng, times = np.random.default_rng(3), np.linspace(-2.0, 7.0, 60)
+    amplitudes, omegas = rng.normal(size=5) + 1j * rng.normal(size=5), rng.normal(size=5)
+    plain = (amplitudes[:, None] * np.exp(1j * np.outer(omegas, times))).real.sum(axis=0)
+    uneven = times + 0.01 * np.sin(times)
+    assert observables.harmonic_sum(amplitudes, omegas, uneven) == pytest.approx(
+        (amplitudes[:, None] * np.exp(1j * np.outer(omegas, uneven))).real.sum(axis=0), abs=1e-12
+    )  # round-off of five terms
+    monkeypatch.delattr(observables, "_plain_sum")
+    assert observables.harmonic_sum(amplitudes, omegas, times) == pytest.approx(plain, abs=1e-12)
+
+
 # Equilibration of a box
 
 

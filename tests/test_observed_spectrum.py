@@ -64,6 +64,7 @@ def test_jansky_to_kelvin() -> None:
     [
         ([1.0, 2.0], [1.0], 1.0, {}, "frequencies for"),
         ([1.0, 1.0], [1.0, 2.0], 1.0, {}, "two channels at 1 MHz"),
+        ([1.0, 2.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0], 1.0, {}, "two channels at 2 MHz"),
         ([1.0, np.nan], [1.0, 2.0], 1.0, {}, "expected two or more"),
         ([-1.0, 1.0], [1.0, 2.0], 1.0, {}, "above 0"),
         ([1.0, 2.0], [1.0, 2.0], 0.0, {}, "noise"),

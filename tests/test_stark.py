@@ -282,6 +282,7 @@ def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
     ("change", "message"),
     [
         ({"fields_kv_per_cm": [1e7]}, "no molecule holds together"),
+        ({"fields_kv_per_cm": [0.0, 1.0, -1e7]}, "a field of -1e\\+07 kV/cm is beyond"),
         ({"fields_kv_per_cm": [np.nan]}, "finite"),
         ({"fields_kv_per_cm": []}, "finite"),
         ({"j_highest": -1}, "J = -1"),
