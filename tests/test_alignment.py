@@ -26,7 +26,7 @@ from rotor.alignment.pulse import (
     elliptical,
 )
 from rotor.alignment.timeline import timeline
-from rotor.quantum.fields.blocks import Contraction
+from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
 

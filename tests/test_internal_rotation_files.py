@@ -173,13 +173,10 @@ def test_a_stark_map_on_the_command_line_has_species(acetaldehyde, call):
     code, out, _ = call("stark", str(acetaldehyde), "--field", "0:5kV/cm:3", "--states", "1")
     assert code == 0
     assert "E 0 1 0 1" in out
-    code, _, err = call("stark", str(acetaldehyde), "--field", "0:5kV/cm:3", "--states", "1", "--lines", "lines.csv")
-    assert code == 2
-    assert "lines in a field are not computed with internal rotation" in err
 
 
-def test_a_field_on_a_molecule_with_spins_is_refused_too(acetaldehyde, call):
+def test_a_field_on_a_molecule_with_spins_has_species_and_spins(acetaldehyde, call):
     acetaldehyde.write_text(ACETALDEHYDE + "[spins.14N]\nchi_aa = -4\n")
-    code, _, err = call("stark", str(acetaldehyde), "--hyperfine", "--field", "0:1kV/cm:2")
-    assert code == 2
-    assert "internal rotation" in err
+    code, out, _ = call("stark", str(acetaldehyde), "--hyperfine", "--field", "0:1kV/cm:2", "--states", "1")
+    assert code == 0
+    assert "E 0 1 0 1 2" in out

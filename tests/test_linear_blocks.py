@@ -11,11 +11,12 @@ import pytest
 import rotor
 from rotor import units
 from rotor.quantum.basis.labelled import Basis, product, rotation_labels
+from rotor.quantum.basis.phases import with_real_phases
 from rotor.quantum.basis.real import RealFunctions, real_functions, rotation_reversal
-from rotor.quantum.blocks import LinearBlocks, linear_blocks
-from rotor.quantum.contraction import Space, contracted, coupled, spin_space
+from rotor.quantum.blocks import LinearBlocks, blocks_of_elements, linear_blocks
+from rotor.quantum.contraction import NEGLIGIBLE, Space, contracted, coupled, flat_elements, spin_space
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.in_field import in_field
+from rotor.quantum.in_field import space_factor
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, ket_bra, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
@@ -252,7 +253,17 @@ def test_spin_rotation_beside_a_quadrupole_is_that_of_the_engine_of_spins():
 
 
 def field_blocks(space, twice_m) -> LinearBlocks:
-    return in_field(space, twice_m, {"field": "mu"})
+    """Linear blocks of one M: the energies of a space, and its tensor "mu" along the field."""
+    start, pieces = space.starts(), []
+    energies = np.concatenate([sector.energies for sector in space.sectors])
+    pieces.append((np.arange(len(space)), np.arange(len(space)), 0, energies))
+    for (a, b), reduced in space.tensors["mu"].blocks.items():
+        factor = space_factor(space.sectors[a].twice_j, space.sectors[b].twice_j, 1, twice_m)
+        r, c = np.nonzero(np.abs(factor * reduced) > NEGLIGIBLE * np.abs(reduced).max(initial=0.0))
+        pieces.append((start[a] + r, start[b] + c, 1, factor * reduced[r, c]))
+    projects = np.repeat([sector.twice_j >= abs(twice_m) for sector in space.sectors], np.diff(start))
+    elements = with_real_phases(flat_elements(len(space), 2, pieces)).elements
+    return blocks_of_elements(["energy", "field"], space.labels(), elements, projects)
 
 
 @pytest.mark.parametrize("dipole", [(0.0, 1.8, 0.0), (1.2, 0.7, 0.0), (1.2, 0.7, 0.4)])
@@ -302,7 +313,7 @@ def test_a_toy_effect_of_one_operator_reaches_levels_slopes_spins_and_fields():
     assert trace == pytest.approx(
         expected, rel=1e-9
     )  # the coupling has no trace in F = 3/2 but that of each J, which vanishes in sum
-    assert np.isfinite(in_field(hyperfine, 1, {"field": "mu"}).energies([1.0, 100.0])).any()
+    assert np.isfinite(field_blocks(hyperfine, 1).energies([1.0, 100.0])).any()
 
 
 def test_elements_of_a_plain_shift_reach_the_labels_they_name():

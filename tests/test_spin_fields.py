@@ -13,7 +13,8 @@ from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.effects.zeeman import MHZ_PER_T2, zeeman_map
-from rotor.quantum.fields.spin_fields import Magnet, spin_field_space
+from rotor.quantum.fields.operators import Magnet
+from rotor.quantum.fields.space import field_space
 from rotor.quantum.spins import Spin
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, NUCLEAR_MAGNETON_MHZ_PER_T
@@ -158,7 +159,7 @@ def test_a_symmetric_top_with_a_nucleus_in_a_magnetic_field(text, axis):
     slow = np.linalg.eigvalsh(full_matrix(constants, 2, chi, tesla=5.0, g=g, g_i=0.4038, x=x))[:30]
     assert every_state(found, 30) == pytest.approx(slow, abs=1e-8)  # round-off of 2e4 MHz; found 3e-10
     with pytest.raises(ValueError, match="tensors that have its axis"):
-        spin_field_space(Top.from_constants(text), 3, effects, (), Magnet(np.diag([0.5, 0.2, 0.1]), {}))
+        field_space(Top.from_constants(text), 3, [Magnet(np.diag([0.5, 0.2, 0.1]))], effects)
 
 
 @pytest.mark.parametrize(
@@ -195,7 +196,6 @@ def test_a_spin_alone_precesses_beside_a_linear_top():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda top, q: stark_map(top, [1.0], effects=SEMI_RIGID), "no spins"),
         (lambda top, q: stark_map(top, [1.0], effects=q, direction=(1, 0, 1)), "along Z alone"),
         (lambda top, q: stark_map(top, [1.0], effects=q, m_values=(0.5,)), "M_F of"),
         (lambda top, q: zeeman_map(top, [1.0], 0.1, nuclear_g={"N": 0.4}), "give the effects"),

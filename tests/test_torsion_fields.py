@@ -7,8 +7,8 @@ import pytest
 import qutip
 
 import rotor
-from rotor.quantum.fields.blocks import Contraction
-from rotor.quantum.fields.torsion_fields import torsion_field_space
+from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.solved_space import solved_levels, solved_space
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
@@ -23,6 +23,11 @@ def turning(rho=0.08, dab=700.0, v3=40.0, frame="RAM", **settings):
         values = {"F0": 158e3, "delta": 0.7, "V3": v3 * CM}
     internal = InternalRotationConstants(values, frame, **settings)
     return rotor.Top.from_constants(constants, dipole_abc_debye=DIPOLE, internal_rotation=internal)
+
+
+def blocks_of_species(top, jmax, along, m, species, together):
+    space = solved_space(top, solved_levels(top, jmax, ()), jmax, [along], together=together)
+    return [block for block in space.blocks(m) if space.levels.quanta["species"][block.rows[0]] == species]
 
 
 def symbol(j1, j2, j3, m1, m2, m3):
@@ -64,8 +69,7 @@ def direct_product(sigma, m, jmax, strength, waves=10):
 def test_levels_in_a_field_are_those_of_the_direct_product(sigma, m):
     strength = 5000.0  # MHz/D: 10 kV/cm
     along = Contraction(DIPOLE, (0.0, 0.0, 1.0))
-    space = torsion_field_space(turning(vt_max=18, functions=20), 3, [along], together=True)
-    blocks = [block for block in space.blocks(abs(m)) if block.species.name == "AE"[sigma]]
+    blocks = blocks_of_species(turning(vt_max=18, functions=20), 3, along, abs(m), "AE"[sigma], together=True)
     if sigma:
         blocks = [block for block in blocks if block.m == m]
     energies = [np.linalg.eigvalsh(np.diag(block.energies_mhz) - strength * block.matrix(along)) for block in blocks]
@@ -131,8 +135,8 @@ def test_elements_between_torsional_states_move_levels_by_less_than_is_said(sigm
     along = Contraction(DIPOLE, (0.0, 0.0, 1.0))
     lowest = []
     for together in (True, False):
-        space = torsion_field_space(turning(v3=400.0, vt_max=1), 3, [along], together=together)
-        blocks = [block for block in space.blocks(1) if block.species.name == "AE"[sigma] and block.m == 1]
+        blocks = blocks_of_species(turning(v3=400.0, vt_max=1), 3, along, 1, "AE"[sigma], together=together)
+        blocks = [block for block in blocks if block.m == 1]
         energies = [np.linalg.eigvalsh(np.diag(b.energies_mhz) - strength * b.matrix(along)) for b in blocks]
         lowest.append(np.sort(np.concatenate(energies))[:15])
     assert np.abs(lowest[0] - lowest[1]).max() < 0.1

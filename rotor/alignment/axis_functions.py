@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import AxialBlock
+from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.direction_cosines import cosine_bands
-from rotor.quantum.fields.wang_blocks import WangBlockInField
+from rotor.quantum.fields.solved_space import SolvedFieldBlock
 from rotor.quantum.tensors import frame_of, phase_exponent
 
 Complexes = NDArray[np.complex128]
@@ -33,7 +33,7 @@ ROUND_OFF = 1e-9  # imaginary parts of elements, of the largest value of f
 def absolute_cosine(block: AxialBlock) -> Floats:
     """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n) of a linear or symmetric top, θ of its figure axis; exact but for round-off.
 
-    >>> from rotor.quantum.fields.blocks import Contraction
+    >>> from rotor.quantum.fields.operators import Contraction
     >>> from rotor.quantum.fields.space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
@@ -82,7 +82,7 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
     return out
 
 
-def of_asymmetric(block: WangBlockInField, axis: int, function: EvenFunction = np.abs) -> Floats:
+def of_asymmetric(block: SolvedFieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
     """⟨a|f(cosθ)|b⟩ over a block (n, n) of an asymmetric top, θ between the axis a (0), b (1) or c (2) and Z, f even.
 
     Raises ValueError where the block is not one of a field along Z that leaves real phases.
@@ -92,8 +92,9 @@ def of_asymmetric(block: WangBlockInField, axis: int, function: EvenFunction = n
     by_k: dict[int, list[tuple[int, int, Complexes]]] = {}
     start = 0
     for number, colour in zip(block.members, block.colours, strict=True):
-        solved = block.space.solved[number]
-        columns = 1j**colour * _turned(solved.basis, axis, block.space.representation) @ solved.vectors
+        elements = block.space.elements
+        solved = elements.blocks[block.space.sectors[number].block]
+        columns = 1j**colour * _turned(solved.basis, axis, elements.representation) @ solved.vectors
         for k, row in zip(range(-solved.basis.j, solved.basis.j + 1), columns, strict=True):
             if np.abs(row).max() > 0:
                 by_k.setdefault(k, []).append((solved.basis.j, start, row))

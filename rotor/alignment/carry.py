@@ -16,7 +16,9 @@ from rotor.alignment.observables import Coherences, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:

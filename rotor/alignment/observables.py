@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 
 from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock
-from rotor.quantum.fields.wang_blocks import WangBlockInField
+from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.solved_space import SolvedFieldBlock
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -51,7 +53,7 @@ class Observable:
             return block.matrix(self.contraction)
         if isinstance(block, AxialBlock):
             return absolute_cosine(block)
-        if isinstance(block, WangBlockInField):
+        if isinstance(block, SolvedFieldBlock):
             return of_asymmetric(block, self.axis)
         raise ValueError(f"{self.name} is made for fields with the symmetry of Z; use cos2theta")
 

@@ -27,11 +27,11 @@ from rotor.formats.provenance import write_beside
 from rotor.formats.spcat.text.cat import format_lines
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
 from rotor.formats.tables import copy_columns, quoted, run
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import intensity_cut, jmax_for_cut, require_cut
-from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.spectra.transitions import all_transitions
 from rotor.temporary import locked_file
 from rotor.thermodynamics import PartitionFunction

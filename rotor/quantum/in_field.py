@@ -1,54 +1,76 @@
-"""Spaces in a field along z: linear blocks of one M, with a term for each component of a tensor."""
+"""What a field does to solved states: one factor for each pair of angular momenta and M, the phases that make a block real.
+
+An operator T^K of rank K between solved states |F τ M⟩ is (R. N. Zare, Angular Momentum, 1988, eq. 5.14)
+
+    ⟨F'τ'M'|T^K_q|F τ M⟩ = (-1)^(F'-M') (F' K F; -M' q M) ⟨F'τ'‖T^K‖F τ⟩,      q = M' - M,
+
+whatever was contracted into τ: rotation, states, spins, torsion. In a static field along Z, H = E + Σ x^n O_n with q = 0.
+
+Phases. Between real functions (`rotor.quantum.tensors`) reduced elements of odd rank are i times real. States of a sector times 1 or i make
+all matrices real where such operators lead to the other factor and all others to the same one. From -M to M, with real elements R and
+colours c of the sectors,
+
+    v(-M) = (-1)^(F + c) v(M)*,
+
+since (F' K F; M 0 -M) = (-1)^(F' + F + K) (F' K F; -M 0 M) and the elements of odd rank change sign when they are conjugated.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rotor.arrays import Ints
-from rotor.quantum.basis.phases import with_real_phases
-from rotor.quantum.blocks import LinearBlocks, blocks_of_elements
-from rotor.quantum.contraction import NEGLIGIBLE, Space, flat_elements
-from rotor.quantum.wigner import three_j
+from rotor.arrays import Floats
+from rotor.quantum.symmetric_top_elements import coupling
 
 
-def in_field(space: Space, twice_m: int, components: Mapping[str, str]) -> LinearBlocks:
-    """A space in static fields along z: linear blocks of one M, a field strength being a coefficient.
+def space_factor(twice_up: int, twice_low: int, rank: int, twice_m: int, q: int = 0) -> float:
+    """(-1)^(F'-M') (F' K F; -M' q M) of doubled F', F and M, M' = M + q; 0 where a rule forbids it.
 
-    Parameters
-    ----------
-    space : Space
-        Solved without fields.
-    twice_m : int
-        Twice the projection M.
-    components : mapping of str to str
-        Name of each term, and the tensor whose component along the field it is.
-
-    Returns
-    -------
-    LinearBlocks
-        Of the terms "energy" and `components`; H = energy + Σ field · T_0, signs as the tensors have them.
+    >>> round(space_factor(2, 0, 1, 0), 6)  # 1/√3
+    0.57735
     """
-    start, count = space.starts(), len(space)
-    projects = np.repeat([s.twice_j >= abs(twice_m) for s in space.sectors], np.diff(start))
-    diagonal = np.arange(count)
-    pieces: list[tuple[Ints, Ints, int, NDArray[Any]]] = [
-        (diagonal, diagonal, 0, np.concatenate([sector.energies for sector in space.sectors]))
-    ]
-    for number, name in enumerate(components.values(), 1):
-        tensor = space.tensors[name]
-        pairs = [pair for pair in tensor.blocks if min(space.sectors[p].twice_j for p in pair) >= abs(twice_m)]
-        if not pairs:
+    if abs(twice_m) > twice_low or abs(twice_m + 2 * q) > twice_up:
+        return 0.0
+    return float(_factors(twice_up, twice_low, rank, q)[(twice_low + twice_m) // 2])
+
+
+@lru_cache(maxsize=8192)
+def _factors(twice_up: int, twice_low: int, rank: int, q: int) -> Floats:
+    """Of M = -F ... F."""
+    m = np.arange(-twice_low, twice_low + 1, 2) / 2
+    j_up, j_low = (twice // 2 if twice % 2 == 0 else twice / 2 for twice in (twice_up, twice_low))
+    return np.asarray(coupling(j_low, j_up, rank, q, m) / np.sqrt((twice_up + 1.0) * (twice_low + 1)))
+
+
+def coloured_components(
+    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]
+) -> list[tuple[list[int], list[int], bool]]:
+    """Connected components of a graph with a colour 0 or 1 for each node, and whether all edges agree with the colours.
+
+    An edge (a, b, 1) asks for different colours, (a, b, 0) for the same one.
+
+    >>> coloured_components([0, 1, 2], [(0, 1, 1)])
+    [([0, 1], [0, 1], True), ([2], [0], True)]
+    """
+    beside: dict[int, list[tuple[int, int]]] = {node: [] for node in nodes}
+    for a, b, odd in edges:
+        beside[a].append((b, odd))
+        beside[b].append((a, odd))
+    colour: dict[int, int] = {}
+    out = []
+    for start in nodes:
+        if start in colour:
             continue
-        up, low = (np.array([space.sectors[pair[side]].twice_j for pair in pairs]) for side in (0, 1))
-        m = twice_m / 2
-        factors = np.where((up - twice_m) // 2 % 2, -1.0, 1.0) * three_j(up / 2, tensor.rank, low / 2, -m, 0, m)
-        for (a, b), factor in zip(pairs, factors.tolist(), strict=True):
-            matrix = factor * tensor.blocks[a, b]
-            r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(tensor.blocks[a, b]).max(initial=0.0))
-            pieces.append((start[a] + r, start[b] + c, number, matrix[r, c]))
-    elements = with_real_phases(flat_elements(count, 1 + len(components), pieces)).elements
-    return blocks_of_elements(["energy", *components], space.labels(), elements, projects)
+        colour[start], component, agree = 0, [start], True
+        for node in component:  # grows while it is walked
+            for other, odd in beside[node]:
+                if other not in colour:
+                    colour[other] = (colour[node] + odd) % 2
+                    component.append(other)
+                agree = agree and colour[other] == (colour[node] + odd) % 2
+        members = sorted(component)
+        out.append((members, [colour[node] for node in members], agree))
+    return out

@@ -45,6 +45,12 @@ class MomentBlock(ABC):
 
     energies_mhz: Floats
     start: int
+    components: int
+
+    @property
+    @abstractmethod
+    def combined(self) -> bool:
+        """Whether functions are combined so that reduced elements of odd rank are i times real."""
 
     @property
     @abstractmethod
@@ -56,8 +62,12 @@ class MomentBlock(ABC):
         """Whether tensors, by pairs of states, have elements between the states of this block and another one."""
 
     @abstractmethod
+    def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+        """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
+
     def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
-        """Reduced elements (n_up, n_low) up to phases, their squares the strengths."""
+        """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
+        return np.asarray(np.sqrt(self.components) * np.abs(self.reduced(low, tensors)))
 
     @abstractmethod
     def slopes(self, names: Sequence[str]) -> Floats:

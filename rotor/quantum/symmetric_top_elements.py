@@ -12,13 +12,13 @@ from rotor.arrays import Floats
 from rotor.quantum.wigner import three_j
 
 
-def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
+def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floats:
     """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q: √(2J+1) ⟨J k K q|J' k'⟩.
 
     Parameters
     ----------
-    j_low, j_up : int
-        J and J'.
+    j_low, j_up : float
+        J and J', whole or half-integer.
     rank : int
         K of the tensor.
     q : int
@@ -52,12 +52,12 @@ def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
     return np.where(exists, values, 0.0)
 
 
-def coupling_of_existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
+def coupling_of_existing(j: float, j_up: float, rank: int, q: int, k: Floats) -> Floats:
     """`coupling` for k and k + q that exist.
 
     Parameters
     ----------
-    j, j_up : int
+    j, j_up : float
         J and J'.
     rank, q : int
         Rank and component along the axis of the body.
@@ -70,12 +70,12 @@ def coupling_of_existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Flo
         Without units.
     """
     if rank <= 2:
-        return closed_coupling(j, j_up - j, rank, q, k)
+        return closed_coupling(j, int(j_up - j), rank, q, k)
     root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
     return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
 
 
-def closed_coupling(j: int | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
+def closed_coupling(j: float | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
     """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist.
 
     Parameters
@@ -110,19 +110,19 @@ def sign_of(power: int) -> float:
     return -1.0 if power % 2 else 1.0
 
 
-def _vector_up(j: int | Floats, k: Floats, q: int) -> Floats:
+def _vector_up(j: float | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         return np.asarray(np.sqrt((j - k + 1) * (j + k + 1) / (j + 1)))
     return np.asarray(np.sqrt((j + k + 1) * (j + k + 2) / (2 * (j + 1))))
 
 
-def _vector_level(j: int | Floats, k: Floats, q: int) -> Floats:
+def _vector_level(j: float | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         return np.asarray(k * np.sqrt((2 * j + 1) / (j * (j + 1))))
     return np.asarray(-np.sqrt((j - k) * (j + k + 1) * ((2 * j + 1) / (2 * j * (j + 1)))))
 
 
-def _tensor_two_up(j: int | Floats, k: Floats, q: int) -> Floats:
+def _tensor_two_up(j: float | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         above = 1.5 * (j - k + 1) * (j - k + 2) * (j + k + 1) * (j + k + 2)
     elif q == 1:
@@ -132,7 +132,7 @@ def _tensor_two_up(j: int | Floats, k: Floats, q: int) -> Floats:
     return np.asarray(np.sqrt(above / ((j + 1.0) * (2 * j + 3) * (j + 2))))
 
 
-def _tensor_one_up(j: int | Floats, k: Floats, q: int) -> Floats:
+def _tensor_one_up(j: float | Floats, k: Floats, q: int) -> Floats:
     norm = 2.0 * j * (j + 1) * (j + 2)
     if q == 0:
         return np.asarray(k * np.sqrt(6 * (j - k + 1) * (j + k + 1) / norm))
@@ -141,7 +141,7 @@ def _tensor_one_up(j: int | Floats, k: Floats, q: int) -> Floats:
     return np.asarray(-np.sqrt((j - k) * (j + k + 1) * (j + k + 2) * (j + k + 3) / norm))
 
 
-def _tensor_level(j: int | Floats, k: Floats, q: int) -> Floats:
+def _tensor_level(j: float | Floats, k: Floats, q: int) -> Floats:
     norm = (2 * j - 1) * 2.0 * j * (j + 1) * (2 * j + 3) / (2 * j + 1)
     if q == 0:
         return np.asarray((3 * k * k - j * (j + 1)) * np.sqrt(2 / norm))

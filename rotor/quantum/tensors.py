@@ -85,6 +85,23 @@ def spherical_components(cartesian: ArrayLike, rank: int, representation: str) -
     )
 
 
+def cartesian_of(components: ArrayLike, representation: str) -> Floats:
+    """The vector (3,) or the symmetric matrix (3, 3) without a trace along a, b, c whose T^K_q these are.
+
+    >>> cartesian_of(spherical_components([1.0, 2.0, 3.0], 1, "Il"), "Il").round(12).tolist()
+    [1.0, 2.0, 3.0]
+    """
+    parts, turn = np.asarray(components, dtype=complex), frame_of(representation)
+    if len(parts) == 3:
+        vector = np.array([-np.sqrt(2) * parts[2].real, -np.sqrt(2) * parts[2].imag, parts[1].real])
+        return np.asarray(turn.T @ vector)
+    zero, one, two = parts[2].real / np.sqrt(6), -parts[3], parts[4]
+    matrix = np.array([[two.real - zero, two.imag, one.real],
+                       [two.imag, -two.real - zero, one.imag],
+                       [one.real, one.imag, 2 * zero]])  # fmt: skip
+    return np.asarray(turn.T @ matrix @ turn)
+
+
 def _of_matrix(t: Floats, rank: int) -> Complexes:
     if rank == 0:
         return np.array([-np.trace(t) / np.sqrt(3)], dtype=complex)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints, rising_order
 from rotor.checks import require_positive, require_whole
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
@@ -369,16 +369,6 @@ def line_list(
     if inside is not None:
         lines = lines.where(inside)
     return lines.sorted() if sort else lines
-
-
-def dipoles_by_state(
-    top: Top, dipole_abc: tuple[float, float, float], effects: Sequence[QuantumEffect]
-) -> dict[tuple[int, int], tuple[float, float, float]]:
-    """The dipole of every state, the top's own where its effect gives none, and those between states."""
-    found = {(0, 0): dipole_abc}
-    for effect in effects:
-        found |= {(state.v, state.v): dipole_abc for state in effect.states(top)} | effect.dipoles(top)
-    return found
 
 
 def _dipole_of(top: Top) -> tuple[float, float, float]:

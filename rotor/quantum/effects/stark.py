@@ -12,18 +12,19 @@ here: the matrices are solved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
-from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace
+from rotor.quantum.effect import QuantumEffect, dipoles_by_state
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.map_request import (
     MOST_AT_EDGE,
@@ -33,6 +34,7 @@ from rotor.quantum.fields.map_request import (
     checked_fields,
     checked_tolerance_mhz,
 )
+from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
@@ -165,31 +167,20 @@ def map_request(
     """
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
     unit = checked_direction(direction)
-    dipole, light = acting(top, intensity_w_per_cm2, unit)
+    dipole, light = acting(top, intensity_w_per_cm2, unit, effects)
     tilted = not dipole.along_z
     if tilted and m_values is not None:
         raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
     names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
+    if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
+        del names["cos2theta"]  # tensors of rank 2 are not carried along there
     contractions = tuple(one for one in (dipole, light) if one is not None)
-    space: Callable[[int], FieldSpace] = partial(field_space, top, contractions=contractions)
-    if top.internal_rotation is not None and not effects:
-        from rotor.quantum.fields.torsion_fields import torsion_field_space
-
-        space = partial(torsion_field_space, top, contractions=contractions)
-    if effects:
-        from rotor.quantum.fields.spin_fields import spin_field_space
-
-        space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions)
     return MapRequest(
-        space=KnownSpaces(space),
+        space=KnownSpaces(partial(field_space, top, operators=contractions, effects=tuple(effects))),
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
         fields=fields,
         j_highest=checked_j(j_highest),
-        m_values=(0,)
-        if tilted
-        else checked_m(m_values, j_highest)
-        if not effects
-        else doubled_m(top, effects, m_values, j_highest),
+        m_values=(0,) if tilted else projections(top, effects, m_values, j_highest),
         tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
         field_name="field_kv_per_cm",
         slope_name="mu_eff_debye",
@@ -199,10 +190,10 @@ def map_request(
     )
 
 
-def doubled_m(
+def projections(
     top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
-) -> tuple[int, ...]:
-    """Twice the |M_F| of a top with spins, each once.
+) -> tuple[float, ...]:
+    """|M| of the states, |M_F| of a top with spins, each once.
 
     Parameters
     ----------
@@ -217,14 +208,16 @@ def doubled_m(
 
     Returns
     -------
-    tuple of int
-        Rising.
+    tuple of float
+        Rising; whole numbers as int.
 
     Raises
     ------
     ValueError
         For values that no F of these spins has.
     """
+    if not any(effect.spins(top) for effect in effects):
+        return checked_m(m_values, j_highest)
     from rotor.quantum.spins import scheme_of
 
     total = scheme_of(top, tuple(effects)).total
@@ -235,7 +228,7 @@ def doubled_m(
             f"M_F of {list(m_values or ())}: expected are {possible[0] / 2:g}, {possible[0] / 2 + 1:g} ... {possible[-1] / 2:g} "
             "(M and -M coincide)"
         )
-    return values
+    return tuple(m / 2 if m % 2 else m // 2 for m in values)
 
 
 def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
@@ -268,9 +261,15 @@ def checked_m(m_values: Sequence[float] | None, j_highest: int) -> tuple[int, ..
 
 
 def acting(
-    top: Top, intensity_w_per_cm2: float, direction: tuple[float, float, float] = Z
+    top: Top,
+    intensity_w_per_cm2: float,
+    direction: tuple[float, float, float] = Z,
+    effects: Sequence[QuantumEffect] = (),
 ) -> tuple[Contraction, Contraction | None]:
-    """The dipole as contraction with the direction of the field, light as one with Z; ValueError where nothing acts."""
+    """The dipole as contraction with the direction of the field, light as one with Z; ValueError where nothing acts.
+
+    Of several states each has its dipole, and those between states act too.
+    """
     name = top.name or "this top"
     if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
         raise ValueError(
@@ -290,7 +289,9 @@ def acting(
         if top.polarizability_abc_angstrom3 is None:
             raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
         light = Contraction(top.polarizability_abc_angstrom3, np.outer(Z, Z))
-    return Contraction(dipole or (0.0, 0.0, 0.0), direction), light
+    own = dipole or (0.0, 0.0, 0.0)
+    states = dipoles_by_state(top, own, effects or effects_of(top, False))
+    return Contraction(own, direction, states if len(states) > 1 else {}), light
 
 
 def figure_axis(top: Top) -> int:
@@ -312,7 +313,7 @@ def _alignment(top: Top) -> Contraction:
 def _problem(
     dipole: Contraction, light: Contraction | None, intensity: float, names: dict[str, Contraction], block: FieldBlock
 ) -> BlockProblem:
-    fixed = np.diag(block.energies_mhz)
+    fixed: NDArray[Any] = np.diag(block.energies_mhz)
     if light is not None:
         fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
     slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)

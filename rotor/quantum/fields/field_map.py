@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.block_states import (
     BlockStates,
     basis_order,
@@ -30,7 +31,7 @@ from rotor.quantum.fields.block_states import (
     enough_states,
     solve_block,
 )
-from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
 from rotor.quantum.fields.solver import (
@@ -295,9 +296,13 @@ def _lowest_jmax(request: MapRequest) -> int:
     jmax = request.j_highest + STEP_J
     while jmax <= HIGHEST_J:
         levels = request.space(jmax).levels
-        top = levels.energy_mhz[levels.j <= request.j_highest].max()
-        if levels.energy_mhz[levels.j == jmax].min() > top:
-            return max(int(levels.j[levels.energy_mhz <= top].max()), request.j_highest + EDGE)
+        family = np.zeros(len(levels), dtype=np.int64) if levels.family is None else levels.family
+        tops = np.full(family.max() + 1, -np.inf)
+        followed = levels.j <= request.j_highest
+        np.maximum.at(tops, family[followed], levels.energy_mhz[followed])
+        below = levels.energy_mhz <= tops[family]
+        if not below[levels.j == jmax].any():
+            return max(int(levels.j[below].max()), request.j_highest + EDGE)
         jmax += max(STEP_J, jmax // 4)
     raise ValueError(f"levels beyond J = {HIGHEST_J} lie among those up to J = {request.j_highest}; follow fewer")
 

@@ -52,7 +52,7 @@ class MapRequest:
     """What a map is of.
 
     space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
-    followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
+    followed. m_values: |M|, with signs in a magnetic field. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
     most_at_edge: the population that a state may have in the two highest J. reach: the largest change of J that a field makes.
     """
 
@@ -60,7 +60,7 @@ class MapRequest:
     problem: Callable[[FieldBlock], BlockProblem]
     fields: Floats
     j_highest: int
-    m_values: tuple[int, ...]
+    m_values: tuple[float, ...]
     tolerance_mhz: float
     field_name: str
     slope_name: str

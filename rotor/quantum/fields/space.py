@@ -5,43 +5,54 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rotor.quantum.fields.blocks import AxialSpace, Contraction, FieldSpace, FreeLevels
+from rotor.quantum.fields.axial import AxialSpace, axial_levels
+from rotor.quantum.fields.blocks import FieldSpace
+from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet
+from rotor.quantum.fields.solved_space import solved_levels, solved_space
 from rotor.quantum.fields.tilted_blocks import tilted_space
-from rotor.quantum.fields.wang_blocks import wang_space
-from rotor.quantum.solve import solve_levels
-from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 
-def field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> FieldSpace:
-    """The states of a top up to `jmax` and the blocks that contractions leave apart.
+def field_space(
+    top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
+) -> FieldSpace:
+    """The states of a top up to `jmax` and the blocks that operators leave apart.
 
-    Raises ValueError for a spherical top.
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    jmax : int
+        The highest J, of N with spins.
+    operators : sequence of FieldOperator
+        Everything that will act.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian without the field; by default all that the top has but spins.
+
+    Returns
+    -------
+    FieldSpace
+        Closed forms of linear and symmetric tops, else solved states of the Hamiltonian.
+
+    Raises
+    ------
+    ValueError
+        For a spherical top, and for a field at an angle with Z beside spins or internal rotation.
     """
-    if not all(one.along_z for one in contractions):
-        return tilted_space(top, jmax, contractions)
+    if not all(isinstance(one, Magnet) or one.along_z for one in operators):
+        contractions = [one for one in operators if isinstance(one, Contraction)]
+        return tilted_space(top, jmax, contractions, effects)
     if top.kind == "spherical":
         raise ValueError(
             f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
             "or second order turns it"
         )
     axis = 2 if top.kind == "oblate" else 0
-    if top.kind != "asymmetric" and all(one.axial_about(axis) for one in contractions):
-        return AxialSpace(axial_levels(top, jmax), jmax, axis, any(one.rank == 1 for one in contractions))
-    return wang_space(top, jmax, contractions)
-
-
-def axial_levels(top: Top, jmax: int) -> FreeLevels:
-    """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
-    solved = solve_levels(one_state(top, "levels in a field"), jmax)
-    j, each = solved.rotational, solved.weight_per_component
-    if top.kind == "linear":
-        return FreeLevels(j, solved.energy_mhz, {}, each)
-    k = np.concatenate([solved.quanta["k"], -solved.quanta["k"][solved.quanta["k"] > 0]])
-    row = np.concatenate([np.arange(len(solved)), np.flatnonzero(solved.quanta["k"] > 0)])
-    order = np.lexsort((j[row], k))
-    return FreeLevels(j[row][order], solved.energy_mhz[row][order], {"k": k[order]}, each[row][order])
+    magnetic = any(isinstance(one, Magnet) for one in operators)
+    axial = top.kind != "asymmetric" and not effects and top.states is None
+    if axial and all(isinstance(one, Magnet) or one.axial_about(axis) for one in operators):
+        return AxialSpace(axial_levels(top, jmax), jmax, axis, any(one.rank == 1 for one in operators), magnetic)
+    return solved_space(top, solved_levels(top, jmax, effects), jmax, operators)

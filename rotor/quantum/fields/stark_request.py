@@ -17,8 +17,7 @@ from rotor.quantum.effects.stark import (
     acting,
     checked_direction,
     checked_j,
-    checked_m,
-    doubled_m,
+    projections,
     stark_map,
 )
 from rotor.quantum.estimates.limits import every_limit, limit_facts
@@ -101,10 +100,7 @@ class StarkRequest:
     def __post_init__(self) -> None:
         check_fields(self)
         checked_j(self.j_highest)
-        if self.hyperfine:
-            doubled_m(self.top, self.effects, self.m_values, self.j_highest)
-        else:
-            checked_m(self.m_values, self.j_highest)
+        projections(self.top, self.effects, self.m_values, self.j_highest)
         require_positive("most_at_edge", self.most_at_edge)
         checked_direction(self.direction)
         if self.tilted and self.m_values is not None:

@@ -4,7 +4,8 @@ A contraction of a body tensor T with a space tensor S is Σ_pq S^K_p* T^K_q D^K
 
     ⟨J'k'M'|...|J k M⟩ = ⟨J'k'‖T^K‖J k⟩ ⟨J'M'‖S^K*‖J M⟩ / √((2J'+1)(2J+1)).
 
-Both factors come from `rotor.quantum.tensors`, over Wang blocks of k and over the same Wang functions of M, so that the matrix of two
+The first factor is that of `rotor.quantum.fields.reduced_elements`, of one or more states, the second comes from
+`rotor.quantum.tensors` over Wang functions of M, so that the matrix of two
 J is a Kronecker product, real in the phases of that module: for an odd rank both factors are i times real, and their product -1
 times real. Light whose polarization has principal axes along X, Y, Z leaves the D2 species of M apart, as a diagonal polarizability
 those of k: together up to 16 blocks.
@@ -13,21 +14,24 @@ those of k: together up to 16 blocks.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.wang_blocks import coloured_components
-from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet
+from rotor.quantum.fields.reduced_elements import ReducedElements
+from rotor.quantum.fields.solved_space import solved_levels
+from rotor.quantum.in_field import coloured_components
+from rotor.quantum.reduced import twice_total
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang.basis import WangBlock, wang_blocks
 
 if TYPE_CHECKING:
-    from rotor.quantum.levels import SolvedBlock
+    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 NO_M = -1  # in place of M where it is mixed
@@ -62,16 +66,19 @@ class TiltedBlock(FieldBlock):
         """The levels of the space."""
         return self.space.levels
 
-    def matrix(self, contraction: Contraction) -> Any:
+    def matrix(self, operator: FieldOperator) -> Any:
         """The contraction over the states (n, n), real symmetric; sparse (CSR) for more than 600 of them."""
         from scipy.sparse import csr_array
+
+        if isinstance(operator, Magnet):
+            raise ValueError("a magnetic field is solved along Z alone")
 
         edges = np.cumsum([0, *(self.space.size(pair) for pair in self.members)])
         place = {pair: i for i, pair in enumerate(self.members)}
         out = csr_array if len(self) > SPARSE_ABOVE else None
         dense = np.zeros((len(self), len(self))) if out is None else None
         pieces: list[tuple[Ints, Ints, Floats]] = []
-        for up, low, elements in self.space.elements(contraction, place):
+        for up, low, elements in self.space.between(operator, place):
             first, second = edges[place[up]], edges[place[low]]
             if dense is not None:
                 dense[first : first + len(elements), second : second + elements.shape[1]] += elements
@@ -83,129 +90,136 @@ class TiltedBlock(FieldBlock):
             if up != low:
                 pieces.append((second + j, first + i, elements[i, j]))
         if dense is not None:
-            dense[np.diag_indices(len(self))] += contraction.scalar
+            dense[np.diag_indices(len(self))] += operator.scalar
             return dense
         diagonal = np.arange(len(self))
-        pieces.append((diagonal, diagonal, np.full(len(self), contraction.scalar)))
+        pieces.append((diagonal, diagonal, np.full(len(self), operator.scalar)))
         rows, columns, values = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return csr_array((values, (rows, columns)), shape=(len(self), len(self)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TiltedSpace(FieldSpace):
-    """Solved Wang blocks of k up to J max, Wang blocks of M of each J, and everything that will act."""
+    """Solved blocks up to J max, Wang blocks of M of each J, and everything that will act."""
 
     m_is_good: ClassVar[bool] = False
 
     levels: FreeLevels = field(repr=False)
     jmax: int
-    representation: str
-    solved: tuple[SolvedBlock, ...] = field(repr=False)
+    elements: ReducedElements = field(repr=False)
     contractions: tuple[Contraction, ...]
 
-    def blocks(self, m: int) -> list[FieldBlock]:
+    def blocks(self, m: float) -> list[FieldBlock]:
         """All blocks, for m = 0; none for others, since each block holds every M."""
         if m:
             return []
-        nodes = [(i, k) for i, block in enumerate(self.solved) for k in range(len(self._of_m[block.basis.j]))]
+        nodes = [(i, k) for i, j in enumerate(self._j) for k in range(len(self._of_m[j]))]
         number = {pair: n for n, pair in enumerate(nodes)}
         edges = [
             (number[up], number[low], 0)
             for contraction in self.contractions
             for up, low in self._connected(contraction)
         ]
-        found = coloured_components(range(len(nodes)), edges)
-        return [self._block(n, [nodes[i] for i in members]) for n, (members, _, _) in enumerate(found)]
+        components = coloured_components(range(len(nodes)), edges)
+        return [self._block(n, [nodes[i] for i in members]) for n, (members, _, _) in enumerate(components)]
 
     def _block(self, number: int, members: list[tuple[int, int]]) -> TiltedBlock:
         rows, abs_m = [], []
         for i, k in members:
-            block, of_m = self.solved[i], self._of_m[self.solved[i].basis.j][k]
-            rows.append(np.tile(np.arange(block.start, block.start + block.basis.size), of_m.size))
-            abs_m.append(np.repeat(of_m.k, block.basis.size))
+            block, of_m = self.elements.blocks[i], self._of_m[self._j[i]][k]
+            size = len(block.energies_mhz)
+            rows.append(np.tile(np.arange(block.start, block.start + size), of_m.size))
+            abs_m.append(np.repeat(of_m.k, size))
         return TiltedBlock(
             NO_M, f"block {number}", 1, tuple(members), np.concatenate(rows), np.concatenate(abs_m), self
         )
 
     def size(self, pair: tuple[int, int]) -> int:
         """States of a pair of blocks."""
-        block = self.solved[pair[0]].basis
-        return block.size * self._of_m[block.j][pair[1]].size
+        return len(self.elements.blocks[pair[0]].energies_mhz) * self._of_m[self._j[pair[0]]][pair[1]].size
+
+    @cached_property
+    def _j(self) -> list[int]:
+        """J of each solved block."""
+        return [twice_total(block) // 2 for block in self.elements.blocks]
 
     @cached_property
     def _of_m(self) -> dict[int, list[WangBlock]]:
         return {j: wang_blocks(j, _SPACE_AXES) for j in range(self.jmax + 1)}
 
-    @cached_property
-    def _by_j(self) -> dict[int, list[int]]:
-        out: dict[int, list[int]] = {}
-        for i, block in enumerate(self.solved):
-            out.setdefault(block.basis.j, []).append(i)
-        return out
-
     def _connected(self, contraction: Contraction) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-        """Pairs (up, low) of nodes that a contraction connects, J' ≥ J."""
-        body, space = self._tensors(contraction)
-        out = []
-        for j, lows in self._by_j.items():
-            for place, low in enumerate(lows):
-                above = [i for rise in range(1, contraction.rank + 1) for i in self._by_j.get(j + rise, [])]
-                for up in lows[place:] + above:
-                    if body.between(self.solved[up].basis, self.solved[low].basis) is None:
-                        continue
-                    out += [
-                        ((up, a), (low, b)) for a, b in self._of_m_pairs(self.solved[up].basis.j, j, space, up == low)
-                    ]
+        """Pairs (up, low) of nodes that a contraction connects, J' ≥ J; each pair once where both nodes share the solved block."""
+        space, out = self._tensor(contraction), []
+        for up, low in self.elements.connected(contraction):
+            ups, lows = self._of_m[self._j[up]], self._of_m[self._j[low]]
+            out += [
+                ((up, a), (low, b))
+                for a in range(len(ups))
+                for b in range(len(lows))
+                if space.between(ups[a], lows[b]) is not None and (a >= b or up != low)
+            ]
         return out
 
-    def _of_m_pairs(self, j_up: int, j_low: int, space: BodyTensor, same: bool) -> list[tuple[int, int]]:
-        """Wang blocks of M that the space tensor connects; each pair once where both nodes share the body block."""
-        ups, lows = self._of_m[j_up], self._of_m[j_low]
-        return [
-            (a, b)
-            for a in range(len(ups))
-            for b in range(len(lows))
-            if space.between(ups[a], lows[b]) is not None and (a >= b or not same)
-        ]
-
-    def _tensors(self, contraction: Contraction) -> tuple[BodyTensor, BodyTensor]:
-        """The body tensor, and the complex conjugate of the space tensor, which is that of its mirror image y → -y."""
+    def _tensor(self, contraction: Contraction) -> BodyTensor:
+        """The complex conjugate of the space tensor, which is that of its mirror image y → -y."""
         mirror = np.array([1.0, -1.0, 1.0])
         space = contraction.space * mirror if contraction.rank == 1 else contraction.space * np.outer(mirror, mirror)
-        body = body_tensor(contraction.body, contraction.rank, self.representation)
-        return body, body_tensor(space, contraction.rank, _SPACE_AXES)
+        return body_tensor(space, contraction.rank, _SPACE_AXES)
 
-    def elements(
+    def between(
         self, contraction: Contraction, members: dict[tuple[int, int], int]
     ) -> list[tuple[tuple[int, int], tuple[int, int], Floats]]:
-        """(up, low, real elements) of every connected pair among `members`, M running slower than the states of k."""
-        body, space = self._tensors(contraction)
+        """(up, low, real elements) of every connected pair among `members`, M running slower than the solved states."""
+        space = self._tensor(contraction)
         sign = -1.0 if contraction.rank == 1 else 1.0
-        out, known = [], {}
+        out = []
         for up, low in self._connected(contraction):
             if up not in members or low not in members:
                 continue
-            of_k, low_k = self.solved[up[0]], self.solved[low[0]]
-            of_m, low_m = self._of_m[of_k.basis.j][up[1]], self._of_m[low_k.basis.j][low[1]]
-            if (up[0], low[0]) not in known:
-                known[up[0], low[0]] = wang_amplitudes(of_k, low_k, body)
-            root = np.sqrt((2.0 * of_k.basis.j + 1) * (2 * low_k.basis.j + 1))
-            out.append((up, low, np.kron(block_elements(of_m, low_m, space) * (sign / root), known[up[0], low[0]])))
+            reduced = self.elements.between(contraction, up[0], low[0])
+            if reduced is None:
+                continue
+            j_up, j_low = self._j[up[0]], self._j[low[0]]
+            of_m = block_elements(self._of_m[j_up][up[1]], self._of_m[j_low][low[1]], space)
+            root = np.sqrt((2.0 * j_up + 1) * (2 * j_low + 1))
+            out.append((up, low, np.kron(of_m * (sign / root), reduced)))
         return out
 
 
-def tilted_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> TiltedSpace:
+def elements_of_mixed(up: TiltedBlock, low: TiltedBlock, dipole: Contraction) -> list[Floats]:
+    """⟨up|μ_X|low⟩, ⟨up|μ_Y|low⟩ and ⟨up|μ_Z|low⟩ (n_up, n_low), real in the phases of this module."""
+    space = up.space
+    starts = [np.cumsum([0, *(space.size(pair) for pair in block.members)]) for block in (up, low)]
+    place = [
+        {pair: int(edges[n]) for n, pair in enumerate(block.members)}
+        for block, edges in zip((up, low), starts, strict=True)
+    ]
+    members = dict.fromkeys((*up.members, *low.members), 0)
+    out = []
+    for axis in np.eye(3):
+        matrix = np.zeros((len(up), len(low)))
+        for one, other, elements in space.between(replace(dipole, space=axis), members):
+            sides = [(one, other, elements)] if one == other else [(one, other, elements), (other, one, elements.T)]
+            for left, right, values in sides:
+                if left in place[0] and right in place[1]:
+                    row, column = place[0][left], place[1][right]
+                    matrix[row : row + values.shape[0], column : column + values.shape[1]] = values
+        out.append(matrix)
+    return out
+
+
+def tilted_space(
+    top: Top, jmax: int, contractions: Sequence[Contraction], effects: Sequence[QuantumEffect] = ()
+) -> TiltedSpace:
     """The space of a top for fields of any direction.
 
-    Raises ValueError for a spherical top.
+    Raises ValueError for a spherical top, and for spins and internal rotation.
     """
-    from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.wang.rotation import representation_of, solve_rotation
-    from rotor.tops.top import one_state
-
     if top.kind == "spherical":
         raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
-    levels = solve_rotation(one_state(top, "levels in a field"), SEMI_RIGID, 0, jmax, in_blocks=True)
-    quanta = {name: column for name, column in levels.quanta.items() if name != "j"}
-    free = FreeLevels(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component)
-    return TiltedSpace(free, jmax, representation_of(top), levels.blocks, tuple(contractions))
+    if any(effect.spins(top) for effect in effects):
+        raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
+    if top.internal_rotation is not None:
+        raise ValueError("a top with internal rotation is solved in fields along Z alone; leave out the angle")
+    levels = solved_levels(top, jmax, effects)
+    return TiltedSpace(FreeLevels.of(levels), jmax, ReducedElements(levels), tuple(contractions))

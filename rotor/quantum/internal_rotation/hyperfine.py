@@ -24,6 +24,7 @@ from rotor.quantum.internal_rotation.levels import (
     components_of,
     reduced_weights,
     species_blocks,
+    turned_by,
     turning_tops,
 )
 from rotor.quantum.internal_rotation.species import SpeciesLevels
@@ -32,7 +33,7 @@ from rotor.quantum.operators.algebra import Operator, half_anticommutator
 from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.terms import Spin
-from rotor.quantum.tensors import Tensors, spherical_components
+from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 if TYPE_CHECKING:
@@ -81,17 +82,35 @@ class HyperfineBlock(MomentBlock):
             return False
         dipoles = self.species.space.tensors
         pair = self.sector, low.sector
-        return any(pair in dipoles[f"mu {axis}"].blocks for axis, value in _vector(tensors).items() if value)
+        return any(pair in dipoles[f"mu {axis}"].blocks for axis, value in self._vector(tensors).items() if value)
 
-    def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
-        """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
+    @property
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+        return self.species.levels.functions.folded
+
+    def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+        """Reduced elements (n_up, n_low) of one component."""
         assert isinstance(low, HyperfineBlock)
-        total = np.zeros((len(self.states), len(low.states)), dtype=complex)
-        for axis, value in _vector(tensors).items():
-            block = self.species.space.tensors[f"mu {axis}"].blocks.get((self.sector, low.sector)) if value else None
-            if block is not None:
-                total += value * block[np.ix_(self.states, low.states)]
-        return np.asarray(np.sqrt(self.components) * np.abs(total))
+        pieces = [
+            value * block[np.ix_(self.states, low.states)]
+            for axis, value in self._vector(tensors).items()
+            if value
+            and (block := self.species.space.tensors[f"mu {axis}"].blocks.get((self.sector, low.sector))) is not None
+        ]
+        return np.asarray(sum(pieces)) if pieces else np.zeros((len(self.states), len(low.states)))
+
+    def _vector(self, tensors: Tensors) -> dict[str, float]:
+        """Components of a vector along the axes of ρ by their names."""
+        body = tensors[0, 0]
+        if body.rank != 1:
+            raise ValueError(
+                "spins beside internal rotation: elements of dipoles are computed, of tensors of rank 2 none"
+            )
+        vector = turned_by(cartesian_of(body.components, REPRESENTATION), self.species.model.angle)
+        if self.species.model.has_plane and abs(vector[2]) > 0:
+            raise ValueError("a dipole along c beside internal rotation: the molecule has the plane ab as a mirror")
+        return dict(zip("abc", vector.tolist(), strict=True))
 
     def slopes(self, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the torsion-rotation levels that name the states; constants of spins count for nothing."""
@@ -99,13 +118,6 @@ class HyperfineBlock(MomentBlock):
         rows = self.species.quanta[self.sector]["row"][self.states]
         slopes = self.species.levels.slopes(rows) @ self.species.model.jacobian
         return np.column_stack([slopes[:, known.index(n)] if n in known else np.zeros(len(rows)) for n in names])
-
-
-def _vector(tensors: Tensors) -> dict[str, float]:
-    """Components along a, b, c of a vector from T_q, z, x, y being a, b, c."""
-    down, along, up = tensors[0, 0].components
-    x, y = (down - up) / np.sqrt(2), 1j * (down + up) / np.sqrt(2)
-    return {"a": float(np.real(along)), "b": float(np.real(x)), "c": float(np.real(y))}
 
 
 def hyperfine_levels(
@@ -203,12 +215,14 @@ def _nuclei(top: Top, effects: Sequence[QuantumEffect], angle: float) -> list[Nu
     for spin in spins.values():
         if spin.electron or spin.total:
             raise ValueError(f"spin {spin.name} beside internal rotation: computed are single nuclei")
-    turn = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
     none: dict[type, Floats] = {}
     return [
         NucleusTensors(
             spin,
-            *(turn @ tensors.get(name, none).get(kind, np.zeros((3, 3))) @ turn.T for kind in (Cosines, CosinesWithN)),
+            *(
+                turned_by(tensors.get(name, none).get(kind, np.zeros((3, 3))), angle)
+                for kind in (Cosines, CosinesWithN)
+            ),
         )
         for name, spin in spins.items()
     ]

@@ -17,7 +17,7 @@ from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.internal_rotation.two_tops import TwoTops, two_tops
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.tensors import Tensors
+from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 if TYPE_CHECKING:
@@ -74,15 +74,17 @@ class SpeciesMoments:
 
 
 def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
-    """T_q of a vector along the axes of ρ, which lie at an angle (radians) from those of the vector; real where they can be."""
+    """T_q along the axes of ρ, which lie at an angle (radians) from those of the tensor, a towards b; real where they can be."""
     if angle:
-        if len(components) != 3:
-            raise ValueError("tensors of rank 2 with internal rotation: give the constants in the rho-axis frame (RAM)")
-        down, along, up = components
-        x, y = (down - up) / np.sqrt(2), 1j * (down + up) / np.sqrt(2)
-        z, x = np.cos(angle) * along + np.sin(angle) * x, np.cos(angle) * x - np.sin(angle) * along
-        components = np.array([(x - 1j * y) / np.sqrt(2), z, -(x + 1j * y) / np.sqrt(2)])
+        body = turned_by(cartesian_of(components, REPRESENTATION), angle)
+        components = spherical_components(body, body.ndim, REPRESENTATION)
     return components.real if not np.abs(components.imag).max() else components
+
+
+def turned_by(body: Floats, angle: float) -> Floats:
+    """A vector or tensor along the axes of ρ, which lie at an angle (radians) from a towards b."""
+    turn = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(turn @ body if body.ndim == 1 else turn @ body @ turn.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +116,18 @@ class TorsionBlock(MomentBlock):
             and (self.number, low.number) in self.moments.between(tensors)
         )
 
-    def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
-        """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
+    @property
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+        return self.moments.levels.functions.folded
+
+    def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+        """Reduced elements (n_up, n_low) of one component."""
         assert isinstance(low, TorsionBlock)
         entries = self.moments.between(tensors)[self.number, low.number]
         matrix = np.zeros((len(self.vectors), len(low.vectors)), dtype=entries.values.dtype)
         matrix[entries.rows, entries.columns] = entries.values
-        reduced = self.vectors.conj().T @ (matrix @ low.vectors)
-        return np.asarray(np.sqrt(self.components) * np.abs(reduced))
+        return np.asarray(self.vectors.conj().T @ (matrix @ low.vectors))
 
     def slopes(self, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the states, by the constants of the top and of the internal rotor."""

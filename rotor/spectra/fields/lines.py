@@ -26,13 +26,14 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.stark import Z, checked_direction, map_request
-from rotor.quantum.fields.block_states import BlockStates, block_states
+from rotor.quantum.effects.stark import Z, acting, checked_direction, map_request
+from rotor.quantum.fields.block_states import BlockStates
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.tilted_blocks import TiltedBlock
-from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks
+from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.tilted_blocks import TiltedBlock, elements_of_mixed
+from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks, states_of_both_signs
 from rotor.spectra.fields.light import Light, LightText, Vector, light_of
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
@@ -204,11 +205,13 @@ def field_lines(
         top, fields_kv_per_cm, j_highest, None, intensity_w_per_cm2, direction, tolerance_mhz, effects=effects
     )
     jmax = smallest_jmax(request, executor) if jmax is None else jmax
-    solved = _solved(request, jmax, bool(effects), executor)
+    both = each_block(request, jmax, partial(states_of_both_signs, request, fields=request.fields, jmax=jmax), executor)
+    solved = [states for pair in both for states in pair]
     found = populations_in_field(top, solved, temperature_k, populations, effects)
     seen = seen if isinstance(solved[0].block, TiltedBlock) else seen.about(unit)
     parts = [
-        _lines_of(solved, pair, strength, found, j_highest) for pair, strength in _strengths(top, solved, seen, unit)
+        _lines_of(solved, pair, strength, found, j_highest)
+        for pair, strength in _strengths(acting(top, 0.0, unit, effects)[0], solved, seen, unit)
     ]
     columns = _joined(parts)
     if effects or isinstance(solved[0].block, TiltedBlock):
@@ -234,23 +237,11 @@ def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
     return max(float(one.error[:, one.block.levels.j[one.rows] <= j_highest].max(initial=0.0)) for one in solved)
 
 
-def _solved(request: MapRequest, jmax: int, spins: bool, executor: Executor | None) -> list[BlockStates]:
-    """The states of all blocks; with spins M_F and -M_F apart."""
-    if not spins:
-        return each_block(request, jmax, partial(block_states, request, fields=request.fields, jmax=jmax), executor)
-    from rotor.quantum.fields.mixed_transitions import signed_states
-
-    both = each_block(request, jmax, partial(signed_states, request, fields=request.fields, jmax=jmax), executor)
-    return [one for pair in both for one in pair]
-
-
-def _strengths(top: Top, solved: list[BlockStates], light: Light, unit: Vector) -> Iterator[tuple[BlockPair, Floats]]:
+def _strengths(
+    dipole: Contraction, solved: list[BlockStates], light: Light, unit: Vector
+) -> Iterator[tuple[BlockPair, Floats]]:
     """Pairs of blocks and S (fields, up, low) of their states in D²."""
-    from rotor.quantum.fields.mixed_transitions import elements_of_mixed, elements_with_spins, pairs_with_spins
-    from rotor.quantum.fields.spin_fields import SpinFieldBlock
-
-    dipole, blocks = top.dipole_abc_debye, [one.block for one in solved]
-    assert dipole is not None
+    blocks = [one.block for one in solved]
     if isinstance(blocks[0], TiltedBlock):
         for low, up in combinations_with_replacement(range(len(blocks)), 2):
             axes = elements_of_mixed(blocks[up], blocks[low], dipole)  # type: ignore[arg-type]
@@ -258,12 +249,10 @@ def _strengths(top: Top, solved: list[BlockStates], light: Light, unit: Vector) 
                 between = [_between(solved[up], solved[low], one) for one in axes]
                 yield BlockPair(up, low, 0, 1), light.strength(between, unit)
         return
-    spins = isinstance(blocks[0], SpinFieldBlock)
-    for pair in pairs_with_spins(blocks) if spins else pairs_of_blocks(blocks):
+    for pair in pairs_of_blocks(blocks):
         factor = light.factors[pair.q] * pair.copies
         if factor > 1e-30:  # the cosine of 90 degrees is not quite 0
-            make: Any = elements_with_spins if spins else dipole_elements
-            elements = make(blocks[pair.up], blocks[pair.low], dipole)
+            elements = dipole_elements(blocks[pair.up], blocks[pair.low], dipole)
             if elements.any():
                 yield pair, factor * np.abs(_between(solved[pair.up], solved[pair.low], elements)) ** 2
 

@@ -1,0 +1,131 @@
+"""Linear and symmetric tops in fields along Z: chains of J for each k and M, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
+from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet, along
+from rotor.quantum.solve import solve_levels
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class AxialBlock(FieldBlock):
+    """States |J k M⟩ of one k and M of a linear or symmetric top, `step` 2 where J even and odd are apart.
+
+    axis: 0 where the figure axis is a, 2 where it is c.
+    """
+
+    m: int
+    k: int
+    copies: int
+    step: int
+    axis: int
+    rows: Ints = field(repr=False)
+    space: AxialSpace = field(repr=False)
+
+    @property
+    def levels(self) -> FreeLevels:
+        """The levels of the space."""
+        return self.space.levels
+
+    @property
+    def even_in_field(self) -> bool:
+        """Where K M is not 0 a reversed field exchanges K and -K."""
+        return not self.k * self.m
+
+    @property
+    def label(self) -> str:
+        """k, and the parity of J where it is good."""
+        parity = "" if self.step == 1 else (" J odd" if int(self.j[0]) % 2 else " J even")
+        return f"k={self.k}{parity}"
+
+    def bands(self, contraction: Contraction) -> list[Floats]:
+        """Diagonals of the matrix, the main one first; at most three."""
+        size = along(contraction.body, self.axis) * along(contraction.space, 2)
+        first, j = max(abs(self.k), abs(self.m)), self.j
+        skip = int(j[0]) - first
+        bands = _cosines(contraction.rank, first, int(j[-1]), self.k, self.m)
+        if contraction.rank == 1:
+            return [size * band[skip:] for band in bands]
+        d, one, two = (band[skip:] for band in bands)
+        main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
+        return [main, size * two[::2]] if self.step == 2 else [main, size * one, size * two]
+
+    def matrix(self, operator: FieldOperator) -> Floats:
+        """The operator over the states (n, n), real; that of a vector connects nothing where J even and odd are apart."""
+        if isinstance(operator, Magnet):
+            return self._moment(operator.g)
+        if self.step == 2 and operator.rank == 1:
+            return np.zeros((len(self), len(self)))
+        size = len(self)
+        out = np.zeros(size * size)
+        for n, band in enumerate(self.bands(operator)):
+            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
+        return out.reshape(size, size)
+
+    def _moment(self, g: Floats) -> Floats:
+        """g⊥ M + (g∥ - g⊥) k cosθ."""
+        across = (np.trace(g) - g[self.axis, self.axis]) / 2
+        diagonal, beside = cosine_bands(self.j, self.k, self.m)
+        chain = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
+        return np.asarray(across * self.m * np.eye(len(self)) + (g[self.axis, self.axis] - across) * self.k * chain)
+
+
+@lru_cache(maxsize=4096)
+def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats, ...]:
+    """Bands of cosθ (power 1) or cos²θ (2) over J = first ... last."""
+    return (cosine_bands if power == 1 else cosine_squared_bands)(np.arange(first, last + 1), k, m)
+
+
+@dataclass(frozen=True)
+class AxialSpace(FieldSpace):
+    """Of a linear or symmetric top whose tensors have its axis; `oriented` where a vector connects J with J ± 1."""
+
+    levels: FreeLevels = field(repr=False)
+    jmax: int
+    axis: int
+    oriented: bool
+    magnetic: bool = False
+
+    def blocks(self, m: float) -> list[FieldBlock]:
+        """(k, M) is like (-k, -M); without a dipole like (-k, M) too, and in a magnetic field like (-k, M) alone."""
+        out: list[FieldBlock] = []
+        number = int(m)
+        for k, rows in self._rows_by_k.items():
+            both_signs = self.oriented and number > 0 and not self.magnetic
+            rows = rows[max(abs(number) - abs(k), 0) :]
+            if not len(rows) or (k < 0 and not both_signs):
+                continue
+            copies = (2 if number and not self.magnetic else 1) * (2 if k and not both_signs else 1)
+            apart = not self.oriented and k * number == 0
+            for half in (rows[::2], rows[1::2]) if apart else (rows,):
+                if len(half):
+                    out.append(AxialBlock(number, k, copies, 2 if apart else 1, self.axis, half, self))
+        return out
+
+    @cached_property
+    def _rows_by_k(self) -> dict[int, Ints]:
+        k = self.levels.quanta.get("k", np.zeros(len(self.levels), dtype=np.int64))
+        return {int(value): np.flatnonzero(k == value) for value in np.unique(k)}
+
+
+def axial_levels(top: Top, jmax: int) -> FreeLevels:
+    """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
+    solved = solve_levels(top, jmax)
+    j, each = solved.rotational, solved.weight_per_component
+    if top.kind == "linear":
+        return FreeLevels(j, solved.energy_mhz, {}, each)
+    k = np.concatenate([solved.quanta["k"], -solved.quanta["k"][solved.quanta["k"] > 0]])
+    row = np.concatenate([np.arange(len(solved)), np.flatnonzero(solved.quanta["k"] > 0)])
+    order = np.lexsort((j[row], k))
+    return FreeLevels(j[row][order], solved.energy_mhz[row][order], {"k": k[order]}, each[row][order])

@@ -1,0 +1,129 @@
+"""What a field does to a top: an operator fixed in the molecule, contracted with something fixed in space.
+
+    Σ_F E_F μ_F     (vector with vector),        Σ_FG S_FG α_FG     (symmetric tensor with symmetric tensor),
+
+and so are the cosines: cosθ of a body axis g and Z is the contraction of the unit vectors g and Z, cos²θ that of gg and ZZ.
+A `Contraction` holds both as Cartesian arrays; in spherical components it is tr·tr/3 and Σ_p S^K_p* T^K_p with the elements of
+`rotor.quantum.tensors`. A `Magnet` is what a magnetic field along Z acts on,
+
+    ½ Σ g_ij {Φ_Zi, N_j} + Σ_spins g_I I_Z,        times -μ_N B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.quantum.tensors import Tensors, body_tensor
+
+ROUND_OFF = 1e-9  # of the largest element: what a tensor may miss of being axial
+
+Key = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Contraction:
+    """A body vector (3,) with a space vector (3,), or a symmetric body tensor (3, 3) with a symmetric space tensor (3, 3).
+
+    body: along a, b, c, of the state v = 0. space: along X, Y, Z. states: the body parts by pairs (v', v) where there are several states;
+    by default each state has the same and none acts between them.
+
+    >>> Contraction([1.0, 0, 0], [0, 0, 1.0]).rank  # cosθ of the a axis
+    1
+    """
+
+    body: Any
+    space: Any
+    states: Mapping[tuple[int, int], tuple[float, ...]] = field(default_factory=dict)
+
+    time_odd = False
+
+    def __post_init__(self) -> None:
+        body, space = np.array(self.body, dtype=np.float64), np.array(self.space, dtype=np.float64)
+        if body.shape != space.shape or body.shape not in ((3,), (3, 3)):
+            raise ValueError(
+                f"a contraction is of two vectors (3,) or of two tensors (3, 3); got {body.shape}, {space.shape}"
+            )
+        if not (np.isfinite(body).all() and np.isfinite(space).all()):
+            raise ValueError("a contraction of fields has numbers that are not finite")
+        object.__setattr__(self, "body", body)
+        object.__setattr__(self, "space", space)
+
+    @property
+    def rank(self) -> int:
+        """1 of vectors, 2 of tensors (their traces are a number besides)."""
+        return int(self.body.ndim)
+
+    @cached_property
+    def key(self) -> Key:
+        """The part fixed in the molecule, by which its elements are known."""
+        return (self.body.tobytes(), *sorted(self.states.items()))
+
+    def tensors(self, states: tuple[int, ...], representation: str) -> Tensors:
+        """T^K of each state, and between them."""
+        bodies = dict(self.states) if self.states else {(v, v): self.body for v in states}
+        return {pair: body_tensor(body, self.rank, representation) for pair, body in bodies.items() if np.any(body)}
+
+    @cached_property
+    def along_z(self) -> bool:
+        """Whether the space part is symmetric about Z, so that M is conserved."""
+        return _axial(self.space, 2)
+
+    def axial_about(self, axis: int) -> bool:
+        """Whether the body part is symmetric about a (0), b (1) or c (2)."""
+        return all(_axial(np.asarray(body), axis) for body in (self.body, *self.states.values()))
+
+    @cached_property
+    def size(self) -> float:
+        """The component q = 0 of the space part: of T^1_0 = Z, or T^2_0 = (2ZZ - XX - YY)/√6."""
+        space = self.space
+        return float(space[2]) if self.rank == 1 else float((2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6))
+
+    @property
+    def scalar(self) -> float:
+        """The part that does not depend on orientation."""
+        return float(np.trace(self.body) * np.trace(self.space) / 3) if self.rank == 2 else 0.0
+
+
+@dataclass(frozen=True)
+class Magnet:
+    """The rotational g tensor (3, 3) along a, b, c, alike in all states, and g of nuclei by the names of their spins."""
+
+    g: Floats
+    nuclei: Mapping[str, float] = field(default_factory=dict)
+
+    rank = 1
+    time_odd = True
+    size = 1.0
+    scalar = 0.0
+
+    @cached_property
+    def key(self) -> Key:
+        """By which its elements are known."""
+        return ("magnet", self.g.tobytes(), *self.nuclei.items())
+
+
+FieldOperator = Contraction | Magnet
+
+
+def _axial(array: Floats, axis: int) -> bool:
+    others = [i for i in range(3) if i != axis]
+    if array.ndim == 1:
+        rest = array[others]
+    else:
+        i, j = others
+        rest = np.array([array[0, 1], array[0, 2], array[1, 2], array[i, i] - array[j, j]])
+    return bool(np.abs(rest).max() <= ROUND_OFF * max(float(np.abs(array).max()), 1e-300))
+
+
+def along(array: Floats, axis: int) -> float:
+    """The axial component of a vector, or the difference of a tensor's element along the axis and across it."""
+    if array.ndim == 1:
+        return float(array[axis])
+    across = (np.trace(array) - array[axis, axis]) / 2
+    return float(array[axis, axis] - across)

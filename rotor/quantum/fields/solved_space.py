@@ -1,0 +1,293 @@
+"""Solved states of any Hamiltonian in a field along Z: sets of solved blocks that operators connect, for one M.
+
+A sector is a solved block of one total angular momentum, or what of it belongs to one torsional state. The matrix between two sectors is
+their reduced elements (`rotor.quantum.fields.reduced_elements`) times the factor of M (`rotor.quantum.in_field`), made once for all M,
+fields and constants that only multiply it. No static field connects torsional species; elements between states of different v_t, whose
+overlaps are small, are left out: levels move by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Ints
+from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
+from rotor.quantum.fields.reduced_elements import ReducedElements, axial_k
+from rotor.quantum.in_field import coloured_components, space_factor
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.reduced import twice_total
+from rotor.quantum.solve import solve_levels
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+
+class Sector(NamedTuple):
+    """States of a solved block: its number, the places of the states in it (None: all), their rows among the levels, and twice F."""
+
+    block: int
+    places: Ints | None
+    rows: Ints
+    twice_f: int
+
+
+@dataclass(frozen=True)
+class SolvedFieldBlock(FieldBlock):
+    """States |F τ M⟩ of the sectors `members`, with the colour 0 or 1 of each: its states times 1 or i.
+
+    real: whether all matrices are real then. paired: whether each state stands for its mirror image too (K and -K, σ and -σ), so that
+    M and -M differ in an electric field.
+    """
+
+    m: float
+    copies: int
+    members: tuple[int, ...]
+    colours: tuple[int, ...]
+    real: bool
+    paired: bool
+    rows: Ints = field(repr=False)
+    space: SolvedSpace = field(repr=False)
+
+    @property
+    def twice_m(self) -> int:
+        """Twice M."""
+        return round(2 * self.m)
+
+    @property
+    def even_in_field(self) -> bool:
+        """A reversed field exchanges mirror images of one M."""
+        return not (self.paired and self.m)
+
+    @property
+    def label(self) -> str:
+        """Species of Wang functions, K where it is good, else the lowest level."""
+        blocks = [self.space.elements.blocks[self.space.sectors[i].block] for i in self.members]
+        if isinstance(blocks[0], SolvedBlock):
+            return "+".join(sorted({block.basis.species for block in blocks}))
+        k = axial_k(blocks[0])
+        return f"from {self.levels.label(int(self.rows[0]))}" if k is None else f"k={k}"
+
+    @property
+    def levels(self) -> FreeLevels:
+        """The levels of the space."""
+        return self.space.levels
+
+    @cached_property
+    def starts(self) -> Ints:
+        """Where the states of each sector begin, and the number of states."""
+        return np.cumsum([0, *(len(self.space.sectors[i].rows) for i in self.members)])
+
+    @cached_property
+    def signs(self) -> Ints:
+        """(-1)^(F + c) of the states but for one sign (n,), by which v(-M) differs from v(M)* (see `rotor.quantum.in_field`)."""
+        sectors = [self.space.sectors[i] for i in self.members]
+        odd = [(one.twice_f - sectors[0].twice_f) // 2 + c for one, c in zip(sectors, self.colours, strict=True)]
+        return np.repeat(np.where(np.array(odd) % 2, -1, 1), np.diff(self.starts))
+
+    def matrix(self, operator: FieldOperator) -> NDArray[Any]:
+        """The operator over the states (n, n), real symmetric or complex Hermitian."""
+        out: NDArray[Any] = np.diag(np.full(len(self), operator.scalar))
+        places = [slice(a, b) for a, b in pairwise(self.starts.tolist())]
+        for i, k, elements in self._elements(operator):
+            if elements.dtype != out.dtype and elements.dtype == np.complex128:
+                out = out.astype(np.complex128)
+            rows, columns = places[i], places[k]
+            out[rows, columns] += elements
+            if i != k:
+                out[columns, rows] += elements.conj().T
+        return out
+
+    def _elements(self, operator: FieldOperator) -> Iterator[tuple[int, int, NDArray[Any]]]:
+        """Places of two members, F' ≥ F, and the elements between their states in the phases of their colours."""
+        space, place = self.space, {sector: i for i, sector in enumerate(self.members)}
+        for i, up in enumerate(self.members):
+            for low, odd in space.below(operator).get(up, ()):
+                k = place.get(low)
+                factor = 0.0 if k is None else space.factor(operator, up, low, self.twice_m)
+                elements = space.reduced(operator, up, low) if factor else None
+                if k is not None and elements is not None:
+                    yield i, k, _turned(self.colours[k] - self.colours[i] + odd, factor * elements)
+
+    def between(self, operator: FieldOperator, low: SolvedFieldBlock) -> NDArray[Any]:
+        """⟨M'|T_q|M⟩ of an operator from the states of another block (n, n_low), q = M' - M; T_q† = (-1)^q T_-q of Hermitian tensors."""
+        q, space = (self.twice_m - low.twice_m) // 2, self.space
+        place = {sector: i for i, sector in enumerate(self.members)}
+        out = np.zeros((len(self), len(low)), dtype=np.complex128)
+        low_place = {sector: i for i, sector in enumerate(low.members)}
+        for first in {*self.members, *low.members}:
+            for second, odd in space.below(operator).get(first, ()):
+                for bra, ket, adjoint in ((first, second, False), (second, first, True))[: 1 + (first != second)]:
+                    if bra not in place or ket not in low_place:
+                        continue
+                    m = self.twice_m if adjoint else low.twice_m
+                    factor = space.factor(operator, first, second, m, -q if adjoint else q)
+                    elements = space.reduced(operator, first, second) if factor else None
+                    if elements is None:
+                        continue
+                    i, k = place[bra], low_place[ket]
+                    turns = low.colours[k] - self.colours[i] + (-odd if adjoint else odd)
+                    matrix = (-1) ** q * elements.conj().T if adjoint else elements
+                    rows, columns = slice(*self.starts[i : i + 2]), slice(*low.starts[k : k + 2])
+                    out[rows, columns] += _turned(turns, factor * matrix)
+        return out
+
+
+def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
+    """i^turns times a matrix, real where that is real."""
+    if turns % 4 == 0:
+        return matrix
+    return -matrix if turns % 4 == 2 else np.asarray((1j if turns % 4 == 1 else -1j) * matrix)
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedSpace(FieldSpace):
+    """Solved blocks up to J max and the operators that act on them; a magnet makes M and -M differ."""
+
+    levels: FreeLevels = field(repr=False)
+    jmax: int
+    sectors: tuple[Sector, ...] = field(repr=False)
+    elements: ReducedElements = field(repr=False)
+    operators: tuple[FieldOperator, ...]
+    _below: dict[Key, dict[int, list[tuple[int, int]]]] = field(default_factory=dict, repr=False)
+
+    def blocks(self, m: float) -> list[FieldBlock]:
+        """Connected sets of sectors: of ±M in an electric field, of M and of -M where states are paired; of M in a magnetic one."""
+        twice_m = round(2 * m)
+        nodes = [i for i, sector in enumerate(self.sectors) if sector.twice_f >= abs(twice_m)]
+        edges = [
+            (up, low, odd)
+            for operator in self.operators
+            for up, lows in self.below(operator).items()
+            for low, odd in lows
+            if self.factor(operator, up, low, twice_m)
+        ]
+        magnetic = any(isinstance(operator, Magnet) for operator in self.operators)
+        out: list[FieldBlock] = []
+        for members, colours, real in coloured_components(nodes, edges):
+            paired = self.elements.paired[self.sectors[members[0]].block]
+            signs = (1, -1) if paired and twice_m and not magnetic else (1,)
+            copies = 2 if paired or (twice_m and not magnetic) else 1
+            rows = np.concatenate([self.sectors[i].rows for i in members])
+            for sign in signs:
+                number = sign * twice_m / 2 if twice_m % 2 else sign * (twice_m // 2)
+                out.append(SolvedFieldBlock(number, copies, tuple(members), tuple(colours), real, paired, rows, self))
+        return out
+
+    def below(self, operator: FieldOperator) -> dict[int, list[tuple[int, int]]]:
+        """By sector those of equal or lower F that an operator connects, with 1 where elements stand for i times themselves, else 0."""
+        if operator.key not in self._below:
+            pairs: dict[int, list[tuple[int, int]]] = {}
+            for up, low, odd in self._pairs(operator):
+                pairs.setdefault(up, []).append((low, odd))
+            self._below[operator.key] = pairs
+        return self._below[operator.key]
+
+    def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
+        for up, low in self.elements.connected(operator):
+            odd = int(operator.rank % 2 and not operator.time_odd and self.elements.combined[low])
+            for a in self._sectors_of[up]:
+                for b in self._sectors_of[low]:
+                    if self._same_torsion(a, b) and (up != low or a >= b):
+                        yield a, b, odd
+
+    def _same_torsion(self, a: int, b: int) -> bool:
+        vt = self.levels.quanta.get("vt")
+        if vt is None or self.sectors[a].places is None:
+            return True
+        return bool(vt[self.sectors[a].rows[0]] == vt[self.sectors[b].rows[0]])
+
+    @cached_property
+    def _sectors_of(self) -> dict[int, list[int]]:
+        out: dict[int, list[int]] = {}
+        for number, sector in enumerate(self.sectors):
+            out.setdefault(sector.block, []).append(number)
+        return out
+
+    def factor(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int = 0) -> float:
+        """The factor of M between two sectors, for q = 0 times the size of the operator in space."""
+        factor = space_factor(self.sectors[up].twice_f, self.sectors[low].twice_f, operator.rank, twice_m, q)
+        return factor if q else operator.size * factor
+
+    def reduced(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
+        """Reduced elements between two sectors."""
+        first, second = self.sectors[up], self.sectors[low]
+        elements = self.elements.between(operator, first.block, second.block)
+        if elements is None or first.places is None or second.places is None:
+            return elements
+        return np.asarray(elements[np.ix_(first.places, second.places)])
+
+
+def solved_space(
+    top: Top, levels: Levels, jmax: int, operators: Sequence[FieldOperator], together: bool = False
+) -> SolvedSpace:
+    """The space of solved levels for fields along Z; with `together` states of all v_t of a species in one block.
+
+    Raises ValueError for a symmetric top whose spins leave K good, with operators that do not have its axis, and for g of a spin that
+    there is not.
+    """
+    elements = ReducedElements(levels)
+    _refuse_across_axis(top, elements, operators)
+    _refuse_unknown_nuclei(elements, operators)
+    sectors = tuple(_sectors(levels, not together))
+    free = FreeLevels.of(levels)
+    space = SolvedSpace(free, jmax, sectors, elements, tuple(operators))
+    if not set(BEFORE_J) & set(free.quanta):
+        return space
+    family = np.zeros(len(free), dtype=np.int64)
+    edges = [(up, low, 0) for one in operators for up, lows in space.below(one).items() for low, _ in lows]
+    for number, (members, _, _) in enumerate(coloured_components(range(len(sectors)), edges)):
+        for i in members:
+            family[sectors[i].rows] = number
+    return replace(space, levels=replace(free, family=family))
+
+
+def _sectors(levels: Levels, by_vt: bool) -> Iterator[Sector]:
+    """Solved blocks, those of a torsion by v_t."""
+    vt = levels.quanta.get("vt") if by_vt else None
+    for number, block in enumerate(levels.blocks):
+        rows = np.arange(block.start, block.start + len(block.energies_mhz))
+        if vt is None:
+            yield Sector(number, None, rows, twice_total(block))
+            continue
+        for value in np.unique(vt[rows]).tolist():
+            places = np.flatnonzero(vt[rows] == value)
+            yield Sector(number, places, rows[places], twice_total(block))
+
+
+def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
+    axis = {"prolate": 0, "oblate": 2}.get(top.kind)
+    if axis is None or not any(elements.paired):
+        return
+    acting = [Contraction(one.g, np.eye(3)) if isinstance(one, Magnet) else one for one in operators]
+    if not all(one.axial_about(axis) for one in acting):
+        raise ValueError("a symmetric top with spins is solved with tensors that have its axis")
+
+
+def _refuse_unknown_nuclei(elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
+    asked = {name for one in operators if isinstance(one, Magnet) for name in one.nuclei}
+    if not asked:
+        return
+    shared = getattr(elements.blocks[0], "shared", None)
+    known = [] if shared is None else [spin.name for spin in shared.scheme.spins]
+    if unknown := sorted(asked - set(known)):
+        raise ValueError(f"g of {', '.join(unknown)}: the spins of these effects are {', '.join(known) or 'none'}")
+
+
+def solved_levels(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> Levels:
+    """All levels up to J max (N with spins) with eigenvectors: those of `effects`, by default of the constants without spins."""
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.quantum.wang.rotation import solve_rotation
+
+    effects = tuple(effects) or effects_of(top, False)
+    if top.internal_rotation is not None or any(effect.spins(top) for effect in effects):
+        return solve_levels(top, jmax, effects=effects)
+    return solve_rotation(top, effects, 0, jmax, in_blocks=True)
