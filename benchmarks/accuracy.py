@@ -28,7 +28,8 @@ HEAD = """# Accuracy and what it costs
 
 Made by `python benchmarks/accuracy.py`, from the functions behind [`rotor accuracy`](verbs/accuracy.md), which does the
 same for a scene of yours. Every picture shows error against processor time, without start-up and compilation; a setting stands
-beside its point, the usual one has a ring, and an open point shows no difference from the reference. Errors are numerical: the
+beside its point, the usual one has a ring, and an open point shows no difference from the reference. Times are medians of five rounds
+where they are short; neighbours whose times differ by less than their scatter have one time. Errors are numerical: the
 constants are taken as given, except where measured lines are named. Times are of one core of a shared machine: their ratios
 inside one picture mean something, no more.
 
@@ -82,7 +83,7 @@ def read_results() -> dict[str, list[Panel]]:
 def panel_of(record: dict) -> Panel:
     """A panel from its record."""
     curves = {name: [Point(**point) for point in points] for name, points in record["curves"].items()}
-    return Panel(record["title"], record["of"], curves)
+    return Panel(record["title"], record["of"], curves, record.get("joined", True))
 
 
 def _by_panel(content: dict) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from rotor.plots.work_precision import Panel, Point
 from rotor.requests.knob import Measure, Sweep, ladder
 from rotor.scenes.accuracy_panels import points_of
-from rotor.scenes.accuracy_sweep import knobs_of, sweep, timed
+from rotor.scenes.accuracy_sweep import in_rounds, knobs_of, sweep, timed, without_scatter
 from rotor.scenes.scene import (
     FluidScene,
     GasScene,
@@ -84,8 +85,8 @@ def spectra() -> dict[str, SpectrumScene]:
 def highest_j(_: Path | None) -> list[Panel]:
     return [
         Panel(
-            "J max of a list",
-            "intensity left out (%)",
+            "highest J of a list",
+            "integrated intensity (%)",
             {n: curve(one, "numerics.jmax") for n, one in spectra().items()},
         )
     ]
@@ -93,7 +94,7 @@ def highest_j(_: Path | None) -> list[Panel]:
 
 def cut(_: Path | None) -> list[Panel]:
     found = {name: curve(one, "observables.min_lgint") for name, one in spectra().items()}
-    return [Panel("least lgint of a list", "intensity left out (%)", found)]
+    return [Panel("least intensity in a list, log10(nm² MHz)", "integrated intensity (%)", found)]
 
 
 def orders(shared: Path | None) -> list[Panel]:
@@ -104,8 +105,8 @@ def orders(shared: Path | None) -> list[Panel]:
         )
     return [
         Panel(
-            "order of distortion",
-            "median size of measured - calculated (MHz)",
+            "order of centrifugal distortion",
+            "a measured line, median (MHz)",
             {n: measured(n, shared) for n in ("SO2", "H2CS", "HCOOH", "CH3CN")},
         )
     ]
@@ -125,14 +126,20 @@ def measured(name: str, shared: Path) -> list[Point]:
     reference = read_cat(next(path for path in paths if path.exists()))
     seen = reference.take((reference.tag < 0) & (reference.quanta_upper[:, 0] <= tag.j_max))
     top, jmax = rotor.read(name), int(seen.quanta_upper[:, 0].max())
-    points = []
+    points, calls = [], []
     for order in sorted({2, *(order_of(one, top) for one in top.constants.values)}):
-        lines, seconds, _ = timed(
-            lambda o=order: rotor.api.line_list(to_order(top, o), jmax=jmax, min_lgint=None, q=1.0)
-        )
+        calls.append(partial(rotor.api.line_list, to_order(top, order), jmax=jmax, min_lgint=None, q=1.0))
+        lines, seconds, _ = timed(calls[-1])
         found = compare(seen, catalogue(lines))
         points.append(Point(f"J^{order}", seconds, float(np.median(np.abs(found.differences("frequency_mhz"))))))
-    return points
+    times, _ = in_rounds(calls, [one.seconds for one in points])
+    return [replace(one, seconds=seconds) for one, seconds in zip(points, times, strict=True)]
+
+
+def evened(points: list[Point]) -> list[Point]:
+    """The points with their times without what is scatter."""
+    times = without_scatter([[one.seconds] for one in points])
+    return [replace(one, seconds=seconds) for one, seconds in zip(points, times, strict=True)]
 
 
 def partition(_: Path | None) -> list[Panel]:
@@ -140,7 +147,7 @@ def partition(_: Path | None) -> list[Panel]:
     for name in ("CO", "water", "CH2OHCHO"):
         scene = ThermoScene(molecule=name, conditions=ThermoConditions(temperature=[10.0, 100.0, 300.0]))
         found[name] = curve(scene, "numerics.relative_error", "Q")
-    return [Panel("relative_error of Q(T) at 10, 100 and 300 K", "Q (%)", found)]
+    return [Panel("relative error asked for, at 10, 100 and 300 K", "Q (%)", found)]
 
 
 def hyperfine(_: Path | None) -> list[Panel]:
@@ -153,7 +160,7 @@ def hyperfine(_: Path | None) -> list[Panel]:
     formamide = read_scene(SCENES / "formamide_hyperfine.toml")
     scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables=LevelsObservables(jmax=20))
     found["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
-    return [Panel("hyperfine_method", "energy of a level (MHz)", found)]
+    return [Panel("method of hyperfine structure", "energy of a level (MHz)", found, joined=False)]
 
 
 def stark(_: Path | None) -> list[Panel]:
@@ -161,25 +168,25 @@ def stark(_: Path | None) -> list[Panel]:
     for name, molecule in (("OCS", "OCS"), ("indole", INDOLE)):
         scene = StarkScene(molecule=molecule, conditions=StarkConditions(field="0:200kV/cm:21"))
         found[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
-    return [Panel("J max of the basis, states of J ≤ 2", "energy (MHz)", found)]
+    return [Panel("highest J of the basis, states of J ≤ 2", "energy (MHz)", found)]
 
 
 def pulse(_: Path | None) -> list[Panel]:
     from bench_alignment import work_precision
 
     settings = {
-        "ours": ("1e-4", "1e-6", "1e-8", "1e-10"),
+        "rotor": ("1e-4", "1e-6", "1e-8", "1e-10"),
         "QuTiP vern7": ("1e-6", "1e-8", "1e-10", "1e-12"),
-        "scipy expm_multiply": ("64 steps", "256 steps", "1024 steps"),
+        "scipy expm_multiply": ("64 steps", "256 steps", "1024 steps", "4096 steps"),
     }
     one = {
-        name: [Point(s, ms / 1e3, error) for s, (error, ms) in zip(settings[name], points, strict=True)]
+        name: evened([Point(s, ms / 1e3, error) for s, (error, ms) in zip(settings[name], points, strict=True)])
         for name, points in work_precision().items()
     }
     thermal = curve(read_scene(SCENES / "ocs_alignment.toml"), "numerics.tolerance")
     return [
         Panel("OCS from J = 0, 50 fs, 4001 times", "⟨cos²θ⟩", one),
-        Panel("OCS at 1 K, 1 ps: tolerance", "⟨cos²θ⟩", {"ours": thermal}),
+        Panel("OCS at 1 K, 1 ps: tolerance", "⟨cos²θ⟩", {"rotor": thermal}),
     ]
 
 
@@ -189,7 +196,7 @@ def free(_: Path | None) -> list[Panel]:
     found = {}
     for name, points in methods().items():
         if name.endswith(("order 2", "order 8", "Moser-Veselov 8", "DOP853")) or name.startswith("exact"):
-            found[name] = [Point("", us * 1e-6, error) for us, error in points]
+            found[name] = evened([Point("", us * 1e-6, error) for us, error in points])
     return [Panel("after 1000 periods, time of one period", "attitude (rad)", found)]
 
 
@@ -280,7 +287,7 @@ def fit(_: Path | None) -> list[Panel]:
         )
 
     settings = ladder((1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8), 1e-4, lambda one: one)
-    knob = Sweep("tolerance", (Measure("constants", "σ", error),), settings, 1e-12, "1e-12", answer)
+    knob = Sweep("tolerance", (Measure("constants", "standard errors", error),), settings, 1e-12, "1e-12", answer)
     rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
     return [
         Panel("tolerance of a fit, 500 lines, 15 constants", "a constant (standard errors)", {"fit": points_of(rows)})

@@ -88,7 +88,7 @@ class Result:
     def errors(self) -> ErrorBudget:
         """How far the result can be trusted.
 
-        Raises AttributeError for verbs that state no budget yet.
+        Raises AttributeError for verbs from outside the package that state none.
         """
         budget = getattr(self.answer, "errors", None)
         if not isinstance(budget, ErrorBudget):
@@ -146,7 +146,8 @@ class Result:
         shown = self.verb.read_shown(self.given)
         head = {"rotor_version": version(), "command": f"rotor.{self.verb.name}", "input": self.subject.text}
         content = {**head, **self.facts(), **self.verb.content(self.answer, shown)}
-        return Report(content, shown, self.given, {"command": head["command"]})
+        provenance: dict[str, Any] = {name: content[name] for name in ("command", "errors") if name in content}
+        return Report(content, shown, self.given, provenance)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

@@ -14,11 +14,17 @@ LINES_OF_CO = (
 HEAD = 'schema = 1\nkind = "{}"\naccuracy = "{}"\n'
 FIT = '[molecule]\nconstants = "B=57000 D=0.1 MHz"\n[lines]\nsource = "l.csv"\n[parameters]\nfree = ["B", "D"]\n'
 EMISSION = '[[molecules]]\nsource = "HCONH2"\ncolumn = 1e15\n[conditions]\nrange = "100:120GHz"\nexcitation = "50 K"\nwidth = "3 km/s"\n'
+FAMILY = 'name = "OCS"\n[geometry]\natoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]\n' + "".join(
+    f'[[isotopologue]]\n{isotopes}constants = "B={b} MHz"\n'
+    for isotopes, b in (("", 6081.492114), ('isotopes = "C=13C"\n', 6061.923848), ('isotopes = "S=34S"\n', 5932.833732))
+)
+STRUCTURE = '[family]\nfile = "f.toml"\n[observables]\nmethod = ["r0"]\n'
 TORSION = 'molecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n'
 
 
 def ran(call, folder, kind, accuracy, body) -> tuple[int, str, str]:
     (folder / "l.csv").write_text(LINES_OF_CO)
+    (folder / "f.toml").write_text(FAMILY)
     (folder / "s.toml").write_text(HEAD.format(kind, accuracy) + body)
     return call("run", "s.toml", "--json", "-")
 
@@ -33,6 +39,9 @@ def ran(call, folder, kind, accuracy, body) -> tuple[int, str, str]:
         ("torsion", "1 kHz", TORSION, "MHz"),
         ("spectrum", "0.1 %", 'molecule = "OCS"\n', "%"),
         ("raman", "1 kHz", 'molecule = "N2"\n', "MHz"),
+        ("info", "1 kHz", 'molecule = "OCS"\n', "MHz"),
+        ("isotopologues", "1 kHz", 'molecule = "OCS"\n', "MHz"),
+        ("structure", "1e-6 Å", STRUCTURE, "Å"),
     ],
 )
 def test_an_accuracy_is_reached_and_named_with_its_unit(call, folder, kind, accuracy, body, unit):
@@ -78,6 +87,13 @@ def test_a_decade_coarser_misses(folder):
 def test_what_cannot_be_had_is_refused(call, folder):
     assert "cannot be given: the error here is" in ran(call, folder, "emission", "1e-9 K", EMISSION)[2]
     assert "cannot be given: the error here is" in ran(call, folder, "fit", "1e-9 kHz", FIT)[2]
+    assert "does not measure the same thing" in ran(call, folder, "structure", "1 kHz", STRUCTURE)[2]
+    of_substitution = STRUCTURE.replace('"r0"', '"rs"')
+    said = ran(call, folder, "structure", "1e-6 Å", of_substitution)[2]
+    assert (
+        "accuracy: the numerical error of bond lengths (rs) is not estimated: Kraitchman's equations lose digits"
+        in said
+    )
     assert "does not measure the same thing" in ran(call, folder, "emission", "1 MHz", EMISSION)[2]
     (folder / "s.toml").write_text(HEAD.format("emission", "1 mK") + EMISSION + "[observables]\nleast_depth = 1e-3\n")
     assert "accuracy and observables.least_depth: give one of them" in call("run", "s.toml")[2]

@@ -248,7 +248,7 @@ def test_a_panel_a_knob():
     rows = [Row(f"numerics.step, order {n}", "1", False, "attitude", 1e-3 / n, "rad", 0.1) for n in (2, 4)]
     panels = panels_of(WorkPrecision("tumble", tuple(rows), {}))
     assert [(one.title, one.of, list(one.curves)) for one in panels] == [
-        ("numerics.step", "attitude (rad)", ["order 2", "order 4"])
+        ("length of a step", "attitude (rad)", ["order 2", "order 4"])
     ]
 
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import rotor
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.statistics.least_squares import minimise
 from rotor.structures.consistency import doubts, gains, moments_across_planes, without_each
 from rotor.structures.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
 from rotor.structures.family import family
@@ -627,3 +628,25 @@ def test_a_structure_without_bonds_has_no_empty_table(call, folder, sulphur):
     assert "rs: coordinates" in out
     assert ("rs" in out.splitlines()) == sulphur
     assert ("C2-S3" in out.replace(" ", "")) == sulphur
+
+
+def test_the_bound_of_bond_lengths_holds_for_a_loose_search(monkeypatch):
+    """Lengths of a search that ends early, within twice its next step of those of a full one; and what rounding can do is below it."""
+    from rotor.structures import least_squares
+    from rotor.structures.budgets import lengths_budget
+
+    def fitted(tolerance):
+        loose = lambda evaluate, start, **more: minimise(evaluate, start, **{**more, "tolerance": tolerance})  # noqa: E731
+        monkeypatch.setattr(least_squares, "minimise", loose)
+        return fit_structure(family(OCS, OCS_SPECIES), "r0")
+
+    full, bounds = fitted(1e-13), []
+    for tolerance in (1e3, 1e-1, 1e-3):
+        found = fitted(tolerance)
+        pairs = zip(found.values, full.values, strict=True)
+        actual = max(abs(one.value - true.value) for one, true in pairs if one.unit == "Å")
+        budget = lengths_budget("r0", found.values, found, "equal")
+        assert actual <= budget.numerical
+        bounds.append(budget.truncation.value)
+    assert bounds[0] > bounds[-1]
+    assert budget.data.value == max(one.error for one in found.values if one.unit == "Å")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from rotor.assignment.growth import LEAST_RATIO, Grown
 from rotor.assignment.refinement import Refined
 from rotor.assignment.rigid_table import PARAMETERS, TYPES
 from rotor.fitting.assignment import Assignments
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.table import Table, TextOf
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -172,9 +173,24 @@ class AssignAnswer(TextOf):
             peaks.frequency_mhz, peaks.intensity, peaks.uncertainty_mhz, species, self.spurs, upper, lower, calculated
         )
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the frequencies of the first species can be trusted, given that its assignment is right."""
+        from rotor.fitting.budgets import predictions_budget
+
+        of = "frequencies of the first species"
+        if not self.species:
+            unknown = ErrorTerm(None, "no species was found")
+            return ErrorBudget(of, "MHz", *(unknown,) * 5)
+        first = self.species[0]
+        budget = predictions_budget(first.refined.fit)
+        right = f"{budget.model.source}; the assignment is right with a probability of {first.probability:.4f}"
+        return replace(budget, of=of, model=replace(budget.model, source=right))
+
     def facts(self) -> dict[str, Any]:
         """Everything but the table of peaks."""
         return {
+            "errors": self.errors.as_json(),
             "word": self.word,
             "peaks": len(self.request.peaks),
             "band_mhz": list(self.request.peaks.band_mhz),

@@ -20,6 +20,7 @@ import numpy as np
 
 from rotor.fitting.fit import Fit
 from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.table import counted
 
 REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
 CONFIDENCE = 0.95
@@ -61,7 +62,7 @@ def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: f
         ),
         model=_misfit(fit, line),
         data=ErrorTerm(scale, f"errors of {len(fit.groups)} frequencies; {confidence_text(free)}", LINES),
-        statistics=ErrorTerm(scale / math.sqrt(2 * free), f"{free} degrees of freedom", LINES)
+        statistics=ErrorTerm(scale / math.sqrt(2 * free), f"{counted(free, 'degree')} of freedom", LINES)
         if free
         else ErrorTerm(None, UNCHECKED, LINES),
     )

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from rotor.formats.family_file import FamilyFile
 from rotor.molecules.molecule import Molecule
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Flag, NameList, Text
+from rotor.structures.budgets import lengths_budget
 from rotor.structures.consistency import PlanarMoment, Without, doubts, gains, moments_across_planes, without_each
 from rotor.structures.family import Family
 from rotor.structures.least_squares import FittedStructure, fit_structure
@@ -104,6 +106,16 @@ class StructureAnswer:
         return StructureTable(values | {one.method: (*one.values, *one.vibrational) for one in self.fitted})
 
     @property
+    def errors(self) -> ErrorBudget:
+        """How far the bond lengths of the last method can be trusted."""
+        weights = self.request.weights
+        if self.fitted:
+            last = self.fitted[-1]
+            return lengths_budget(last.method, last.values, last, weights)
+        assert self.substitution is not None  # one method at least
+        return lengths_budget("rs", self.substitution.values, None, weights)
+
+    @property
     def geometry(self) -> tuple[Molecule, tuple[Value, ...], str]:
         """The last geometry that is complete, its values and the name of the method.
 
@@ -152,6 +164,7 @@ class StructureAnswer:
             "rs": _substitution_record(self.substitution),
             **{one.method: _fitted_record(one) for one in self.fitted},
             "notes": self.notes,
+            "errors": self.errors.as_json(),
         }
 
 

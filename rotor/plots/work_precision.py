@@ -1,4 +1,8 @@
-"""Work-precision pictures: the error of a calculation against its processor time, one panel a knob, its settings named at the points."""
+"""Work-precision pictures: the error of a calculation against its processor time, one panel a knob, its settings named at the points.
+
+Four settings and more are joined by a line; fewer, such as the three methods that there are, stand as marks alone. Names of settings stand
+beside their points where they lie on no other name and on no mark.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,15 @@ from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new
 
 PANEL_INCHES = (3.6, 2.8)
 LEAST_DRAWN = 1e-17  # an error of 0 is drawn as an open point below all others
+PLACES = (
+    (6.0, 2.0, "left"),
+    (6.0, -8.0, "left"),
+    (-6.0, -8.0, "right"),
+    (-6.0, 2.0, "right"),
+    (0.0, 8.0, "center"),
+)  # points
+MARK_PIXELS = 3.0  # half of a mark
+LEAST_JOINED = 4  # settings of a curve
 MARKERS = "osD^vP*"  # one more than colours, so that no two curves are alike
 
 
@@ -27,11 +40,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves by name that share one unit of error. of: what the error is of, with its unit."""
+    """Curves by name that share one unit of error. of: of what, with its unit. joined: False for methods, which are no series."""
 
     title: str
     of: str
     curves: Mapping[str, Sequence[Point]]
+    joined: bool = True
 
 
 def work_precision_figure(panels: Sequence[Panel], title: str = "") -> Any:
@@ -49,12 +63,14 @@ def work_precision_figure(panels: Sequence[Panel], title: str = "") -> Any:
             (2 * wide if across == 1 else across * wide, (1.3 if across == 1 else 1.0) * high * down + 0.3)
         )
         every = figure.subplots(down, across, squeeze=False).ravel()
-        for axes, panel in zip(every, panels, strict=False):
-            _draw(axes, panel)
+        drawn = [_draw(axes, panel) for axes, panel in zip(every, panels, strict=False)]
         for axes in every[len(panels) :]:
             axes.set_axis_off()
         if title:
             figure.suptitle(title, x=0.01, ha="left")
+        figure.canvas.draw()  # places the axes, so that names can be placed in pixels
+        for axes, curves in zip(every, drawn, strict=False):
+            _name_settings(axes, curves)
     return figure
 
 
@@ -83,26 +99,38 @@ def plot_work_precision(
     save(work_precision_figure(panels, title), path, title or "work and precision", facts or {})
 
 
-def _draw(axes: Any, panel: Panel) -> None:
+Places = list[tuple[Point, float]]  # settings of a curve, with the errors as they are drawn
+
+
+def _draw(axes: Any, panel: Panel) -> list[Places]:
+    """Draw the curves of a panel."""
     points = [point for curve in panel.curves.values() for point in curve]
     floor = max(min((one.error for one in points if one.error > 0.0), default=0.0) / 10.0, LEAST_DRAWN)
     few = len(panel.curves) == 1
+    drawn: list[Places] = []
     for number, (name, curve) in enumerate(panel.curves.items()):
         colour, marker = (BLUE, "o") if few else (PALETTE[number % len(PALETTE)], MARKERS[number % len(MARKERS)])
-        errors = _curve(axes, curve, floor, (colour, marker, name))
-        if few:
-            _name(axes, curve, errors)
-        else:
-            _name(axes, [curve[0], curve[-1]], [errors[0], errors[-1]])
-    axes.set(xscale="log", yscale="log", xlabel="processor time (s)", ylabel=panel.of)
-    axes.margins(x=0.25, y=0.1)
+        errors = _curve(axes, curve, floor, (colour, marker, name), panel.joined)
+        drawn.append(list(zip(curve, errors, strict=True)))
+    axes.set(xscale="log", yscale="log", xlabel="processor time (s)", ylabel=f"error of {panel.of}")
+    axes.margins(x=0.25, y=0.15)
     _at_least_a_decade(axes)
     if any(one.error == 0.0 for one in points):
         axes.text(0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=6.5, color=GREY)
     axes.set_title(panel.title, loc="left")
     axes.grid(alpha=0.25)
     if not few:
-        axes.legend(frameon=False, fontsize=7)
+        _legend_above(axes, len(panel.curves))
+    return drawn
+
+
+def _legend_above(axes: Any, count: int) -> None:
+    """The names of the curves between title and axes, where no mark lies; in one or two rows."""
+    columns = count if count <= 3 else math.ceil(count / 2)
+    axes.legend(
+        frameon=False, fontsize=7, ncols=columns, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2
+    )
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=6 + 12 * math.ceil(count / columns))
 
 
 def _at_least_a_decade(axes: Any) -> None:
@@ -118,11 +146,12 @@ def _at_least_a_decade(axes: Any) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str, str]) -> list[float]:
+def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str, str], joined: bool) -> list[float]:
     """Draw one curve; the errors as they are drawn."""
     colour, marker, name = look
     times, errors = [one.seconds for one in curve], [max(one.error, floor) for one in curve]
-    axes.plot(times, errors, color=colour, linewidth=0.8, alpha=0.6)
+    if joined and len(curve) >= LEAST_JOINED:
+        axes.plot(times, errors, color=colour, linewidth=0.8, alpha=0.6)
     for one, error in zip(curve, errors, strict=True):
         axes.plot(
             one.seconds, error, marker, color=colour, markersize=4.5, fillstyle="full" if one.error > 0.0 else "none"
@@ -133,14 +162,34 @@ def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str
     return errors
 
 
-def _name(axes: Any, curve: Sequence[Point], errors: Sequence[float]) -> None:
-    """The setting beside each point, once where points coincide."""
-    spread = math.log10(max(errors) / min(errors)) or 1.0
-    last = math.inf
-    for one, error in zip(curve, errors, strict=True):
-        if abs(math.log10(error) - last) < 0.03 * spread:
+def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
+    """The setting beside each point, the ends of curves first, where it lies on no other name and on no mark."""
+    marks = axes.transData.transform([(one.seconds, error) for curve in curves for one, error in curve])
+    taken: list[Any] = []
+    ends = [place for curve in curves for place in (curve[0], curve[-1])[: len(curve)]]
+    inner = [place for curve in curves for place in curve[1:-1]]
+    for one, error in ends + inner:
+        if not one.setting:
             continue
-        last = math.log10(error)
-        axes.annotate(
-            one.setting, (one.seconds, error), xytext=(6, 2), textcoords="offset points", fontsize=6.5, color=GREY
+        text = axes.annotate(
+            one.setting, (one.seconds, error), xytext=(0, 0), textcoords="offset points", fontsize=6.5, color=GREY
         )
+        text.set_in_layout(False)
+        if not any(_fits_at(text, axes, offset, taken, marks) for offset in PLACES):
+            text.remove()
+
+
+def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], taken: list[Any], marks: Any) -> bool:
+    """Put a name at a place beside its point; whether nothing is in its way there. Its box is then added to those taken."""
+    across, up, side = place
+    text.set_position((across, up))
+    text.set_horizontalalignment(side)
+    box = text.get_window_extent().padded(1.0)
+    around = box.padded(MARK_PIXELS)
+    x, y = marks[:, 0], marks[:, 1]
+    covered = ((x > around.x0) & (x < around.x1) & (y > around.y0) & (y < around.y1)).any()
+    inside = axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1 and axes.bbox.y0 <= box.y0 and box.y1 <= axes.bbox.y1
+    if not inside or covered or any(box.overlaps(other) for other in taken):
+        return False
+    taken.append(box)
+    return True

@@ -57,7 +57,7 @@ def asked_of(scene: Scene) -> float | None:
         scale = 1.0  # in percent
     elif scale != 1.0 and not numerics.percent:
         raise ValueError(f"accuracy: {given!r}: expected {numerics.unit}, not a percentage")
-    unit = numerics.unit if numerics.unit in ("MHz", "K") and unit_of(scene) != "%" else ""
+    unit = numerics.unit if numerics.unit in ("MHz", "K", "Å") and unit_of(scene) != "%" else ""
     value = scale * quantity("accuracy", text, unit)
     if not value > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")

@@ -5,21 +5,43 @@ from __future__ import annotations
 from rotor.plots.work_precision import Panel, Point
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision
 
+TITLES = {
+    "effects.distortion": "order of centrifugal distortion", "effects.hyperfine_method": "method of hyperfine structure",
+    "numerics.jmax": "highest J of the basis", "numerics.relative_error": "relative error of the sums",
+    "numerics.step": "length of a step", "numerics.molecules": "number of molecules", "numerics.iterations": "iterations of the search",
+    "numerics.ewald_tolerance": "tolerance of Ewald's sum", "numerics.cutoff": "cutoff of the forces (Å)",
+    "observables.min_lgint": "least intensity in the list, log10(nm² MHz)",
+    "observables.min_relative": "weakest line in the list, of the strongest",
+    "observables.least_depth": "least optical depth of a line", "observables.classical_molecules": "molecules of the classical gas",
+}  # fmt: skip
+
 
 def panels_of(found: WorkPrecision) -> list[Panel]:
-    """One panel a knob and error; the orders of a splitting share one.
+    """One panel a knob and error, with a title in words; the orders of a splitting share one.
 
     >>> from rotor.scenes.accuracy_sweep import work_precision
     >>> from rotor.scenes.scene import LevelsScene
     >>> [(one.title, one.of) for one in panels_of(work_precision(LevelsScene(molecule="CO")))]
-    [('effects.distortion', 'energy of a level (MHz)')]
+    [('order of centrifugal distortion', 'energy of a level (MHz)')]
     """
     grouped: dict[tuple[str, str], dict[str, list[Point]]] = {}
     for (knob, error_of, unit), rows in found.curves().items():
         name, _, variant = knob.partition(", ")
         label = f"{error_of} ({unit})" if unit else error_of
         grouped.setdefault((name, label), {})[variant or name] = points_of(rows)
-    return [Panel(name, label, curves) for (name, label), curves in grouped.items()]
+    return [
+        Panel(title_of(name), label, curves, joined=name != "effects.hyperfine_method")
+        for (name, label), curves in grouped.items()
+    ]
+
+
+def title_of(knob: str) -> str:
+    """A knob in words; of a kind outside the package, the last part of its key.
+
+    >>> title_of("numerics.jmax"), title_of("numerics.grid_points")
+    ('highest J of the basis', 'grid points')
+    """
+    return TITLES.get(knob, knob.rpartition(".")[2].replace("_", " "))
 
 
 def points_of(rows: list[Row]) -> list[Point]:

@@ -3,16 +3,19 @@
     table = work_precision(read_scene("s.toml"))
 
 Coarse settings come first and the reference last. Where the time limit ends a sweep before its reference, the finest answer that
-there is serves as one, and the table says so. Times are those of the processor, the shortest of a few calls where they are short.
+there is serves as one, and the table says so. Times are those of the processor. Settings that are short are timed in rounds, each
+setting once a round, so that other work on the machine slows all of them alike; the median of the rounds counts. Times of neighbours
+that differ by less than their scatter have one value, the mean (`without_scatter`).
 """
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +28,9 @@ from rotor.scenes.scene import Scene
 from rotor.table import Table
 
 Progress = Callable[[str, str], object]
-SHORT_SECONDS, REPEATS = 0.05, 3  # calls that are shorter are made so often
+SHORT_SECONDS, ROUNDS = 0.2, 5  # settings that are shorter are timed in so many rounds
+LEAST_SCATTER = 0.1  # of a time: processor time depends on what else uses memory and caches
+LEAST_SECONDS = 5e-3  # of one timing: shorter calls are repeated in it
 COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated
 USUAL_LIMIT = 120.0  # seconds of processor time for all knobs together
 
@@ -182,10 +187,13 @@ def sweep(
     reached = knob.reference is None or last.label == "the reference"
     against = knob.against if reached else f"the finest within the time limit, {last.label}"
     shown = done if knob.reference is None else done[:-1]
+    calls = [lambda asked=setting.request: knob.answer(asked) for setting, _, _ in shown]
+    times, more = in_rounds(calls, [seconds for _, _, seconds in shown], limit_seconds - spent)
+    spent += more
     rows = [
         Row(knob.name, setting.label, setting.own, m.of, m.error(answer, reference), m.unit, seconds / knob.repeats)
         for m in knob.measures
-        for setting, answer, seconds in shown
+        for (setting, answer, _), seconds in zip(shown, times, strict=True)
     ]
     return rows, against, remarks, spent
 
@@ -200,18 +208,62 @@ def _next_seconds(taken: list[float]) -> float:
 
 
 def timed(call: Callable[[], Any], warm: bool = True) -> tuple[Any, float, float]:
-    """The answer of a call, its processor time in seconds, and that of all calls that were timed.
+    """The answer of a call, its processor time in seconds, and that of all calls that were made.
 
-    The time of a short call is the shortest of a few. warm: False where the call may load modules or compile; it is made once
-    more then, and the first time does not count.
+    warm: False where the call may load modules or compile; a short one is made once more then, and the first time does not count.
     """
     answer, first = _once(call)
-    if not warm and SHORT_SECONDS < first < COMPILING_SECONDS:
-        answer, first = _once(call)
-    if first > SHORT_SECONDS:
+    if warm or first >= COMPILING_SECONDS:
         return answer, first, first
-    again = [_once(call)[1] for _ in range(REPEATS)]
-    return answer, min(again), first + sum(again)
+    answer, again = _once(call)
+    return answer, again, first + again
+
+
+def in_rounds(
+    calls: Sequence[Callable[[], Any]], first: Sequence[float], limit_seconds: float = math.inf
+) -> tuple[list[float], float]:
+    """Times of calls in seconds, medians of rounds where they are short, and the seconds that the rounds took.
+
+    first: the time of each by one call. Rounds end where another one would go beyond the limit.
+    """
+    counts = {
+        n: max(1, math.ceil(LEAST_SECONDS / max(one, 1e-9))) for n, one in enumerate(first) if one < SHORT_SECONDS
+    }
+    a_round = sum(first[n] * count for n, count in counts.items())
+    rounds = ROUNDS if a_round * ROUNDS <= limit_seconds else int(limit_seconds / a_round)
+    taken: dict[int, list[float]] = {n: [] for n in counts}
+    for _ in range(rounds):
+        for n, count in counts.items():
+            taken[n].append(_once(partial(_repeat, calls[n], count))[1] / count)
+    samples = [taken.get(n) or [one] for n, one in enumerate(first)]
+    spent = math.fsum(counts[n] * math.fsum(times) for n, times in taken.items())
+    return without_scatter(samples), spent
+
+
+def _repeat(call: Callable[[], Any], count: int) -> None:
+    for _ in range(count):
+        call()
+
+
+def without_scatter(samples: Sequence[Sequence[float]]) -> list[float]:
+    """Medians of the times of settings, coarse ones first; those that fall by less than their scatter have a common mean.
+
+    A finer setting that seems to be faster by less than the interquartile range of either, or than a tenth, is not known to be faster.
+
+    >>> without_scatter([[1.0, 1.1, 1.3], [0.9, 1.0, 1.2], [2.0, 2.1, 2.2]])
+    [1.05, 1.05, 2.1]
+    >>> without_scatter([[5.0, 5.1, 5.2], [1.0, 1.1, 1.2]])
+    [5.1, 1.1]
+    """
+    groups: list[tuple[float, float, int]] = []  # mean, scatter and number of settings
+    for times in samples:
+        low, middle, high = (float(one) for one in np.quantile(times, [0.25, 0.5, 0.75]))
+        groups.append((middle, max(high - low, LEAST_SCATTER * middle), 1))
+        while len(groups) > 1 and 0.0 < groups[-2][0] - groups[-1][0] < max(groups[-2][1], groups[-1][1]):
+            (mean, scatter, count), (other, other_scatter, others) = groups.pop(), groups.pop()
+            joined = (mean * count + other * others) / (count + others)
+            groups.append((joined, max(scatter, other_scatter), count + others))
+    return [mean for mean, _, count in groups for _ in range(count)]
 
 
 def _once(call: Callable[[], Any]) -> tuple[Any, float]:

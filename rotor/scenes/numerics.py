@@ -62,6 +62,7 @@ _TABLE = {
                     sweeps="knobs.of_measured:fit", plan="plan_measured:plan_of_fit"),
     "emission": Numerics("K", choose="accuracy_measured:choose_depth", plan="plan_measured:plan_of_emission"),
     "assign": Numerics(sweeps="knobs.of_measured:assign", plan="plan_measured:plan_of_assign"),
+    "structure": Numerics("Å"),
     "torsion": Numerics(sweeps="knobs.of_measured:torsion", plan="plan:plan_of_torsion"),
 }  # fmt: skip
 
@@ -109,7 +110,12 @@ def error_of(kind: str, answer: Any, unit: str) -> float:
         return float(load(numerics.relative)(answer))
     if numerics.error:
         return float(load(numerics.error)(answer, unit))
-    return float(answer.errors.numerical or 0.0)
+    numerical: float | None = answer.errors.numerical
+    if numerical is None:
+        terms = (answer.errors.rounding, answer.errors.truncation)
+        why = next(term.source for term in terms if term.value is None)
+        raise ValueError(f"accuracy: the numerical error of {answer.errors.of} is not estimated: {why}; leave it out")
+    return numerical
 
 
 def sweeps_of(kind: str, request: Any) -> Sweeps:

@@ -204,6 +204,8 @@ def _write(
     provenance: dict[str, Any] = {"scene": scene_text(scene)}
     if found is not None:
         provenance["accuracy"] = asdict(found)
+    if (budget := getattr(answer, "errors", None)) is not None:
+        provenance["errors"] = budget.as_json()
 
     def rows(path: Path) -> None:
         from rotor.formats import write

@@ -48,7 +48,7 @@ def section_left_out(answer: Any, reference: Any) -> float:
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 
-SECTION = Measure("cross section left out", "%", section_left_out)
+SECTION = Measure("total cross section", "%", section_left_out)
 RELATIVE_CUT = Knob(
     lambda request: [cut for cut in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8) if request.min_relative is None or cut > request.min_relative],
     lambda request: None if request.min_relative is None else 1e-2 * request.min_relative, (SECTION,),

@@ -79,7 +79,7 @@ def intensity_left_out(answer: Any, reference: Any) -> float:
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 
-INTENSITY = Measure("intensity left out", "%", intensity_left_out)
+INTENSITY = Measure("integrated intensity", "%", intensity_left_out)
 CUT = Knob(
     lambda request: COARSE_CUTS if request.min_lgint is None else tuple(request.min_lgint + decades for decades in COARSER_CUTS),
     lambda request: None if request.min_lgint is None else request.min_lgint - FINER_CUT, (INTENSITY,),

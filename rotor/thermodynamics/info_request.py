@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
 from rotor.thermodynamics.partition_table import partition_table
+from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import top_facts
 from rotor.tops.top import Top
 
@@ -78,9 +80,19 @@ class InfoAnswer:
         """Q(T)."""
         return PartitionRows(self.partition)
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far A, B and C can be trusted; Q has its error in its table."""
+        return constants_budget([self.request.top])
+
     def facts(self) -> dict[str, Any]:
         """Everything about the top, by the keys of docs/verbs."""
-        found = {**top_facts(self.request.top), **self.sizes, "partition_function": list(self.partition)}
+        found = {
+            **top_facts(self.request.top),
+            **self.sizes,
+            "partition_function": list(self.partition),
+            "errors": self.errors.as_json(),
+        }
         return found | ({} if self.request.conformers is None else {"conformers": list(self.conformers)})
 
 

@@ -11,6 +11,7 @@ from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.fitting.publication import value_text
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Custom, Range, Text
@@ -124,6 +125,8 @@ def show(answer: AssignAnswer, report: Report) -> None:
         print()
         show_table(_table(number, one))
         show_facts(_facts(one))
+    print()
+    show_facts(error_facts(record))
 
 
 def _verdict(answer: AssignAnswer) -> str:
@@ -194,5 +197,6 @@ VERB = Verb(
     subject=SpectrumFile(),
     drawn="MHz",
     scaled=False,
+    accuracy="of the frequencies of the first species",
     start={"spectrum.file": "peaks.csv", "observables.species": 1, "outputs.csv": "assigned.csv"},
 )

@@ -27,7 +27,7 @@ from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work
+from rotor.verbs.verb import PICTURES, ErrorsShown, Extra, Output, Report, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
@@ -47,7 +47,7 @@ CONSTANTS = ("toml", "par", "var")  # outputs that hold the fitted constants
 
 
 @dataclass(frozen=True)
-class Further:
+class Further(ErrorsShown):
     """What is done beside the fit."""
 
     try_constants: tuple[str, ...] | None = declared(

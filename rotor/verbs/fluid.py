@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
@@ -217,6 +218,8 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
         with frames_for(outputs, "plot" in work.files) as (files, frames):
             quiet: Mapping[str, Any] = {"progress": lambda *_: None} if of_scene else {}
             made = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
+            if csv is not None:
+                _add_errors(csv, made)
             if "plot" not in work.files:
                 return made
             values = {one.name: getattr(made, one.name) for one in fields(FluidAnswer)}
@@ -227,6 +230,15 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
         if checkpoint is not None and Path(checkpoint).is_file():
             work.note(f"interrupted; the same command with --resume goes on from {checkpoint}")
         raise
+
+
+def _add_errors(csv: str, answer: FluidAnswer) -> None:
+    """Add the error budget, which the end of a run gives, to the record beside its table."""
+    from rotor.formats.provenance import write_beside
+
+    beside = Path(f"{csv}.provenance.json")
+    record = json.loads(beside.read_text(encoding="utf-8")) if beside.is_file() else {}
+    write_beside(csv, {**record, "errors": answer.errors.as_json()})
 
 
 def _settings(request: FluidRequest) -> dict[str, Any]:

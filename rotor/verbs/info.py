@@ -202,5 +202,6 @@ VERB = Verb(
     subject=OneMolecule(("polarizability", "anisotropy", "internal_rotation")),
     build=build,
     drawn=None,
+    accuracy="of the rotational constants",
     start={"molecule": "water", "outputs.csv": "q.csv"},
 )

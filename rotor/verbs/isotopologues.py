@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
-from rotor.reports.screen import Table, show_table
-from rotor.reports.top_facts import known_digits
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts, known_digits
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
 from rotor.verbs.molecule import STATES
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Output, Report, Verb
+from rotor.verbs.verb import ErrorsShown, Output, Report, Verb
 
 EXAMPLES = """\b
 Examples:
@@ -20,11 +18,6 @@ Examples:
   rotor isotopologues CH3Cl --min-abundance 0.01 --json family.json
   rotor isotopologues H2CO --each C=13C --each O=18O
   rotor isotopologues water --site 2=2H --site 3=2H"""
-
-
-@dataclass(frozen=True)
-class Nothing:
-    """No options of printing."""
 
 
 def show(answer: IsotopologuesAnswer, report: Report) -> None:
@@ -35,6 +28,8 @@ def show(answer: IsotopologuesAnswer, report: Report) -> None:
         columns = ("isotopologue", "constants of spins (MHz)")
         print()
         show_table(Table("", columns, rows, frozenset(columns)))
+    print()
+    show_facts(error_facts(report.content))
 
 
 def _constants_text(top: Top) -> str:
@@ -98,7 +93,8 @@ VERB = Verb(
         ("constants", "isotopes", "polarizability", "anisotropy", "spin_weights", *STATES, "internal_rotation", "calculator", "hessian",
          "symmetry_tolerance"),
     ),
-    shown=Nothing,
+    shown=ErrorsShown,
+    accuracy="of the rotational constants",
     notes=lambda answer: answer.remarks,
     drawn=None,
     sound=False,

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from rotor.formats.family_file import FamilyFile, read_family
 from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
-from rotor.verbs.isotopologues import Nothing
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import PICTURES, NoAnswerError, Output, Place, Report, Subject, SubjectKind, Verb
+from rotor.verbs.verb import PICTURES, ErrorsShown, NoAnswerError, Output, Place, Report, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
     from rotor.structures.consistency import PlanarMoment, Without
@@ -133,6 +133,8 @@ def show(answer: StructureAnswer, report: Report) -> None:
         )
         if answer.without.get(one.method):
             show_table(_without_table(one.method, answer.without[one.method]))
+    print()
+    show_facts(error_facts(report.content))
 
 
 def _planar_table(found: Sequence[PlanarMoment]) -> Table:
@@ -210,7 +212,9 @@ VERB = Verb(
         Output("plot", PICTURES, "Draw the molecule with its bonds (.png, .pdf, .svg)", draw, "structure.png"),
     ),
     subject=Isotopologues(),
-    shown=Nothing,
+    shown=ErrorsShown,
+    accuracy="of the bond lengths",
+    accuracy_example="0.001 Å",
     notes=lambda answer: answer.notes,
     drawn=None,
     sound=False,

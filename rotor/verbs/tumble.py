@@ -75,7 +75,7 @@ def write_rows(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) 
 
 def _provenance(report: Report) -> dict[str, Any]:
     content = {**report.content, **report.provenance}
-    return {key: plain(content[key]) for key in _PROVENANCE if key in content}
+    return {key: plain(content[key]) for key in (*_PROVENANCE, "errors") if key in content}
 
 
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:

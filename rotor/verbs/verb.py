@@ -120,11 +120,17 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Shown:
-    """Options of every verb that has a report."""
+class ErrorsShown:
+    """Options of every verb."""
+
+    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
+
+
+@dataclass(frozen=True)
+class Shown(ErrorsShown):
+    """Options of every verb whose report ends with sources."""
 
     sources: bool = declared(False, Flag(), "Print the sources of the numbers in full", option="--sources")
-    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
 
 
 def no_notes(answer: Any) -> Iterable[str]:

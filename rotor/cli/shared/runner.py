@@ -102,7 +102,8 @@ def report_of(
     shown = verb.read_shown(given)
     with answering():
         content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    return Report(content, shown, given, dict(head), view, bool(getattr(shown, "sources", False)), executor)
+    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}}
+    return Report(content, shown, given, provenance, view, bool(getattr(shown, "sources", False)), executor)
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:

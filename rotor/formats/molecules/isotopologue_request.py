@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.molecules.fitted_isotopologue import with_fitted_isotopologue
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.fill import renaming
 from rotor.requests.readers import Names, Quantity
 from rotor.table import Table
+from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue, isotopologue, isotopologues, single_substitutions
 from rotor.tops.top import Top
@@ -94,9 +96,18 @@ class IsotopologuesAnswer:
                     about.setdefault(text, []).append(one.label)
         return [f"{', '.join(labels)}: {text}" for text, labels in about.items()]
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far A, B and C of all of them can be trusted."""
+        return constants_budget([one.top for one in self.family])
+
     def facts(self) -> dict[str, Any]:
         """Everything about the isotopologues, by the keys of docs/verbs."""
-        return {"name": self.request.top.name or None, "isotopologues": [record(one) for one in self.family]}
+        return {
+            "name": self.request.top.name or None,
+            "isotopologues": [record(one) for one in self.family],
+            "errors": self.errors.as_json(),
+        }
 
 
 def answer_isotopologues(request: IsotopologuesRequest) -> IsotopologuesAnswer:

@@ -1,0 +1,106 @@
+"""Error budget of bond lengths (`rotor.requests.budget`), of the last method of a request, the largest of each source.
+
+With equal weights the covariance of a fit is s² (JᵀJ)⁻¹, s the root mean square of its residuals over the degrees of freedom: a length of
+standard error σ moves by at most σ/s |δr| where the residuals change by δr (Cauchy and Schwarz), and by as much for a step δ of length
+√(δᵀ JᵀJ δ). Rounding changes each moment by `ROUNDING` of itself; the search leaves at most twice its next step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+from rotor.structures.least_squares import FittedStructure
+from rotor.structures.substitution import Value
+from rotor.table import counted
+
+REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+NO_LENGTH = ErrorTerm(None, "no bond length follows from these moments")
+VIBRATION = {
+    "rs": "what vibration adds to the moments, of which Costain's error is a part",
+    "r0": "what vibration adds to the moments",
+    "rm1": "vibration beyond c √I", "rm2": "vibration beyond c √I and d",
+    "re": "the corrections of the constants are taken as they are",
+}  # fmt: skip
+REMEDY = "constants of more isotopologues"
+
+
+def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure | None, weights: str) -> ErrorBudget:
+    """The errors of bond lengths in Å.
+
+    Parameters
+    ----------
+    method : str
+        rs, r0, rm1, rm2 or re.
+    values : sequence of Value
+        Those of the method; angles do not count.
+    fitted : FittedStructure or None
+        The fit behind them; None for rs.
+    weights : str
+        Of the fit, "equal" or "errors".
+
+    Returns
+    -------
+    ErrorBudget
+    """
+    known = [one.error for one in values if one.unit == "Å" and math.isfinite(one.error)]
+    of = f"bond lengths ({method})"
+    if not known:
+        return ErrorBudget(of, "Å", *(NO_LENGTH,) * 5)
+    sigma = max(known)
+    return ErrorBudget(
+        of=of,
+        unit="Å",
+        **_numerical(sigma, fitted, weights),
+        model=ErrorTerm(None, VIBRATION[method]),
+        data=ErrorTerm(sigma, _source(fitted, weights), REMEDY),
+        statistics=_statistics(sigma, fitted, weights),
+    )
+
+
+def _numerical(sigma: float, fitted: FittedStructure | None, weights: str) -> dict[str, ErrorTerm]:
+    """Rounding and what the search leaves."""
+    if fitted is None:
+        unknown = ErrorTerm(None, "Kraitchman's equations lose digits for atoms near an axis")
+        return {"rounding": unknown, "truncation": ErrorTerm(0.0, "closed form")}
+    scale = _scale(fitted, weights)
+    if not scale:
+        none = ErrorTerm(0.0, "the moments are met to the last digit")
+        return {"rounding": none, "truncation": none}
+    per_residual = sigma / scale
+    errors = np.array([1.0 if weights == "equal" else one.error for one in fitted.moments])
+    moments = np.array([one.observed for one in fitted.moments])
+    rounded = ROUNDING * float(np.linalg.norm(moments / errors))
+    left = REMAINING * fitted.minimum.distance
+    return {
+        "rounding": ErrorTerm(per_residual * rounded, "moments in double precision"),
+        "truncation": ErrorTerm(
+            per_residual * left, f"twice the next step of the search, after {len(fitted.minimum.iterations)}"
+        ),
+    }
+
+
+def _scale(fitted: FittedStructure, weights: str) -> float:
+    """By what the errors of a fit are scaled: with equal weights by the scatter of its residuals."""
+    if weights != "equal":
+        return 1.0
+    return float(np.linalg.norm(fitted.minimum.residuals)) / math.sqrt(fitted.degrees_of_freedom)
+
+
+def _source(fitted: FittedStructure | None, weights: str) -> str:
+    if fitted is None:
+        return "errors of the constants, and Costain's 0.0015 Å²/r"
+    return f"{'scatter' if weights == 'equal' else 'errors'} of {len(fitted.moments)} moments"
+
+
+def _statistics(sigma: float, fitted: FittedStructure | None, weights: str) -> ErrorTerm:
+    if fitted is None or weights != "equal":
+        return ErrorTerm(0.0, "errors do not follow from the scatter")
+    return ErrorTerm(
+        sigma / math.sqrt(2 * fitted.degrees_of_freedom),
+        f"{counted(fitted.degrees_of_freedom, 'degree')} of freedom",
+        REMEDY,
+    )
