@@ -63,7 +63,8 @@ class InternalRotationConstants:
     25 products of two tops. spin_states: 2I + 1 of
     each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
     "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
-    uncertainties: in MHz (of rho without a unit). source: where the values are from.
+    exchanged: of two equivalent tops 2I + 1 of the nuclei of each further pair that goes over into itself when they are exchanged, (2,) of
+    propane with the hydrogens of CH2. uncertainties: in MHz (of rho without a unit). source: where the values are from.
 
     >>> constants = InternalRotationConstants({"F": "7.6 cm-1", "rho": 0.33, "V3": "408 cm-1"}, "RAM")
     >>> round(constants.values["V3"]), constants.weights
@@ -76,6 +77,7 @@ class InternalRotationConstants:
     functions: int = 0
     spin_states: int = 2
     names: str = "K"
+    exchanged: tuple[int, ...] = ()
     uncertainties: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 
@@ -100,6 +102,10 @@ class InternalRotationConstants:
             )
         if self.names not in ("K", "energy"):
             raise ValueError(f"names {self.names!r} of levels of internal rotation: expected K or energy")
+        if self.exchanged and (self.tops == 1 or min(self.exchanged) < 1):
+            raise ValueError(
+                f"exchanged = {list(self.exchanged)}: expected 2I + 1 of each pair of nuclei that the exchange of two tops exchanges too"
+            )
         object.__setattr__(self, "values", MappingProxyType(numbers))
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
 
@@ -132,7 +138,15 @@ class InternalRotationConstants:
         return 2 if any(name in (*NUMBERED, *BETWEEN_TOPS) for name in self.values) else 1
 
     def __reduce__(self) -> tuple[Any, ...]:
-        others = (self.vt_max, self.functions, self.spin_states, self.names, dict(self.uncertainties), self.source)
+        others = (
+            self.vt_max,
+            self.functions,
+            self.spin_states,
+            self.names,
+            self.exchanged,
+            dict(self.uncertainties),
+            self.source,
+        )
         return type(self), (dict(self.values), self.frame, *others)
 
     @classmethod
@@ -157,7 +171,8 @@ class InternalRotationConstants:
             k: int(values.pop(k)) for k in ("vt_max", "functions", "spin_states") if k in values
         }
         names = values.pop("names", "K")
-        return cls(values, frame, **settings, names=names)
+        exchanged = tuple(int(number) for number in str(values.pop("exchanged", "")).split(",") if number)
+        return cls(values, frame, **settings, names=names, exchanged=exchanged)
 
     @property
     def weights(self) -> tuple[int, int]:

@@ -22,7 +22,7 @@ from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import BARE, InternalRotationConstants
 
 SETTINGS = ("vt_max", "functions", "spin_states")
-KEYS = ("source", "unverified", "unit", "frame", "names", *SETTINGS)
+KEYS = ("source", "unverified", "unit", "frame", "names", "exchanged", *SETTINGS)
 
 
 def internal_rotation_of(table: TableReader | None, constants: Constants | None) -> InternalRotationConstants | None:
@@ -38,10 +38,18 @@ def internal_rotation_of(table: TableReader | None, constants: Constants | None)
             if error is not None:
                 errors[key] = error
     settings = {key: number for key in SETTINGS if (number := table.whole(key)) is not None}
-    names = table.text("names", "K")
+    names, exchanged = table.text("names", "K"), table.content.get("exchanged", [])
+    if not isinstance(exchanged, list) or not all(type(number) is int for number in exchanged):
+        raise table.error("exchanged", "expected a list of whole numbers, 2I + 1 of each exchanged pair, such as [2]")
     try:
         return InternalRotationConstants(
-            values, table.text("frame"), **settings, names=names, uncertainties=errors, source=table.text("source")
+            values,
+            table.text("frame"),
+            **settings,
+            names=names,
+            exchanged=tuple(exchanged),
+            uncertainties=errors,
+            source=table.text("source"),
         )
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
@@ -55,4 +63,6 @@ def internal_rotation_table(constants: InternalRotationConstants | None) -> Mapp
         name: uncertain_entry(value, constants.uncertainties.get(name)) for name, value in constants.values.items()
     }
     settings = {key: getattr(constants, key) for key in SETTINGS}
-    return {"frame": constants.frame, "unit": "MHz", **values, **settings, "names": constants.names}
+    return {"frame": constants.frame, "unit": "MHz", **values, **settings, "names": constants.names} | (
+        {"exchanged": list(constants.exchanged)} if constants.exchanged else {}
+    )

@@ -42,9 +42,19 @@ class TorsionRotation:
         """|J K⟩."""
         return Basis(rotation_labels(self.jmax, self.jmin))
 
-    @cached_property
+    @property
+    def has_parity(self) -> bool:
+        """Whether Kc follows from the sign s of |K⟩ and |-K⟩."""
+        return self.folded
+
+    @property
     def labels(self) -> Mapping[str, Ints]:
         """J, K, t, and the sign s (0 where functions are not combined)."""
+        return self.plain_labels
+
+    @cached_property
+    def plain_labels(self) -> Mapping[str, Ints]:
+        """The labels of |J K t s) or |J K⟩|K t⟩."""
         j, k, t, s = (np.concatenate(column) for column in zip(*self._groups, strict=True))
         return {"J": j, "K": k, "t": t, "s": s}
 
@@ -66,7 +76,7 @@ class TorsionRotation:
     @cached_property
     def _rows(self) -> Ints:
         """Row of the function (sign, |J K⟩, t), -1 where there is none."""
-        labels = self.labels
+        labels = self.plain_labels
         rows = np.full((2, len(self.rotation), self.torsion.count), -1)
         place = self.rotation.rows({"J": labels["J"], "K": labels["K"]})
         rows[(labels["s"] < 0).astype(int), place, labels["t"]] = np.arange(len(place))
@@ -88,6 +98,10 @@ class TorsionRotation:
         values = self._values(terms, plain, np.arange(len(change)), change, tables)
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
+
+    def of_whole(self, elements: Elements) -> Elements:
+        """Elements of the whole Hamiltonian without those that its symmetry excludes."""
+        return elements
 
     def _k(self, rows: Ints) -> Ints:
         return self.rotation.labels["K"][rows]
@@ -161,7 +175,7 @@ class TorsionRotation:
         c = np.broadcast_to(columns[:, None, :], values.shape[1:]).ravel()
         scale = ROUND_OFF * np.abs(flat).max(axis=1, keepdims=True, initial=0.0)
         retained = np.flatnonzero((np.abs(flat) > scale).any(axis=0) & (r >= 0) & (c >= 0))
-        return Elements(len(self.labels["J"]), r[retained], c[retained], flat[:, retained])
+        return Elements(len(self.plain_labels["J"]), r[retained], c[retained], flat[:, retained])
 
 
 class _Tables:

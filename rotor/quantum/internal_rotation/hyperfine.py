@@ -20,9 +20,8 @@ from rotor.quantum.contraction import Sector, Space, contracted_elements, couple
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.levels import (
     REPRESENTATION,
+    Degeneracies,
     TurningTops,
-    components_of,
-    reduced_weights,
     species_blocks,
     turned_by,
     turning_tops,
@@ -147,7 +146,12 @@ def hyperfine_levels(
         For electron spins, total spins of like nuclei, and constants with powers of N.
     """
     model = turning_tops(top, constants)
+    degeneracies = Degeneracies.of(model, constants)
     nuclei = _nuclei(top, effects, model.angle)
+    if degeneracies.equivalent and len(nuclei) > 1:
+        raise ValueError(
+            "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them"
+        )
     total = sum(nucleus.spin.twice for nucleus in nuclei)
     names = [*(f"f{i}" for i in range(1, len(nuclei))), "f"]
     blocks: list[HyperfineBlock] = []
@@ -160,10 +164,14 @@ def hyperfine_levels(
             if not len(here):
                 continue
             energies = states.space.sectors[sector].energies[here]
-            blocks.append(HyperfineBlock(states, sector, here, energies, start, components_of(name)))
+            components, rows = degeneracies.components(name), quanta["row"][here]
+            blocks.append(HyperfineBlock(states, sector, here, energies, start, components))
             start += len(here)
-            table = {"species": np.full(len(here), name)} | {
-                key: quanta[key][here] for key in ("vt", "n", "ka", "kc", *names)
+            table = {
+                "species": np.full(len(here), name),
+                "components": np.full(len(here), components),
+                "weight": degeneracies.weights(name, states.levels.functions, rows),
+                **{key: quanta[key][here] for key in ("vt", "n", "ka", "kc", *names)},
             }
             for key, column in table.items():
                 columns.setdefault(key, []).append(column)
@@ -173,7 +181,7 @@ def hyperfine_levels(
     for key in names:
         if key not in halves:
             quanta[key] = quanta[key] // 2
-    species, weights = quanta["species"].tolist(), reduced_weights(constants)
+    components_of_levels, weights = quanta.pop("components"), quanta.pop("weight")
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
@@ -181,8 +189,8 @@ def hyperfine_levels(
         energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
         quanta=quanta,
         multiplicity=multiplicity,
-        components=np.array([components_of(name) for name in species], dtype=np.int64),
-        weight=np.array([weights[name] for name in species], dtype=np.int64),
+        components=components_of_levels,
+        weight=weights,
         halves=halves,
         effects=effects,
         blocks=tuple(blocks),

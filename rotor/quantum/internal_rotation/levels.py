@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.exchange import SpinCounts
+from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
-from rotor.quantum.internal_rotation.two_tops import TwoTops, two_tops
+from rotor.quantum.internal_rotation.two_tops import SPECIES, TwoTops, two_tops
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
@@ -162,6 +164,7 @@ def torsion_rotation_levels(
     """
     refuse_axes(top)
     model = turning_tops(top, constants)
+    degeneracies = Degeneracies.of(model, constants)
     blocks: list[TorsionBlock] = []
     quanta: dict[str, list[NDArray[Any]]] = {}
     start = 0
@@ -169,9 +172,12 @@ def torsion_rotation_levels(
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
-        made = _blocks(species, model, start, components_of(name))
+        components = degeneracies.components(name)
+        made = _blocks(species, model, start, components)
         columns = {
             "species": np.full(len(species.rows), name),
+            "components": np.full(len(species.rows), components),
+            "weight": degeneracies.weights(name, species.functions, species.rows),
             **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
         }
         for key, column in columns.items():
@@ -180,7 +186,7 @@ def torsion_rotation_levels(
         blocks += made
     joined = {name: np.concatenate(columns) for name, columns in quanta.items()}
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    return _table(top, constants, effects, jmax, joined, energies, tuple(blocks))
+    return _table(top, effects, jmax, joined, energies, tuple(blocks))
 
 
 def energies_alone(
@@ -197,6 +203,7 @@ def energies_alone(
     """  # fmt: skip
     refuse_axes(top)
     model, pieces, energies = turning_tops(top, constants), [], []
+    degeneracies = Degeneracies.of(model, constants)
     for name in model.species:
         blocks = species_blocks(model, name, jmin, jmax, constants.functions)
         highest = float(
@@ -211,6 +218,8 @@ def energies_alone(
         kc = labels["J"] - ka + np.where((k > 0) & (labels["s"] >= 0), 1, 0)
         columns = {
             "species": np.full(len(k), name),
+            "components": np.full(len(k), degeneracies.components(name)),
+            "weight": degeneracies.weights(name, blocks.functions, np.flatnonzero(solved)),
             "vt": labels["t"],
             "j": labels["J"],
             "ka": ka,
@@ -218,25 +227,24 @@ def energies_alone(
         }
         pieces.append(columns)
     quanta = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    return _table(top, constants, effects, jmax, quanta, np.concatenate(energies), ())
+    return _table(top, effects, jmax, quanta, np.concatenate(energies), ())
 
 
 def _table(
-    top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmax: int,
-    quanta: dict[str, NDArray[Any]], energies: Floats, blocks: tuple[TorsionBlock, ...],
+    top: Top, effects: tuple[QuantumEffect, ...], jmax: int, columns: dict[str, NDArray[Any]], energies: Floats,
+    blocks: tuple[TorsionBlock, ...],
 ) -> Levels:  # fmt: skip
-    """Levels with the degeneracies of their species."""
-    species = quanta["species"].tolist()
-    weights = reduced_weights(constants)
+    """Levels of columns: quantum numbers, components and weights."""
+    components, weight = columns.pop("components"), columns.pop("weight")
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
         jmax=jmax,
         energy_mhz=energies,
-        quanta=quanta,
-        multiplicity=2 * quanta["j"] + 1,
-        components=np.array([components_of(name) for name in species], dtype=np.int64),
-        weight=np.array([weights[name] for name in species], dtype=np.int64),
+        quanta=columns,
+        multiplicity=2 * columns["j"] + 1,
+        components=components,
+        weight=weight,
         effects=effects,
         blocks=blocks,
     )
@@ -254,7 +262,16 @@ def refuse_axes(top: Top) -> None:
 def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
     """The constants of the top and of what turns in it together."""
     if constants.tops == 2:
-        return two_tops(top.constants.values, constants.values)
+        model = two_tops(top.constants.values, constants.values)
+        beside = [
+            name for name, mu in zip("abc", top.dipole_abc_debye or (), strict=False) if mu and name != model.axis
+        ]
+        if model.axis and beside:
+            raise ValueError(
+                f"dipole along {', '.join(beside)}: the tops are exchanged by C2 about {model.axis}, which leaves a dipole along "
+                f"{model.axis} alone; leave the others out, or give the constants by which the tops differ"
+            )
+        return model
     if constants.frame == "RAM":
         return RamModel({**top.constants.values, **constants.values})
     return model_of_principal_axes({**top.constants.values, **constants.values})
@@ -267,24 +284,49 @@ def species_blocks(model: TurningTops, name: str, jmin: int, jmax: int, count: i
     return model.blocks(model.species[name], jmax, jmin=jmin, count=count)
 
 
-def components_of(species: str) -> int:
-    """States that coincide in a level: (σ1, σ2) and (-σ1, -σ2) of all species but A and AA."""
-    return 1 if set(species) == {"A"} else 2
+@dataclass(frozen=True)
+class Degeneracies:
+    """How many states levels of a species stand for, and their spin functions without the common divisor.
 
-
-def reduced_weights(constants: InternalRotationConstants) -> dict[str, int]:
-    """Spin weights of levels by species without their common divisor.
-
-    Those of inequivalent tops are products; of EE and EE*, each with two of the four components, half of it.
+    equivalent: whether two tops are exchanged by a rotation of the whole; other tops have products of weights.
     """
-    a, e = constants.weights
-    weights = (
-        {"A": a, "E": e}
-        if constants.tops == 1
-        else {"AA": a * a, "AE": a * e, "EA": e * a, "EE": e * e // 2, "EE*": e * e // 2}
-    )
-    divisor = int(np.gcd.reduce(list(weights.values())))
-    return {name: weight // divisor for name, weight in weights.items()}
+
+    constants: InternalRotationConstants
+    equivalent: bool = False
+
+    @classmethod
+    def of(cls, model: TurningTops, constants: InternalRotationConstants) -> Degeneracies:
+        """Those of a model."""
+        equivalent = isinstance(model, TwoTops) and bool(model.axis)
+        if constants.exchanged and not equivalent:
+            raise ValueError(
+                "internal rotation: exchanged nuclei are stated, and no twofold axis a, b or c exchanges the tops: expected equal F0, V3, "
+                "V6, and angles such as delta_2 = pi - delta_1"
+            )
+        return cls(constants, equivalent)
+
+    def components(self, species: str) -> int:
+        """States that coincide in a level: (σ1, σ2) and (-σ1, -σ2) of all species but A and AA; of equivalent tops AE and EA."""
+        return 1 if set(species) == {"A"} else 4 if self.equivalent and species == "AE" else 2
+
+    def weights(self, species: str, functions: TorsionRotation, rows: Ints) -> Ints:
+        """Spin weights (levels,) of all components together, of levels in the blocks of functions at these rows.
+
+        Those of inequivalent tops are products; of EE and EE*, each with two of the four components, half of it.
+        """
+        if self.equivalent:
+            counts = SpinCounts(self.constants.spin_states, self.constants.exchanged)
+            signs = np.array([1, -1])
+            divisor = np.gcd.reduce(np.concatenate([counts.of_species(sigma, signs) for sigma in SPECIES.values()]))
+            x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
+            return np.asarray(counts.of_species(SPECIES[species], x[rows]) // divisor)
+        a, e = self.constants.weights
+        weights = (
+            {"A": a, "E": e}
+            if self.constants.tops == 1
+            else {"AA": a * a, "AE": a * e, "EA": e * a, "EE": e * e // 2, "EE*": e * e // 2}
+        )
+        return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
 def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[TorsionBlock]:

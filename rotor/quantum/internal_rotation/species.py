@@ -57,7 +57,8 @@ class SpeciesBlocks:
 
     def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> LinearBlocks:
         """The blocks of one term, H at these coefficients, among functions whose Gershgorin discs reach below `below_mhz`."""
-        elements = self.functions.elements([_merged(self.terms, np.asarray(coefficients, dtype=float))])
+        merged = _merged(self.terms, np.asarray(coefficients, dtype=float))
+        elements = self.functions.of_whole(self.functions.elements([merged]))
         needed = self.needed
         if below_mhz < math.inf:
             value = np.where(elements.rows == elements.columns, elements.values[0].real, -np.abs(elements.values[0]))
@@ -154,11 +155,16 @@ class SpeciesLevels:
         j, k = labels["J"][name], labels["K"][name]
         if self.by_energy:
             k, kc = counted_ka_kc(j, v, self.energies)
-        elif self.functions.folded:
-            kc = kc_of_parity(j, k, labels["s"][name] * self.functions.torsion.parity[v])
+        elif self.functions.has_parity:
+            kc = kc_of_parity(j, k, self._parity(name, v))
         else:
             kc = kc_of_pairs({"J": j, "vt": v}, k, self.energies)
         return {"j": j, "vt": v, "k": k, "ka": np.abs(k), "kc": kc}
+
+    def _parity(self, name: Ints, v: Ints) -> Ints:
+        """(-1)^(J + Kc) of the levels that functions name."""
+        s = self.functions.labels["s"][name]
+        return np.asarray(s * self.functions.torsion.parity[v] if self.functions.folded else s)
 
     def slopes(self, rows: Ints | None = None) -> Floats:
         """∂E/∂c (levels, terms) of the levels at these rows of `solved`; by default of all."""

@@ -11,7 +11,7 @@ p_i with its matrix over these functions. Species are pairs (σ1, σ2); (-σ1, -
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -20,6 +20,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
+from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesBlocks
@@ -31,7 +32,9 @@ from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS
 
 EACH = 9  # functions of each top that products are made of
+ALIKE = 1e-4  # largest difference of the directions (radian) and constants (relative) of equivalent tops: five digits of a file
 Pair = tuple[Operator | None, Operator | None]  # operators of both torsions
+SPECIES = MappingProxyType({"AA": (0, 0), "AE": (0, 1), "EA": (1, 0), "EE": (1, 1), "EE*": (1, -1)})
 
 
 @dataclass(frozen=True)
@@ -97,17 +100,23 @@ class ProductTorsion:
 
 @dataclass(frozen=True)
 class TwoTops:
-    """Constants of a molecule with two internal rotors, MHz: A, B, C and distortion in principal axes, both tops, and what couples them."""
+    """Constants of a molecule with two internal rotors, MHz: A, B, C and distortion in principal axes, both tops, and what couples them.
+
+    axis: about which C2 exchanges the tops, which then are equivalent; "" for others.
+    """
 
     rotation: Mapping[str, float]
     tops: tuple[InternalTop, InternalTop]
     f12: float = 0.0
     v12: float = 0.0
     v12_sine: float = 0.0
+    axis: str = ""
     angle: ClassVar[float] = 0.0  # of z from the axis a
-    species: ClassVar[Mapping[str, tuple[int, int]]] = MappingProxyType(
-        {"AA": (0, 0), "AE": (0, 1), "EA": (1, 0), "EE": (1, 1), "EE*": (1, -1)}
-    )  # (σ1, σ2); each stands for (-σ1, -σ2) too
+
+    @property
+    def species(self) -> Mapping[str, tuple[int, int]]:
+        """(σ1, σ2) by name; each stands for (-σ1, -σ2) too, and AE of equivalent tops for EA."""
+        return {name: sigma for name, sigma in SPECIES.items() if name != "EA" or not self.axis}
 
     @property
     def has_plane(self) -> bool:
@@ -158,12 +167,24 @@ class TwoTops:
         -------
         SpeciesBlocks
         """
-        torsions = self._torsions(species, jmax, each, waves)
-        middle = torsions[0].energies[jmax][:, None] + torsions[1].energies[jmax]
-        retained = np.column_stack(np.unravel_index(np.argsort(middle, axis=None, kind="stable")[:count], middle.shape))
-        product: Any = ProductTorsion(torsions[0], torsions[1], retained)
+        first, second = self._torsions(species, jmax, each, waves)
+        exchanged = bool(self.axis) and species[0] == species[1]
+        if exchanged:
+            second = (
+                first
+                if self.axis == "a"
+                else replace(first, energies=first.energies[::-1], vectors=first.vectors[::-1])
+            )
+        retained = _lowest(first.energies[jmax][:, None] + second.energies[jmax], count, exchanged)
+        product: Any = ProductTorsion(first, second, retained)
         folded = species == (0, 0) and self.has_plane
-        return SpeciesBlocks(TorsionRotation(product, jmin, jmax, folded), self.terms(species))
+        if exchanged:
+            number = {pair: i for i, pair in enumerate(map(tuple, retained.tolist()))}
+            partner = np.array([number[t2, t1] for t1, t2 in retained.tolist()])
+            functions: TorsionRotation = ExchangedTops(product, jmin, jmax, folded, self.axis, partner)
+        else:
+            functions = TorsionRotation(product, jmin, jmax, folded)
+        return SpeciesBlocks(functions, self.terms(species))
 
     def terms(self, species: tuple[int, int]) -> Mapping[str, tuple[Product, ...]]:
         """Sums of products by coefficient, in the order of `coefficients`."""
@@ -248,7 +269,33 @@ def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> T
         )
         for i in (0, 1)
     )  # fmt: skip
-    return TwoTops(rotation, (first, second), float(f[0, 1]), constants.get("V12", 0.0), constants.get("V12s", 0.0))
+    axis = _exchanging(first, second)
+    if axis:
+        turned = np.array(TURNS[axis]) * first.rho_abc
+        second = replace(first, rho_abc=(float(turned[0]), float(turned[1]), float(turned[2])))
+    between = float(f[0, 1]), constants.get("V12", 0.0), constants.get("V12s", 0.0)
+    return TwoTops(rotation, (first, second), *between, axis)
+
+
+def _exchanging(first: InternalTop, second: InternalTop) -> str:
+    """The axis about which C2 exchanges tops of equal constants, "" where they differ."""
+    numbers = [np.array([top.f_mhz, top.v3_mhz, top.v6_mhz]) for top in (first, second)]
+    if np.abs(numbers[0] - numbers[1]).max() > ALIKE * np.abs(numbers[0]).max() or abs(
+        first.v3_mhz - second.v3_mhz
+    ) > ALIKE * abs(first.v3_mhz):
+        return ""
+    rho = [np.array(top.rho_abc) for top in (first, second)]
+    size = float(np.linalg.norm(rho[0]))
+    return exchange_axis(rho[0] / size, rho[1] / size, ALIKE) if size else ""
+
+
+def _lowest(energies: Floats, count: int, exchanged: bool) -> Ints:
+    """(t1, t2) of the lowest products (products, 2); of equivalent tops with the partner of each."""
+    pairs = np.column_stack(np.unravel_index(np.argsort(energies, axis=None, kind="stable"), energies.shape))
+    retained = pairs[:count]
+    if exchanged and tuple(retained[-1][::-1]) not in set(map(tuple, retained.tolist())):
+        retained = np.vstack([retained, retained[-1][::-1]])
+    return retained
 
 
 def _sum(operators: list[Operator]) -> Operator:

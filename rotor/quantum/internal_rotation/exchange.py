@@ -1,0 +1,164 @@
+"""Two equivalent tops: functions of one sign under their exchange, and spin weights by counting.
+
+Tops that a twofold axis g of the molecule exchanges have equal constants and ρ2 = C2(g) ρ1. The permutation of their nuclei acts as
+
+    P |J K⟩|t1 t2⟩ = φ |J, ∓K⟩|t2 t1⟩,      φ = (-1)^K of g = a (K to K),  (-1)^J of b,  (-1)^(J-K) of c (K to -K),
+
+where the functions of the second top at K are those of the first at ±K. With σ1 = σ2 the functions here have P = ±1; with σ1 ≠ σ2 a
+level of (σ1, σ2) coincides with that of (σ2, σ1). Feasible permutations of the six nuclei are the two cyclic ones, P and their products:
+C3 ≀ C2 of 18 elements, G36 with the inversion, which takes no part in weights.
+
+Weights, by counting: of n states of a nucleus, a top has d_0 = (n³ + 2n)/3 spin functions of σ = 0 and d_1 = (n³ - n)/3 of each of ±1. A
+function of the molecule changes by (-1)^(n-1) for each exchanged pair. With N = Π m², M = Π m of further pairs with m = 2I + 1 states
+each, the exchange has the trace d_σ M over the d_σ² N spin functions of (σ, σ), so that (d_σ² N ± d_σ M)/2 of them have P = ±1.
+
+| (σ1, σ2) | components | spin functions, of two CH3 |
+|---|---|---|
+| (0, 0) | 1 | (d_0² N ± d_0 M)/2: 10, 6 |
+| (1, 1), (-1, -1) | 2 | d_1² N ± d_1 M: 6, 2 |
+| (1, -1), (-1, 1) | 2 | d_1² N: 4 |
+| (0, ±1), (±1, 0) | 4 | 2 d_0 d_1 N: 16 |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.elements import Elements, merged
+from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.functions import TorsionRotation
+
+TURNS = {"a": (1.0, -1.0, -1.0), "b": (-1.0, 1.0, -1.0), "c": (-1.0, -1.0, 1.0)}  # C2 about an axis on (a, b, c)
+
+
+@dataclass(frozen=True, eq=False)
+class ExchangedTops(TorsionRotation):
+    """Functions of two tops with σ1 = σ2 that have a sign x under the exchange by C2 about `axis`; t: products by their number.
+
+    partner (n_v,): of the product (t1, t2) the number of (t2, t1). Sums of a pair stand at the lower number, differences at the other.
+    """
+
+    axis: str
+    partner: Ints
+
+    @property
+    def has_parity(self) -> bool:
+        """Whether Kc follows from the sign s of |K⟩ and |-K⟩."""
+        return self.folded or self.axis != "a"
+
+    @cached_property
+    def labels(self) -> Mapping[str, Ints]:
+        """J, K (not below 0 where K and -K are combined), t, the sign s of |-K⟩ beside |K⟩, and the sign x under the exchange."""
+        return self._combined[1]
+
+    @cached_property
+    def _combined(self) -> tuple[Any, dict[str, Ints]]:
+        """The matrix (plain functions, functions with a sign), and their labels."""
+        from scipy.sparse import csr_array
+
+        plain: dict[str, Any] = dict(self.plain_labels)
+        count, t = len(plain["t"]), plain["t"]
+        other = self._row(plain["J"], plain["K"], self.partner[t], plain["s"])
+        first = np.where(t <= self.partner[t], 1.0, -1.0)  # of the function itself in its combination
+        matrix = _pairs(np.arange(count), other, first)
+        sign = first.astype(np.int64)
+        if self.has_parity and not self.folded:
+            k = plain["K"]
+            opposite = self._row(plain["J"], -k, t, plain["s"])
+            matrix = matrix @ _pairs(
+                np.arange(count), opposite, np.where(k >= 0, 1.0, -1.0), np.where(k % 2, -1.0, 1.0)
+            )
+            plain["s"], plain["K"] = np.where(k >= 0, 1, -1), np.abs(k)
+        s, j, k = np.where(plain["K"] > 0, plain["s"], 1), plain["J"], plain["K"]
+        phase = {"a": k, "b": j + k, "c": j}[self.axis] % 2
+        of_rotation = np.where(phase, -1, 1) * (1 if self.axis == "a" else s)
+        plain["x"] = sign * of_rotation
+        order = np.lexsort((plain["t"], plain["K"], plain["J"], -plain["s"]))
+        return csr_array(matrix[:, order]), {name: column[order] for name, column in plain.items()}
+
+    def _row(self, j: Ints, k: Ints, t: Ints, s: Ints) -> Ints:
+        """Rows of plain functions."""
+        return np.asarray(self._rows[(s < 0).astype(int), self.rotation.rows({"J": j, "K": k}), t])
+
+    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
+        """Elements between functions with a sign: those of plain ones, transformed."""
+        from scipy.sparse import csr_array
+
+        plain = super().elements(terms, rank, time_odd)
+        matrix = self._combined[0]
+        pieces = []
+        for i, values in enumerate(plain.values):
+            found = matrix.T @ csr_array((values, (plain.rows, plain.columns)), shape=(plain.count,) * 2) @ matrix
+            found = found.tocoo()
+            here = np.zeros((len(plain.values), found.nnz), dtype=plain.values.dtype)
+            here[i] = found.data
+            pieces.append((found.row.astype(np.int64), found.col.astype(np.int64), here))
+        rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
+        return merged(plain.count, rows, columns, values)
+
+    def of_whole(self, elements: Elements) -> Elements:
+        """Elements of the whole Hamiltonian without those between functions of different x, which are round-off of zero."""
+        x = self.labels["x"]
+        here = x[elements.rows] == x[elements.columns]
+        return Elements(elements.count, elements.rows[here], elements.columns[here], elements.values[:, here])
+
+
+def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None) -> Any:
+    """Columns (|row⟩ + |other⟩ f)/√2 of first = 1 and (|other⟩ - |row⟩ f)/√2 of first = -1, |row⟩ where it is its partner."""
+    from scipy.sparse import csr_array
+
+    weights = np.ones(len(rows)) if factor is None else factor
+    alone = rows == others
+    own = np.where(alone, 1.0, np.where(first > 0, 1.0, -weights) * math.sqrt(0.5))
+    beside = np.where(alone, 0.0, np.where(first > 0, weights, 1.0) * math.sqrt(0.5))
+    entries = np.concatenate([own, beside]), (np.concatenate([rows, others]), np.concatenate([rows, rows]))
+    return csr_array(entries, shape=(len(rows),) * 2)
+
+
+@dataclass(frozen=True)
+class SpinCounts:
+    """Spin functions of two equivalent tops. states: 2I + 1 of a nucleus that turns. pairs: those of further exchanged pairs."""
+
+    states: int = 2
+    pairs: tuple[int, ...] = ()
+
+    def of_species(self, sigma: tuple[int, int], x: Ints) -> Ints:
+        """Spin functions (levels,) of all components together of levels with a sign x under the exchange.
+
+        >>> counts = SpinCounts(2)
+        >>> [counts.of_species(sigma, np.array([1, -1])).tolist() for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))]
+        [[6, 10], [2, 6], [4, 4], [16, 16]]
+        >>> SpinCounts(2, (2,)).of_species((0, 0), np.array([1, -1])).tolist()  # propane: the hydrogens of CH2 are exchanged too
+        [36, 28]
+        """
+        n, all_pairs, trace = self.states, math.prod(m * m for m in self.pairs), math.prod(self.pairs)
+        d = [(n**3 + 2 * n) // 3, (n**3 - n) // 3]
+        first, second = (d[abs(one)] for one in sigma)
+        if sigma[0] != sigma[1]:
+            return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))
+        fermions = 3 * (n % 2 == 0) + sum(m % 2 == 0 for m in self.pairs)
+        y = x * (-1 if fermions % 2 else 1)  # of the spin function that goes along
+        return np.asarray((first**2 * all_pairs + y * first * trace) // (2 if not any(sigma) else 1))
+
+
+def exchange_axis(first: Floats, second: Floats, tolerance: float) -> str:
+    """The axis a, b or c about which C2 takes the direction of one top to that of the other, "" for none.
+
+    A top along a principal axis is excluded: other axes then do it too.
+
+    >>> exchange_axis(np.array([0.8, 0.6, 0.0]), np.array([-0.8, 0.6, 0.0]), 1e-9)
+    'b'
+    """
+    if np.count_nonzero(np.abs(first) > tolerance) < 2:
+        return ""
+    for axis, turn in TURNS.items():
+        if np.abs(np.array(turn) * first - second).max() < tolerance:
+            return axis
+    return ""
