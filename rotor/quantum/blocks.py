@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import ROUND_OFF, Elements
 from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.solvers.dominated import dominated_states
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
 
 
@@ -73,6 +74,25 @@ class LinearBlocks:
     def solve(self, coefficients: ArrayLike, lowest: int | None = None) -> SolvedBlocks:
         """All blocks solved at coefficients (terms,); with `lowest` that many states of each block."""
         states = [eigenstates(matrices, lowest) for matrices in self.matrices(coefficients)]
+        return SolvedBlocks(self, tuple(states))
+
+    def solve_dominated(self, coefficients: ArrayLike, by: NDArray[np.bool_]) -> SolvedBlocks:
+        """Of each block the states with the largest shares in some of the functions (functions,), as many as these; or all."""
+        states = []
+        for stack, matrices in zip(self.stacks, self.matrices(coefficients), strict=True):
+            chosen = by[stack.functions]
+            counts = np.unique(chosen.sum(axis=1))
+            found = [
+                dominated_states(matrix, np.flatnonzero(few)) if len(counts) == 1 and counts[0] else None
+                for matrix, few in zip(matrices, chosen, strict=True)
+            ]
+            solved = [one for one in found if one is not None]
+            if len(solved) == len(found):
+                states.append(
+                    (np.stack([energies for energies, _ in solved]), np.stack([vectors for _, vectors in solved]))
+                )
+            else:
+                states.append(eigenstates(matrices))
         return SolvedBlocks(self, tuple(states))
 
     def energies(self, coefficients: ArrayLike) -> Floats:

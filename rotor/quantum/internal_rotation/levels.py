@@ -127,8 +127,10 @@ class TorsionBlock(MomentBlock):
         """Reduced elements (n_up, n_low) of one component."""
         assert isinstance(low, TorsionBlock)
         entries = self.moments.between(tensors)[self.number, low.number]
-        matrix = np.zeros((len(self.vectors), len(low.vectors)), dtype=entries.values.dtype)
-        matrix[entries.rows, entries.columns] = entries.values
+        from scipy.sparse import csr_array
+
+        shape = len(self.vectors), len(low.vectors)
+        matrix = csr_array((entries.values, (entries.rows, entries.columns)), shape=shape)
         return np.asarray(self.vectors.conj().T @ (matrix @ low.vectors))
 
     def slopes(self, names: Sequence[str]) -> Floats:

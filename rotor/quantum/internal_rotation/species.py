@@ -69,7 +69,8 @@ class SpeciesBlocks:
 
     def _solved(self, linear: LinearBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
         values = np.asarray(coefficients, dtype=float)
-        return SpeciesLevels(self, linear.solve(values), _zeroth_order(linear, values), vt_max, by_energy)
+        solved = linear.solve_dominated(values, linear.labels["t"] <= vt_max)
+        return SpeciesLevels(self, solved, _zeroth_order(linear, values), vt_max, by_energy)
 
 
 def _merged(terms: Terms, coefficients: Floats) -> list[Product]:

@@ -1,0 +1,95 @@
+"""Eigenstates that lie mostly in a few functions, of a matrix that couples these to many others at a distance.
+
+Davidson's method for a block of states: from the chosen functions, the space grows by
+
+    w = (E - D)⁻¹ r,      r = (H - E) x,
+
+D being the diagonal of H, r the residues of the Ritz states x with the largest shares in the chosen functions, until what second order says
+of the rest, Σ r_i²/|E - D_i|, is below a tolerance for each state. A function at the energy of a state enters by its small denominator.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+
+TOLERANCE_MHZ = 1e-7  # of an energy
+STEPS = 10  # enlargements before all states are solved instead
+SMALLEST_GAP = 1e-3  # MHz, in place of smaller denominators
+SMALL = 150  # size up to which all states are solved as fast
+SHARE = 0.2  # of the functions that are chosen, from which they are
+
+
+def dominated_states(lower: Floats, chosen: Ints) -> tuple[Floats, Floats] | None:
+    """Energies (p,), rising, and vectors (n, p) of the p states with the largest shares in p chosen functions.
+
+    Parameters
+    ----------
+    lower : (n, n) array
+        A real symmetric matrix in MHz; its lower triangle is read.
+    chosen : (p,) array of int
+        Functions.
+
+    Returns
+    -------
+    energies, vectors : arrays, or None
+        None where all states are to be solved instead: for a small matrix, many functions, and without convergence.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> matrix = rng.normal(size=(200, 200)) + np.diag(np.where(np.arange(200) < 8, 0.0, 1e3) + np.arange(200))
+    >>> matrix = (matrix + matrix.T) / 2
+    >>> energies, vectors = dominated_states(matrix, np.arange(8))
+    >>> bool(np.abs(energies - np.linalg.eigvalsh(matrix)[:8]).max() < 1e-7)
+    True
+    """
+    size, count = len(lower), len(chosen)
+    if size <= SMALL or count > SHARE * size or np.iscomplexobj(lower):
+        return None
+    whole, diagonal = _symmetric(lower), np.diag(lower)
+    space = np.zeros((size, count))
+    space[chosen, np.arange(count)] = 1.0
+    image = whole @ space
+    inner = space.T @ image
+    for _ in range(STEPS):
+        energies, mixing = np.linalg.eigh(inner)
+        shares = ((space[chosen] @ mixing) ** 2).sum(axis=0)
+        best = np.sort(np.argsort(-shares, kind="stable")[:count])
+        energies, mixing = energies[best], mixing[:, best]
+        vectors = space @ mixing
+        rest = image @ mixing - vectors * energies
+        gaps = energies - diagonal[:, None]
+        gaps = np.where(np.abs(gaps) < SMALLEST_GAP, SMALLEST_GAP, gaps)
+        wrong = (rest**2 / np.abs(gaps)).sum(axis=0) > TOLERANCE_MHZ
+        if not wrong.any():
+            return energies, vectors
+        more = _orthonormal(rest[:, wrong] / gaps[:, wrong], space)
+        applied = whole @ more
+        beside = space.T @ applied
+        inner = np.block([[inner, beside], [beside.T, more.T @ applied]])
+        space, image = np.hstack([space, more]), np.hstack([image, applied])
+    return None
+
+
+def _symmetric(lower: Floats) -> Any:
+    """The whole matrix of a lower triangle, sparse."""
+    from scipy.sparse import csr_array
+
+    rows, columns = np.nonzero(lower)
+    here = rows >= columns
+    rows, columns = rows[here], columns[here]
+    values, beside = lower[rows, columns], rows != columns
+    entries = np.concatenate([values, values[beside]])
+    places = np.concatenate([rows, columns[beside]]), np.concatenate([columns, rows[beside]])
+    return csr_array((entries, places), shape=lower.shape)
+
+
+def _orthonormal(vectors: Floats, space: Floats) -> Floats:
+    """The part of vectors outside a space as orthonormal columns; twice, against rounding."""
+    for _ in range(2):
+        vectors = np.linalg.qr(vectors - space @ (space.T @ vectors))[0]
+    return vectors
