@@ -38,7 +38,7 @@ from mutation_session import NextTest, Session, Unpatchable
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
 REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
-UNREACHED_MOST = 12  # test functions in a row that do not reach it, before the rest is left out
+UNREACHED_MOST = 20  # test functions in a row that do not reach it, before the rest is left out
 FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",
@@ -137,30 +137,43 @@ class Fresh:
 # Mutants run
 
 
-def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float, later: list[str]) -> None:
-    """Run the mutants that have no result of this budget yet; with test files of `later`, survivors on these alone."""
+def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float, later: list[str], only: list[int]) -> None:
+    """Run the mutants that have no result of this budget yet; with test files of `later`, survivors on these alone.
+
+    With numbers of mutants these alone, and nothing is recorded.
+    """
     import pytest
 
     fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * minutes
 
     def work(session: Session) -> None:
         done = finished(folder)
-        left = {
-            number: mutant
-            for number, mutant in enumerate(mutants)
-            if number not in done or (done[number]["result"] != "killed" and (later or done[number]["budget"] < budget))
-        }
+        killed = {number for number, row in done.items() if row["result"] == "killed"}
+        through = {number for number, row in done.items() if row["budget"] >= budget and not later}
+        left = {n: m for n, m in enumerate(mutants) if n in only or not (only or n in killed | through)}
         sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants}
         session.marks = session.patches(dict(enumerate(mutants)), sources)
         reach = Reach(folder / "reach.jsonl")
         for number in sorted(left, key=lambda n: (left[n].compiled or not left[n].statement, n)):
             if time.time() > until:
                 break
-            mutant, last = left[number], done.get(number)
+            mutant, last = left[number], None if only else done.get(number)
             doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
             ranked = {**dict.fromkeys(doctests, 10.0), **selection.ranked(mutant)}
-            row = of_mutant(folder, mutant, number, last, budget, session, reach, ranked, fresh)
-            append(folder / "results.jsonl", {**row, "later": bool(later)})
+            row = of_mutant(
+                folder,
+                mutant,
+                number,
+                last,
+                budget,
+                session,
+                reach,
+                ranked,
+                math.inf if later else UNREACHED_MOST,
+                fresh,
+            )
+            if not only:
+                append(folder / "results.jsonl", {**row, "later": bool(later)})
             place = number, f"{mutant.file}:{mutant.line}", mutant.operator
             note(folder, *place, row["result"], row["by"], len(row["reached"]), "of", len(row["tests"]), row["wall"])
 
@@ -205,7 +218,7 @@ class Reach:
                 out[test] = score * weight * (0.01 if test in self.known else 1.0)
         return out
 
-    def chosen(self, number: int, ranked: dict[str, float], tests: set[str]) -> NextTest:
+    def chosen(self, number: int, ranked: dict[str, float], tests: set[str], most_missed: float) -> NextTest:
         """The best of some tests again and again; what one reaches changes the scores of its file."""
         scores = {test: score for test, score in self.scores(number, ranked).items() if test in tests}
         factors: dict[str, float] = defaultdict(lambda: 1.0)
@@ -216,7 +229,7 @@ class Reach:
             if last:
                 missed = 0 if last[1] else missed + 1
                 factors[last[0].split("::")[0]] *= REACHED if last[1] else NOT_REACHED
-            if not scores or missed >= UNREACHED_MOST:
+            if not scores or missed >= most_missed:
                 return None
             best = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
             del scores[best]
@@ -240,6 +253,7 @@ def of_mutant(
     session: Session,
     reach: Reach,
     ranked: dict[str, float],
+    most_missed: float,
     fresh: Fresh,
 ) -> dict[str, Any]:
     """The result of a mutant, which is in the file on the disk meanwhile, for tests that start processes."""
@@ -249,7 +263,7 @@ def of_mutant(
     try:
         (folder / mutant.file).write_bytes(mutant.applied(source))
         try:
-            row, seen = session.judged(number, mutant, source, reach.chosen(number, ranked, left), budget)
+            row, seen = session.judged(number, mutant, source, reach.chosen(number, ranked, left, most_missed), budget)
             for one in seen:
                 reach.add(one)
         except Unpatchable:
@@ -348,7 +362,9 @@ def summary(folder: Path, mutants: list[Mutant]) -> str:
 
 def wilson(hits: int, total: int) -> str:
     """A share with its 95 % interval: E. B. Wilson, J. Am. Stat. Assoc. 22, 209 (1927)."""
-    z, share = 1.96, hits / max(total, 1)
+    if not total:
+        return "none of none"
+    z, share = 1.96, hits / total
     centre = (share + z * z / (2 * total)) / (1 + z * z / total)
     half = z / (1 + z * z / total) * math.sqrt(share * (1 - share) / total + z * z / (4 * total * total))
     return f"{share:.1%} ({centre - half:.1%} to {centre + half:.1%})"
@@ -368,6 +384,7 @@ def main() -> None:
     parser.add_argument(
         "--later", nargs="+", default=[], help="files of tests written since: survivors are run on these"
     )
+    parser.add_argument("--only", nargs="+", type=int, default=[], help="numbers of mutants; nothing is recorded")
     parser.add_argument("--check", action="store_true", help="run the tests that killed on the package as it is")
     parser.add_argument("--survivors", action="store_true")
     given = parser.parse_args()
@@ -386,7 +403,7 @@ def main() -> None:
             __import__(library)  # once, before children are forked
         if given.later:
             shutil.copytree(given.checkout.resolve() / "tests", folder / "tests", dirs_exist_ok=True)
-        run(folder, mutants, given.minutes, given.budget, given.later)
+        run(folder, mutants, given.minutes, given.budget, given.later, given.only)
     print(summary(folder, mutants))
 
 
