@@ -219,6 +219,48 @@ def test_a_sum_of_cosines_at_even_times_is_the_plain_sum_without_its_exponential
     assert observables.harmonic_sum(amplitudes, omegas, times) == pytest.approx(plain, abs=1e-12)
 
 
+def test_lines_that_stand_twice_are_named_with_how_far_they_are_apart():
+    from rotor.fitting.assignment import assignments
+    from rotor.fitting.fit import _of_twice
+
+    lines = assignments(("j",), [[1], [2], [1], [2]], [[0], [1], [0], [1]], [100.0, 200.0, 100.25, 200.5], 0.1)
+    assert "the largest difference is 0.5 MHz, of 2 - 1" in _of_twice(lines, [(0, 2), (1, 3)])
+
+
+def test_bodies_that_rotate_freely_are_written_in_a_line():
+    from rotor.classical.free.free_motion import free_motion
+
+    moments = [1.0, 2.0, 3.0]
+    assert repr(free_motion([moments] * 2, [[0.1, 0.2, 2.0]] * 2)) == "FreeMotion(2 bodies)"
+    assert repr(free_motion(moments, [0.0, 0.0, 2.0])).startswith("FreeMotion(moments 1, 2, 3; momentum 0, 0, 2; ")
+
+
+def test_what_is_removed_after_killed_processes_is_ours_alone(folder):
+    """A folder and the lock of a file; no link, which may lead anywhere, and no other file of that name."""
+    from rotor.temporary import _is_ours
+
+    Path("folder").mkdir()
+    Path("link").symlink_to("folder", target_is_directory=True)
+    for name in (".rotor-lock-a.csv", "notes"):
+        Path(name).touch()
+    judged = {name: _is_ours(Path(name)) for name in ("folder", "link", "notes", ".rotor-lock-a.csv")}
+    assert judged == {"folder": True, "link": False, "notes": False, ".rotor-lock-a.csv": True}
+
+
+@pytest.mark.parametrize(("pbc", "is_box"), [("T T T", True), ("T T F", True), ("F F F", False)])
+def test_a_box_repeats_along_one_direction_or_more(folder, pbc, is_box):
+    """A slab is a box; what the engines cannot take of it they refuse."""
+    from rotor.formats.boxes import read_box
+
+    lattice = 'Lattice="9 0 0 0 9 0 0 0 9" Properties=species:S:1:pos:R:3'
+    Path("box.extxyz").write_text(f'1\n{lattice} pbc="{pbc}"\nAr 0 0 0\n')
+    if is_box:
+        assert read_box("box.extxyz").pbc.tolist() == [letter == "T" for letter in pbc.split()]
+    else:
+        with pytest.raises(ValueError, match="has no cell that repeats"):
+            read_box("box.extxyz")
+
+
 # Equilibration of a box
 
 
