@@ -22,7 +22,7 @@ from rotor.fitting.parameters import Parameters
 from rotor.fitting.search import FitOptions as FitOptions
 from rotor.fitting.search import Search, errors_of, round_off, too_few
 from rotor.fitting.strategies import with_rejection
-from rotor.fitting.top_constants import ConstantSet
+from rotor.fitting.top_constants import DIPOLES, ConstantSet
 from rotor.fitting.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.requests.budget import ROUNDING
@@ -144,9 +144,10 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
 
 
 def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
-    """The same without the constants that follow from a free parameter that is not determined; None where no other is there."""
+    """The same without the dipole and constants that follow from a free parameter that is not determined; None where no other is there."""
     open_ = ~np.isfinite(statistics.errors)
-    rows = np.flatnonzero(parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
+    frequencies = np.array([name not in DIPOLES for name in parameters.constant_names])
+    rows = np.flatnonzero(frequencies & parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
     if not len(rows):
         return None
     own = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
@@ -387,8 +388,8 @@ def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
 
 
 def _unlikely(lines: Assignments) -> list[str]:
-    """Lines of one state without spins that no dipole makes: J changes by more than 1, or Ka and Kc both by even numbers."""
-    if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] == "f":
+    """Lines of one state without spins and fields that no dipole makes: J changes by more than 1, or Ka and Kc both by even numbers."""
+    if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] in ("f", "field"):
         return []
     there = ~lines.from_zero
     change = np.abs(lines.upper - lines.lower)

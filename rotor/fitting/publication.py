@@ -11,6 +11,7 @@ from decimal import Decimal
 import numpy as np
 
 from rotor.fitting.fit import Fit
+from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
 
 FORMS = ("text", "markdown", "latex")
@@ -168,7 +169,8 @@ def _tied(fit: Fit) -> dict[str, str]:
 
 
 def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -> list[str]:
-    unit, size = unit_of(row.value, row.error if row.error and math.isfinite(row.error) else None)
+    error = row.error if row.error and math.isfinite(row.error) else None
+    unit, size = ("D", 1.0) if row.name in DIPOLES else unit_of(row.value, error)
     known = row.error is not None and math.isfinite(row.error)
     text = (
         value_text(row.value / size, row.error * factor / size, digits)

@@ -12,6 +12,7 @@ from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.fit import Fit
 from rotor.fitting.publication import value_text
+from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
 
 FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
@@ -43,10 +44,10 @@ def report_text(
     """
     parts = [
         [title or "fit of rotational constants", status_text(fit), *_hamiltonian(fit), *head, ""],
-        ["PARAMETERS AT THE START (MHz), A-PRIORI ERRORS", *_start(fit), ""],
+        [f"PARAMETERS AT THE START ({parameter_units(fit)}), A-PRIORI ERRORS", *_start(fit), ""],
         ["LINES", *_lines(fit), ""],
         [
-            "PARAMETERS (MHz): value(error), error from stated line errors, error from the scatter, change",
+            f"PARAMETERS ({parameter_units(fit)}): value(error), error from stated line errors, error from the scatter, change",
             *_end(fit),
             "",
         ],
@@ -208,6 +209,11 @@ def influence(fit: Fit) -> list[str]:
         most = np.argsort(-np.abs(moved[i]), kind="stable")[:_MOVED].tolist()
         out.append(f"{text}; " + ", ".join(f"{fit.parameters.names[k]} {moved[i, k]:+.2f}" for k in most))
     return out
+
+
+def parameter_units(fit: Fit) -> str:
+    """MHz, and D of components of the dipole."""
+    return "MHz; mu in D" if set(fit.parameters.names) & set(DIPOLES) else "MHz"
 
 
 def _hamiltonian(fit: Fit) -> list[str]:

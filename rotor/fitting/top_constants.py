@@ -5,13 +5,15 @@
     G_c[0,1], W[0,1]       between states 0 and 1, see `rotor.quantum.effects.interactions`
     chi_aa(14N)            of spins, in every state; chi_aa(14N)[1] what state 1 has more of it
 
+    mu_a, mu_b, mu_c       the dipole in debye, of lines in an electric field
+
 They are the names of the parameters of `rotor.quantum.effects.of_top.effects_of`, in the same order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -28,11 +30,15 @@ from rotor.tops.states.state_constants import StateConstants, states_of_name
 from rotor.tops.top import Top
 from rotor.tops.uncertain_numbers import write_number
 
+DIPOLES = ("mu_a", "mu_b", "mu_c")
+FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
+
 
 @dataclass(frozen=True, eq=False)
 class TopConstants:
-    """The constants of a top by name; those of spins where `hyperfine` says so.
+    """The constants of a top by name; those of spins where `hyperfine` says so, and of levels in a field the dipole (D).
 
+    dipole : the components that levels in a field depend on, such as ("mu_a",). dipole_errors : one standard deviation of these, D.
     values, uncertainties : in MHz, by names as above. Raises ValueError, as the effects do, for names that are none.
 
     >>> from rotor.tops.spins.spin_constants import SpinConstants
@@ -46,6 +52,8 @@ class TopConstants:
 
     top: Top
     hyperfine: bool = False
+    dipole: tuple[str, ...] = ()
+    dipole_errors: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.effects  # noqa: B018  every name is checked when the set is made
@@ -73,15 +81,25 @@ class TopConstants:
     @cached_property
     def values(self) -> Mapping[str, float]:
         """Every constant in MHz."""
-        return MappingProxyType(
-            {self.own_name(name): value for part in self._parts for name, value in part.values.items()}
-        )
+        named = {self.own_name(name): value for part in self._parts for name, value in part.values.items()}
+        return MappingProxyType(named | self._dipole)
+
+    @property
+    def _dipole(self) -> dict[str, float]:
+        """Components of the dipole in D, where levels are in a field."""
+        values = self.top.dipole_abc_debye or (0.0, 0.0, 0.0)
+        return {name: values[DIPOLES.index(name)] for name in self.dipole}
+
+    @property
+    def in_field(self) -> bool:
+        """Whether the levels are those in an electric field."""
+        return bool(self.dipole)
 
     @cached_property
     def uncertainties(self) -> Mapping[str, float]:
         """One standard deviation in MHz of the constants that have one."""
         found = {self.own_name(name): error for part in self._parts for name, error in part.uncertainties.items()}
-        return MappingProxyType(found)
+        return MappingProxyType(found | dict(self.dipole_errors))
 
     @property
     def _parts(self) -> list[Constants | StateConstants | SpinConstants | InternalRotationConstants]:
@@ -100,7 +118,8 @@ class TopConstants:
         rotation = [name for name in ("n", "j", "k", "ka", "kc") if name in names]
         if rotation[0] == "n" and "j" in rotation:  # the sum with the spin of an electron
             rotation.remove("j")
-        return (*rotation, *(["v"] if "v" in names else []), *(n for n in names if n != "v" and n not in rotation))
+        further = (*(["v"] if "v" in names else []), *(n for n in names if n != "v" and n not in rotation))
+        return (*rotation, *further, *(("m", "field") if self.in_field else ()))
 
     @property
     def halves(self) -> frozenset[str]:
@@ -121,6 +140,8 @@ class TopConstants:
         """
         if "(" in name:
             return parse_name(name).text
+        if self.in_field and name in DIPOLES:
+            return name
         if self.top.internal_rotation is not None and is_torsional(name):
             return name
         if "[" not in name:
@@ -148,6 +169,11 @@ class TopConstants:
     def _of(self, values: Mapping[str, float], errors: Mapping[str, float]) -> TopConstants:
         """A set with these values and uncertainties, and all else of this one."""
         top = self.top
+        dipole_errors = {name: error for name, error in errors.items() if name in DIPOLES}
+        dipole = tuple(name for name in DIPOLES if name in values)
+        if self.in_field:
+            top = top.with_dipole([values.get(name, 0.0) for name in DIPOLES], top.dipole_source)
+            values, errors = ({name: t[name] for name in t if name not in DIPOLES} for t in (values, errors))
         internal = top.internal_rotation
         if internal is not None:
             moved = [{name: table[name] for name in table if is_torsional(name)} for table in (values, errors)]
@@ -169,7 +195,7 @@ class TopConstants:
             covariance=None,
             level_table=None,
         )
-        return TopConstants(made, self.hyperfine)
+        return TopConstants(made, self.hyperfine, dipole, dipole_errors)
 
     def _refuse_unknown(self, name: str) -> None:
         """ValueError for a state or a spin that the set has not."""
@@ -190,8 +216,10 @@ class TopConstants:
     def text(self, unit: str = "MHz") -> str:
         """The constants in one line, uncertainty in brackets."""
         spreads = self.uncertainties
-        items = (f"{name}={write_number(value, spreads.get(name), unit)}" for name, value in self.values.items())
-        return f"{' '.join(items)} {unit}"
+        frequencies = {name: value for name, value in self.values.items() if name not in DIPOLES}
+        items = (f"{name}={write_number(value, spreads.get(name), unit)}" for name, value in frequencies.items())
+        dipole = "".join(f" {name}={value:.10g} D" for name, value in self._dipole.items())
+        return f"{' '.join(items)} {unit}{dipole}"
 
 
 ConstantSet = Constants | TopConstants

@@ -60,8 +60,12 @@ def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
         raise ValueError(f"{labels.shape[1]} quantum numbers for each state; these constants have {', '.join(form)}")
     begin = constants.replace(**{name: AT_ZERO_MHZ for name, value in constants.values.items() if value == 0})
     columns = {name: labels[:, i] for i, name in enumerate(form)}
-    unsigned = [i for i, name in enumerate(form) if name != "k"]
+    unsigned = [i for i, name in enumerate(form) if name not in ("k", "m", "field")]
     _refuse(constants, labels, np.asarray((labels[:, unsigned] < 0).any(axis=1)))
+    if constants.in_field:
+        from rotor.fitting.stark_levels import stark_levels  # with all that fields need
+
+        return stark_levels(begin, labels)
     if constants.top.internal_rotation is not None:
         from rotor.fitting.torsion_levels import torsion_levels
 

@@ -6,7 +6,8 @@ the value, 5), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
 needed, `weight`, `blend` (one text or number for the lines of one measured frequency; without this column lines of one frequency and
 error behind each other are a blend, as in a .lin), `excluded` (yes for a line that does not count), `width_mhz` (how far the
-components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Of a catalogue the lines measured in a
+components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Lines in an electric field have `m_upper`,
+`m_lower` and `field_kv_per_cm` (or `field_v_per_cm`). Of a catalogue the lines measured in a
 laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of spins, where the
 file has them, are put together at their mean by intensity.
 """
@@ -27,6 +28,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
+from rotor.fitting.top_constants import FIELD_STEP_KV_PER_CM
 from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK
@@ -40,6 +42,7 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
+from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
@@ -56,6 +59,7 @@ _YES, _NO = ("yes", "true", "1"), ("no", "false", "0", "")
 _WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
+_FIELD = {"field_kv_per_cm": 1.0, "field_v_per_cm": 1e-3}
 _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
 
 
@@ -117,6 +121,11 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
     return len(lines) > 0 and len(lines.measured(0).quanta) // 2 > count
 
 
+def names_field(path: str | os.PathLike[str]) -> bool:
+    """Whether the lines of a .csv file have a column of the field."""
+    return os.fspath(path).lower().endswith(".csv") and bool(set(_FIELD) & set(_table_of(path)[0]))
+
+
 def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     read = read_lin(path, len(names))
     lines = with_defaults(read if {"v", "f"} & set(names) else without_v(read, len(names)), names)
@@ -147,6 +156,9 @@ def _of_csv(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
 ) -> tuple[Assignments, list[str]]:
     columns, rows = _table_of(path)
+    if "field" in names:
+        rows = [_with_field(path, columns, i, row) for i, row in enumerate(rows, 1)]
+        columns = [name for name in columns if name not in _FIELD] + ["field_upper", "field_lower"]
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment", "excluded"}
     _refuse_columns(path, columns, labels, known)
@@ -179,6 +191,24 @@ def _of_csv(
     if "excluded" in columns:
         made = replace(made, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
     return made, [] if named else _note_of_blends(made)
+
+
+def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, str]) -> dict[str, str]:
+    """A row with the field of both states as a whole number of steps."""
+    found = [name for name in _FIELD if name in columns]
+    if len(found) != 1:
+        raise ValueError(f"{path}: one column of {', '.join(_FIELD)} is needed, the field of each line")
+    value = _real(path, line, found[0], row) * _FIELD[found[0]]
+    if abs(value) > HIGHEST_KV_PER_CM:
+        raise ValueError(
+            f"{path}, line {line} of the table: {found[0]} = {row[found[0]]}: expected at most {HIGHEST_KV_PER_CM:g} kV/cm"
+        )
+    steps = str(round(value / FIELD_STEP_KV_PER_CM))
+    return {
+        **{name: text for name, text in row.items() if name not in _FIELD},
+        "field_upper": steps,
+        "field_lower": steps,
+    }
 
 
 def _equal_lines(frequency: Floats, error: Floats) -> list[int]:
@@ -414,11 +444,14 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         return write_lin(as_lin(lines), path)
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
-    labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
+    names = [name for name in lines.names if name != "field"]
+    labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     wave = bool(lines.wavenumber.all()) and len(lines) > 0
     unit = MHZ_PER_CM if wave else 1.0
+    in_field = "field" in lines.names
     heads = [
         *labels,
+        *(["field_kv_per_cm"] if in_field else []),
         "wavenumber_cm" if wave else "frequency_mhz",
         "error_cm" if wave else "error_mhz",
         "weight",
@@ -434,6 +467,9 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
             numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
             sides = zip((*lines.upper[i].tolist(), *lines.lower[i].tolist()), halves * 2, strict=True)
             quanta = [value_text(value, half) for value, half in sides]
+            if in_field:  # the last of both states is the field
+                del quanta[len(names)]
+                quanta[-1] = repr(float(lines.lower[i, -1]) * FIELD_STEP_KV_PER_CM)
             row = [*quanta, *map(float, numbers), int(lines.blend[i])]
             if lines.widths_mhz:
                 row.append(lines.widths_mhz.get(int(lines.blend[i]), ""))

@@ -22,8 +22,8 @@ from rotor.fitting.fit import Fit, FitOptions, covariance_of_determined, fit_lin
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.publication import publication_table
 from rotor.fitting.report import fit_facts, report_text
-from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.formats.assigned_lines import QUANTA, names_sums, read_assigned_lines
+from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
+from rotor.formats.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
 from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
@@ -232,7 +232,7 @@ def fit_of_lines(
     )
     if moved:
         made = parameters(begin, names, ties=ties, priors_mhz=priors)
-        said = ", ".join(f"{name} at {value:.3g} MHz" for name, value in moved.items())
+        said = ", ".join(f"{name} at {value:.3g} {'D' if name in DIPOLES else 'MHz'}" for name, value in moved.items())
         notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
     title = " ".join(top.name.split()) or Path(name).name
     files = FitFiles(name, start=start)
@@ -255,8 +255,28 @@ def constants_for(lines: Any, top: Top, free: Sequence[str]) -> ConstantSet:
             "lines or free constants of spins, and the constants to start from have none; give them there, such as "
             "[spins.14N] with chi_aa = -4.2" + ("" if top.states else "; a number v of the state needs [states] there")
         )
-    further = top.states is not None or top.internal_rotation is not None
-    return TopConstants(top, hyperfine) if hyperfine or further else top.constants
+    in_field = names_field(lines) if isinstance(lines, str) else "field" in getattr(lines, "names", ())
+    if not in_field and set(free) & set(DIPOLES):
+        raise ValueError("free: a dipole is fitted to lines in a field; the lines have no column field_kv_per_cm")
+    dipole = _dipole_for(top, free) if in_field else ()
+    further = in_field or top.states is not None or top.internal_rotation is not None
+    return TopConstants(top, hyperfine, dipole) if hyperfine or further else top.constants
+
+
+def _dipole_for(top: Top, free: Sequence[str]) -> tuple[str, ...]:
+    """The components of the dipole that act on lines in a field: those that are not 0, and those that are free."""
+    possible = {"linear": "a", "prolate": "a", "oblate": "c", "asymmetric": "abc", "spherical": ""}[top.kind]
+    values = dict(zip(DIPOLES, top.dipole_abc_debye or (0.0, 0.0, 0.0), strict=True))
+    names = tuple(name for name in DIPOLES if values[name] or name in free)
+    if wrong := [name for name in names if name[-1] not in possible]:
+        raise ValueError(
+            f"{', '.join(wrong)}: lines in a field of a {top.kind} top are fitted with {', '.join(f'mu_{a}' for a in possible) or 'none'}"
+        )
+    if not names:
+        raise ValueError(
+            "lines in a field: the dipole is not known; give it in the file to start from, or free it: mu_a"
+        )
+    return names
 
 
 def with_more_lines(request: FitRequest, path: str) -> FitRequest:
@@ -320,6 +340,8 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
         internal = replace(top.internal_rotation, source=origin) if top.internal_rotation is not None else None
         sources |= {"states": origin} if states is not None else {}
         sources |= {"internal_rotation": origin} if internal is not None else {}
+        sources |= {"dipole": origin} if named.dipole_errors else {}
+        file = replace(file, dipole_abc_debye=top.dipole_abc_debye) if named.in_field else file
         named = top.constants
     made = replace(
         file,

@@ -124,6 +124,8 @@ def label_value(name: str, value: int, half: bool = False) -> str:
     >>> label_value("species", 1), label_value("f", 3, half=True)
     ('E', '3/2')
     """
+    if name == "field":  # in steps of 1e-12 kV/cm, see `rotor.fitting.top_constants`
+        return f"{value * 1e-12:g} kV/cm"
     letters = {number: letter for letter, number in SPECIES_NUMBERS.items()}
     return letters.get(value, str(value)) if name == "species" else value_text(value, half)
 

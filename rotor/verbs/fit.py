@@ -265,9 +265,15 @@ def show(answer: FitAnswer, report: Report) -> None:
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     from rotor.fitting.publication import value_text
-    from rotor.fitting.report import scatter_text
+    from rotor.fitting.report import parameter_units, scatter_text
 
-    columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
+    columns = [
+        "parameter",
+        f"value ({parameter_units(fit)})",
+        "error",
+        "from scatter",
+        *(["bootstrap"] if spread else []),
+    ]
     rows = []
     for i, name in enumerate(fit.parameters.names):
         error = float(fit.errors[i])

@@ -294,6 +294,15 @@ def acting(
     return Contraction(own, direction, states if len(states) > 1 else {}), light
 
 
+def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> Contraction:
+    """∂(dipole along Z)/∂μ of one component of the top's dipole, which all states have that have none of their own."""
+    own = (0.0, 0.0, 0.0)
+    with_unit = dipoles_by_state(top, tuple(np.eye(3)[axis].tolist()), effects)
+    none = dipoles_by_state(top, own, effects)
+    states = {pair: tuple(np.subtract(one, none[pair]).tolist()) for pair, one in with_unit.items()}
+    return Contraction(np.eye(3)[axis], Z, states if len(states) > 1 else {})
+
+
 def figure_axis(top: Top) -> int:
     """The axis whose angle with Z is θ: that of a linear or symmetric top, else the one nearest to the dipole."""
     if top.kind != "asymmetric":

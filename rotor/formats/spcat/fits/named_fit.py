@@ -34,6 +34,8 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     Raises ValueError where a fitted combination of constants, or an a-priori error, has no parameter of its own there.
     """
     highest = max(int(fit.lines.upper[:, 0].max()), int(fit.lines.lower[:, 0].max()), _KNMAX)
+    if isinstance(fit.named, TopConstants) and fit.named.in_field:
+        raise ValueError("lines in an electric field: SPFIT's files have none")
     if isinstance(fit.named, TopConstants):
         file, codes = named_parameters(fit.named, title, min(highest, 359))
         matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)

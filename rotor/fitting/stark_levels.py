@@ -1,0 +1,185 @@
+"""Chosen levels in a static electric field, and their derivatives by the constants and by the dipole: what a fit of Stark shifts asks for.
+
+A label is that of the free level, M, and the field; the states of one exact block are named in order of energy (adiabatic labels), as
+those of `rotor stark` are. With a state |ψ⟩ = Σ v_n |n⟩ of solved free states n (Hellmann and Feynman)
+
+    ∂E/∂μ_k = -E ⟨ψ|Φ_Zk|ψ⟩,        ∂E/∂c = ⟨ψ|∂H/∂c|ψ⟩ = Σ_b ⟨V_b v_b|O_c,b|V_b v_b⟩,
+
+V_b the eigenvectors of a block b of the free molecule, O_c,b its linear blocks, that of levels without a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fitting.top_constants import DIPOLES, FIELD_STEP_KV_PER_CM, TopConstants
+from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.stark import dipole_derivative, map_request
+from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.fields.block_states import BlockStates, basis_order, solve_block
+from rotor.quantum.fields.blocks import FieldBlock, FreeLevels
+from rotor.quantum.fields.field_map import smallest_jmax
+from rotor.quantum.fields.map_request import MapRequest
+from rotor.quantum.fields.solved_space import SolvedFieldBlock
+from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
+from rotor.quantum.linear_stacks import LinearBlock
+from rotor.quantum.quanta import label_value
+from rotor.quantum.solve import solve_levels
+from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
+
+TOLERANCE_MHZ = 1e-6  # of the energies, by J max
+
+
+class Labelled(NamedTuple):
+    """Labels whose states are in one block: their places among all, the ranks of the states, and the fields (kV/cm)."""
+
+    block: FieldBlock
+    places: Ints
+    ranks: Ints
+    fields: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class StarkLevels(LevelModel):
+    """Levels in fields by label, for any values of the constants and of the dipole."""
+
+    names: tuple[str, ...]
+    start: TopConstants
+    labels: Ints
+    _jmax: dict[str, int] = field(default_factory=dict)
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`; the dipole in D, derivatives by it in MHz/D. Raises MissingLevelsError for labels that no level has."""
+        values = [value or AT_ZERO_MHZ for value in np.asarray(values_mhz).tolist()]
+        constants = self.start.replace(**dict(zip(self.names, values, strict=True)))
+        request = self._request(constants)
+        energies, slopes = np.empty(len(self.labels)), np.zeros((len(self.labels), len(self.names)))
+        while True:
+            jmax = self._jmax["jmax"]
+            error = 0.0
+            for group in self._groups(request, jmax):
+                fields, number = np.unique(group.fields, return_inverse=True)
+                states = solve_block(request, group.block, request.problem(group.block), fields, jmax)
+                error = max(error, float(states.error[number, group.ranks].max()))
+                energies[group.places] = states.energies[number, group.ranks]
+                slopes[group.places] = self._slopes(constants, group, states, number)
+            if error <= 10 * request.tolerance_mhz:
+                return energies, slopes
+            self._jmax["jmax"] = jmax + 1
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """1: states are named by the order of energies in their block."""
+        return np.ones(len(self.labels))
+
+    def refuse_missing(self) -> None:
+        """MissingLevelsError for labels that no level has."""
+        request = self._request(self.start)
+        self._jmax["jmax"] = smallest_jmax(request)
+        self._groups(request, self._jmax["jmax"])
+
+    def _request(self, constants: TopConstants) -> MapRequest:
+        fields = np.unique(self.labels[:, -1]) * FIELD_STEP_KV_PER_CM
+        effects: Sequence[QuantumEffect] = constants.effects if constants.hyperfine else ()
+        return map_request(
+            constants.top, fields, int(self.labels[:, 0].max()), None, 0.0, tolerance_mhz=TOLERANCE_MHZ, effects=effects
+        )
+
+    def _groups(self, request: MapRequest, jmax: int) -> list[Labelled]:
+        """The labels by block."""
+        space = request.space(jmax + request.margin)
+        rows, m = self._rows(space.levels)
+        groups, known = [], np.zeros(len(rows), dtype=bool)
+        for value in np.unique(np.abs(m)).tolist():
+            for block in space.blocks(value):
+                order = basis_order(block, jmax)
+                rank = np.full(len(space.levels), -1)
+                rank[block.rows[order]] = np.arange(len(order))
+                here = np.flatnonzero((rank[rows] >= 0) & (rows >= 0) & (m == block.m))
+                if len(here):
+                    known[here] = True
+                    fields = self.labels[here, -1] * FIELD_STEP_KV_PER_CM
+                    groups.append(Labelled(block, here, rank[rows[here]], fields))
+        if not known.all():
+            places = np.flatnonzero(~known)
+            label = zip(self.start.quanta, self.labels[places[0]].tolist(), strict=True)
+            text = ", ".join(f"{name} = {label_value(name, value)}" for name, value in label)
+            raise MissingLevelsError(f"there is no level with {text} in this model", places)
+        return groups
+
+    def _rows(self, levels: FreeLevels) -> tuple[Ints, Ints]:
+        """Rows of the labels among the free levels, -1 where there is none, and the M of their blocks."""
+        columns = dict(zip(self.start.quanta, self.labels.T.copy(), strict=True))
+        columns.pop("field")
+        m = columns.pop("m")
+        if "k" in columns:  # (K, M) is like (-K, -M)
+            if "k" not in levels.quanta:
+                raise ValueError(
+                    "lines in a field of a symmetric top whose dipole is not along its axis are not fitted"
+                )
+            turned = (m < 0) | ((m == 0) & (columns["k"] < 0))
+            columns["k"] = np.where(turned, -columns["k"], columns["k"])
+        m = np.abs(m)
+        known = {("n" if "n" in columns else "j"): levels.j, **levels.quanta}
+        keys = np.column_stack([known[name] for name in columns])
+        place = {key: row for row, key in enumerate(map(tuple, keys.tolist()))}
+        wanted = np.column_stack(list(columns.values())).tolist()
+        return np.array([place.get(tuple(key), -1) for key in wanted]), m
+
+    def _slopes(self, constants: TopConstants, group: Labelled, states: BlockStates, number: Ints) -> Floats:
+        """∂E/∂c (labels, names)."""
+        block, top = group.block, constants.top
+        vectors = np.zeros((len(group.ranks), len(block)), dtype=states.vectors.dtype)
+        vectors[:, states.places] = states.vectors[number, :, group.ranks]
+        slopes = np.zeros((len(vectors), len(self.names)))
+        own = [i for i, name in enumerate(self.names) if name not in DIPOLES]
+        for i, name in enumerate(self.names):
+            if name in DIPOLES:
+                cosine = block.dense(dipole_derivative(top, DIPOLES.index(name), constants.effects))
+                mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
+                slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
+        slopes[:, own] = self._of_constants(constants, block, vectors, [self.names[i] for i in own])
+        return slopes
+
+    def _of_constants(
+        self, constants: TopConstants, block: FieldBlock, vectors: Floats, names: Sequence[str]
+    ) -> Floats:
+        top = constants.top
+        if not isinstance(block, SolvedFieldBlock):  # closed forms: free states have no constants in common
+            levels = solve_levels(top, int(block.j.max()), effects=constants.effects)
+            quanta = {"k": np.abs(block.levels.quanta["k"][block.rows])} if "k" in levels.quanta else {}
+            rows = levels.rows_of(j=block.j, **quanta)
+            return np.asarray(vectors**2 @ level_derivatives(top, levels, names, rows))
+        elements, total = block.space.elements, np.zeros((len(vectors), len(names)))
+        blocks = [elements.blocks[block.space.sectors[i].block] for i in block.members]
+        linear = linear_blocks_of(top, elements.levels, names, blocks)
+        for i, (solved, one) in enumerate(zip(blocks, linear, strict=True)):
+            own = vectors[:, block.starts[i] : block.starts[i + 1]]
+            total[:, one.parameters] += _expectation(one, own @ solved.vectors.T)
+        return total
+
+
+def _expectation(block: LinearBlock, states: Floats) -> Floats:
+    """Σ O_i(r, c) v_r* v_c (states, parameters) of columns over the functions of a block, (states, functions)."""
+    density = (states[:, block.rows].conj() * states[:, block.columns]).real
+    density = np.where(block.rows != block.columns, 2.0, 1.0) * density
+    return np.asarray(density @ block.factors @ block.mix)
+
+
+def stark_levels(constants: TopConstants, labels: Ints) -> StarkLevels:
+    """The model for labels (levels, k) by `constants.quanta`.
+
+    Raises MissingLevelsError for labels that no level has, and ValueError for spins and internal rotation, of which lines in a field are
+    not fitted.
+    """
+    if constants.top.internal_rotation is not None or constants.hyperfine:
+        what = "internal rotation" if constants.top.internal_rotation is not None else "spins"
+        raise ValueError(f"lines in a field with {what} are not fitted; take those of the rotation alone")
+    model = StarkLevels(tuple(constants.values), constants, np.asarray(labels, dtype=np.int64))
+    model.refuse_missing()
+    return model
