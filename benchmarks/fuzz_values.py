@@ -9,14 +9,16 @@ SPFIT in tests/oracles. Case k changes numbers inside their ranges (factors near
 molecules, adds an option or a key that another seed of the verb has; one case in twelve is one of fuzz.py (hostile text). Counted as
 defects: a traceback, "this is a defect", an exit code other than 0, 1, 2, a process that dies, files left by a refused command, nan or
 inf in the results of exit code 0, JSON that does not parse, more than 20 s of processor time. A line of JSON per piece of 1000 cases
-goes to the state file, from which a stopped run resumes; its first line has the exit code and the seconds of every seed, by which seeds
-are drawn.
+(50 whole commands) goes to the state file, from which a stopped run resumes; its first line has the exit code and the seconds of every
+seed, by which seeds are drawn.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import fcntl
+import gc
 import json
 import math
 import os
@@ -41,16 +43,18 @@ import fuzz
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "fuzz_values.jsonl"
 PIECE = 1000
-SEED_S = 3.0  # bound on a seed as it stands: longer ones are left out
+WHOLE_PIECE = 50  # whole commands take longer: less is lost where a run is stopped
+SEED_S = 1.0  # bound on a seed as it stands: longer ones are left out
 NUMBER = re.compile(r"(?<![\w.(])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 # a number that is none: not as a part of a word, of a path or of an option
 NOT_FINITE = re.compile(r"(?<![\w./\-])[-+]?(?:nan|NaN|inf|Infinity)(?![\w.(])")
 SHOWS = frozenset(
-    {"molecules", "new", "convert", "cat", "catalogue", "plan", "hostile", ""}
+    {"molecules", "new", "convert", "cat", "catalogue", "plan", "hostile", "", "--version", "--help"}
 )  # compute nothing, or are not counted
 MOLECULES = (
     "water", "CO", "NH3", "CH4", "OCS", "CH3Cl", "HCN", "N2", "CO2", "H2", "CH3CN", "HC3N", "SO2", "H2CO", "O2", "CH3OH", "HCONH2",
 )  # fmt: skip
+PICTURES = frozenset({"--plot", "--gif", "--lobes"})  # seldom added: a film takes as long as 400 other cases
 SIZES = re.compile(r"jmax|j_max|kmax|molecules|steps|points|every|times|--j$|^j$|classical|iterations|seed|workers")
 
 
@@ -93,7 +97,7 @@ def _examples() -> list[str]:
 def _file_seeds() -> list[Seed]:
     """Verbs on files of SPCAT and SPFIT, with the files beside each."""
     verbs = {".int": ("spectrum {} --csv x.csv", "levels {}", "spectrum {} --full-basis --cat x.cat", "info {}"),
-             ".par": ("fit {} --iterations 2 --out o", "convert {} x.toml"), ".cat": ("cat {} --range 0:300GHz --csv x.csv",),
+             ".par": ("fit {} --iterations 2 --out o", "convert {} x.toml"), ".cat": ("cat {} --range 0:300GHz --out x.cat",),
              ".var": ("convert {} x.toml", "info {}")}  # fmt: skip
     seeds = []
     for path in sorted((ROOT / "tests" / "oracles").rglob("*.*")):
@@ -212,6 +216,8 @@ def changed_words(seed: Seed, rng: random.Random, seeds: list[Seed]) -> list[str
         same = [one.words for one in seeds if one.words[:1] == seed.words[:1] and one.kind == "command"]
         donor = rng.choice(same)
         options = [at for at, word in enumerate(donor) if word.startswith("--") and word not in words]
+        if options and rng.random() < 0.95:
+            options = [at for at in options if donor[at] not in PICTURES]
         if options:
             at = rng.choice(options)
             value = [
@@ -330,25 +336,40 @@ def answers(numbers: range, weighted: Weighted, hostile: dict[str, bytes], whole
 
 
 def seed_outcomes(seeds: list[Seed]) -> Iterator[Answer]:
-    """Exit code and seconds of every seed as it stands, run twice: the first time loads modules."""
+    """Exit code and seconds of every seed as it stands; where it is slow, the second time: the first one compiles and loads modules."""
+    known: dict[Seed, Answer] = {}
     for seed in seeds:
+        if seed in known:  # a scene is a seed twice
+            yield known[seed]
+            continue
         with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, contextlib.chdir(folder):
             for name, content in seed.files:
                 Path(name).write_bytes(content)
-            outcome = fuzz.run_words(list(seed.words), SEED_S)[0]
-            again = fuzz.run_words(list(seed.words), SEED_S)[0] if 0.1 < outcome.seconds < SEED_S else outcome
+            outcome = fuzz.run_words(list(seed.words), 5 * SEED_S)[0]
+            again = fuzz.run_words(list(seed.words), SEED_S)[0] if 0.1 < outcome.seconds < 5 * SEED_S else outcome
         print(f"{min(outcome.seconds, again.seconds):.2f}", outcome.code, *seed.words, file=sys.__stderr__, flush=True)
-        yield {"code": outcome.code, "seconds": min(outcome.seconds, again.seconds)}
+        known[seed] = {"code": outcome.code, "seconds": min(outcome.seconds, again.seconds)}
+        yield known[seed]
 
 
 def weights_of(seeds: list[Seed], outcomes: list[dict[str, float]]) -> list[float]:
-    """Valid seeds by their speed, fewer of those that compute nothing; few that are refused as they stand."""
-    weights = []
-    for seed, outcome in zip(seeds, outcomes, strict=True):
-        speed = (0.01 + outcome["seconds"]) ** -2 * (0.1 if seed.words[:1] and seed.words[0] in SHOWS else 1.0)
+    """Seeds of a verb by their speed, a third of the usual for those that are refused as they stand; verbs by speed and number of seeds."""
+    weights: list[float] = []
+    for outcome in outcomes:
         left_out = outcome["code"] is None or outcome["seconds"] > SEED_S / 2
-        weights.append(0.0 if left_out else speed if outcome["code"] == 0 else 60.0)
-    return weights
+        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2 / (1 if outcome["code"] == 0 else 3))
+    verbs = [(seed.kind, seed.words[0] if seed.words else "") for seed in seeds]
+    sums, costs = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+    for verb, weight, outcome in zip(verbs, weights, outcomes, strict=True):
+        sums[verb] += weight
+        costs[verb] += weight * (0.02 + outcome["seconds"])
+    counts = Counter(verbs)
+    shares = {
+        verb: counts[verb] ** 0.5 * total / costs[verb] * (0.05 if verb[1] in SHOWS else 1.0)
+        for verb, total in sums.items()
+        if total
+    }
+    return [weight * shares[verb] / sums[verb] if weight else 0.0 for verb, weight in zip(verbs, weights, strict=True)]
 
 
 def main() -> None:
@@ -357,6 +378,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--cases", type=int, default=98_000)
     parser.add_argument("--whole", action="store_true")
+    parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--state", type=Path, default=RESULTS)
     parser.add_argument("--case", type=int)
     parser.add_argument("--folder", type=Path)
@@ -366,6 +388,7 @@ def main() -> None:
     for library in ("numpy", "scipy.linalg", "scipy.optimize", "numba", "matplotlib.pyplot", "ase", "rdkit.Chem"):
         __import__(library)  # once, before children are forked
     load_package()
+    gc.freeze()  # what is loaded is not looked through again in every case
     lines = [json.loads(line) for line in given.state.read_text("utf-8").splitlines()] if given.state.exists() else []
     seeds = all_seeds()
     if not lines or lines[0].get("seeds") is None:
@@ -381,12 +404,26 @@ def main() -> None:
         given.folder.mkdir(parents=True, exist_ok=True)
         print(json.dumps(run_case(given.case, given.folder, weighted, hostile, given.whole), indent=1))
         return
-    for first in range(given.first, given.first + given.cases, PIECE):
-        if not any(line.get("first") == first and line["whole"] == given.whole for line in lines):
-            lines.append(run_piece(first, weighted, hostile, given.whole))
-            with given.state.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(lines[-1]) + "\n")
-    print(summary(lines))
+    size = WHOLE_PIECE if given.whole else PIECE
+    done = {line["first"] for line in lines[1:] if line["whole"] == given.whole}
+    missing = [first for first in range(given.first, given.first + given.cases, size) if first not in done]
+    children = []
+    for worker in range(given.workers):
+        if not (child := os.fork()):
+            for first in missing[worker :: given.workers]:
+                add_line(given.state, run_piece(range(first, first + size), weighted, hostile, given.whole))
+            os._exit(0)
+        children.append(child)
+    for child in children:
+        os.waitpid(child, 0)
+    print(summary([json.loads(line) for line in given.state.read_text("utf-8").splitlines()]))
+
+
+def add_line(path: Path, line: Answer) -> None:
+    """A line at the end of the state, by one worker at a time."""
+    with path.open("a", encoding="utf-8") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        file.write(json.dumps(line) + "\n")
 
 
 def load_package() -> None:
@@ -399,14 +436,14 @@ def load_package() -> None:
                 __import__(module.name)
 
 
-def run_piece(first: int, weighted: Weighted, hostile: dict[str, bytes], whole: bool) -> Answer:
+def run_piece(numbers: range, weighted: Weighted, hostile: dict[str, bytes], whole: bool) -> Answer:
     """The counts of a piece, its slowest case and its defects."""
     done: list[Answer] = []
     started = time.time()
-    while len(done) < PIECE:
-        rest = range(first + len(done), first + PIECE)
-        done += in_child(answers, rest, weighted, hostile, whole)
-        if len(done) < PIECE:  # the process ended inside a case
+    first = numbers.start
+    while len(done) < len(numbers):
+        done += in_child(answers, numbers[len(done) :], weighted, hostile, whole)
+        if len(done) < len(numbers):  # the process ended inside a case
             done.append({"case": first + len(done), "kind": "", "verb": "", "code": None, "seconds": fuzz.HANG_S, "computed": False,
                          "defects": ["died"], "said": "", "words": []})  # fmt: skip
     counts = Counter(f"{one['kind']} {one['verb']} {one['code']}" for one in done)

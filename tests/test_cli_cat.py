@@ -46,6 +46,19 @@ def test_options_that_the_files_answer_are_refused_and_silences_told(call, tmp_p
     assert call("spectrum", "so2.int")[0] == 2
 
 
+def test_the_other_way_is_named_only_where_it_works(call, tmp_path):
+    """A .var whose states have different spins has no named constants; then --temperature says only where it is set."""
+    (tmp_path / "a.int").write_text("a\n1 76004 1000.0 0 3 -19.0 -19.0 9000.0 300.0\n1 1.2\n")
+    head = "a\n 3 9 1 0 0.0 1.0e6 1.0 1.0\na 1 2 0 60 0 1 1 1 0 1 0\n{}10099 9400.0 1e36\n20099 3100.0 1e36\n30099 2500.0 1e36\n"
+    for second, other in (("", True), ("a 3 1 0 60 0 1 1 1 0 1 0\n", False)):
+        (tmp_path / "a.var").write_text(head.format(second).replace("a 1 2", "a 1 -2" if second else "a 1 2"))
+        code, _, err = call("spectrum", "a.int", "--temperature", "10 K")
+        assert code == 2
+        assert err.startswith("error: --temperature: a.int says that itself (TEMP); change it there")
+        assert ("or give a.var" in err) == other
+        assert (call("spectrum", "a.var", "--dipole-abc", "1,0,0", "--temperature", "10 K")[0] == 0) == other
+
+
 def test_constants_go_to_toml_and_back(call, tmp_path):
     for suffix in (".int", ".var"):
         shutil.copy(SAMPLES / "so2" / f"so2{suffix}", tmp_path / f"so2{suffix}")

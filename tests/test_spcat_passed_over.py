@@ -53,10 +53,34 @@ def test_a_fit_passes_over_it_too(tmp_path: Path):
     assert SAID in spfit_input(read_par(TWO), read_lin(tmp_path / "a.lin", 4, 9), "a.lin").notes
 
 
-def test_names_are_refused_with_the_reason(tmp_path: Path):
-    (tmp_path / "a.par").write_bytes(TWO)
-    with pytest.raises(ValueError, match=re.escape(SAID)):
-        rotor.read(tmp_path / "a.par")
+def test_names_leave_it_out_with_the_reason(tmp_path: Path):
+    """The top of named constants is the same with and without the parameter, for one state and for two."""
+    without = TWO.replace(b"1122 -1.5 1e36\n", b"").replace(b" 5 9", b" 4 9")
+    for name, content in {"two": TWO, "less": without}.items():
+        (tmp_path / f"{name}.par").write_bytes(content)
+    top, less = (rotor.read(tmp_path / f"{name}.par") for name in ("two", "less"))
+    assert SAID in top.notes
+    assert top.constants == less.constants
+    assert dict(top.states.values) == dict(less.states.values)
+
+
+@pytest.mark.parametrize("code", [b"110010000", b"1111"])
+@pytest.mark.parametrize("verb", ["info", "levels", "convert"])
+def test_verbs_pass_over_spins_and_states_that_one_state_does_not_have(verb, code, tmp_path, monkeypatch, capsys):
+    """A spin while SPIND is 1, and state 1 of one: a note in every verb, and numbers as without the parameter."""
+    monkeypatch.chdir(tmp_path)
+    head = b"one\n 4 9 1 0 0.0 1.0e6 1.0 1.0\na 1 1 0 60 0 1 1 1 0 1 0\n10000 9400.0 1e36\n20000 3100.0 1e36\n30000 2500.0 1e36\n"
+    Path("one.par").write_bytes(head + code + b" -71.0 1e36\n")
+    Path("less.par").write_bytes(head.replace(b" 4 9", b" 3 9"))
+    outs = {}
+    for name in ("one", "less"):
+        words = {"info": [], "levels": ["--j", "0:2"], "convert": [f"{name}.toml"]}[verb]
+        assert run([verb, f"{name}.par", *words]) == 0
+        said = capsys.readouterr()
+        assert (f"parameter {code.decode()} is left out, as SPCAT does" in said.err) == (name == "one")
+        written = Path(f"{name}.toml").read_text() if verb == "convert" else said.out
+        outs[name] = [line for line in written.splitlines() if "left out, as SPCAT does" not in line]
+    assert [line.replace("one.", "less.") for line in outs["one"]] == outs["less"]
 
 
 def test_levels_that_fit_no_column_leave_the_catalogue(tmp_path: Path, monkeypatch, capsys):

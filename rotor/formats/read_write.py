@@ -145,7 +145,7 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     become uncertainties.
     """
     from rotor.formats.spcat.hamiltonian.states import has_one_state, states_of
-    from rotor.formats.spcat.model import top_of
+    from rotor.formats.spcat.model import names_what_is_not_there, top_of
     from rotor.formats.spcat.names.named_top import named_top
     from rotor.formats.spcat.prediction_notes import notes_of_range
     from rotor.formats.spcat.text.int_file import read_int
@@ -162,7 +162,8 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
     if light is not None and light.request.flags >= FROM:
         file, light = files_in_mhz(file, light)
-    top = top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
+    plain = has_one_state(file) and not names_what_is_not_there(file)
+    top = top_of(file, light) if plain else named_top(file, light, errors=errors)
     return replace(top, notes=(*top.notes, *notes_of_range(states_of(file), parameters.name)), symmetry_checked=False)
 
 

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 LONGEST = 72  # characters of one source in the short line
 _CATALOGUE = re.compile(r"c\d{6} of (?:JPL|CDMS)(?: \([^()]*\d{4}[^()]*\))?")
 _DATED = re.compile(r"^.*?\((?:\d{4}|[^()]*\b\d{4}\b[^()]*)\)")  # as far as the first year in parentheses
+_OF_CONSTANTS = re.compile(r"[A-Z]\w{0,3}(?:, [A-Z]\w{0,3})*: ")  # which constants a source has is not the source
+_SPECIES = re.compile(r"(?:ground state[,;:]|[A-Z]\w* \d+\w+;) ")  # nor is the state or the isotopologue
 _TABLES = {"constants": "source", "dipole": "dipole_source", "polarizability": "polarizability_source",
            "spin weights": "weights_source"}  # fmt: skip
 
@@ -22,10 +24,13 @@ def short_source(text: str) -> str:
     >>> short_source("fitted here to the 7 lines with J <= 10 of c018003 of JPL (Pickett et al. 1998), weighted by errors")
     'fitted to c018003 of JPL (Pickett et al. 1998)'
     >>> short_source("unverified: ground state; NIST CCCBDB release 22 has B = 1.1766 cm-1")
-    'unverified: ground state'
+    'unverified: NIST CCCBDB release 22 has B = 1.1766 cm-1'
+    >>> short_source("B, DJ: W. J. Orville-Thomas, J. T. Cox and W. Gordy, Millimeter Wave Spectra, J. Chem. Phys. 22 (1954); A: NIST")
+    'B, DJ: W. J. Orville-Thomas, J. T. Cox and W. Gordy, Millimeter Wave Sp…'
     """
     marked = re.match(r"(?:[\w, ]+ )?unverified[:;] ?", text)
     mark, rest = (marked[0], text[marked.end() :]) if marked else ("", text)
+    rest = _SPECIES.sub("", rest, count=1) if _SPECIES.match(rest) else rest
     if scaled := re.match(r"scaled from [^(;]+", rest):
         return mark + scaled[0].rstrip()
     if found := _CATALOGUE.search(rest):
@@ -34,7 +39,8 @@ def short_source(text: str) -> str:
     dated = _DATED.match(rest)
     clause = dated[0] if dated else rest.partition(";")[0]
     if len(clause) > LONGEST:
-        clause = rest.partition(";")[0].partition(":")[0]
+        first = rest.partition(";")[0]
+        clause = first if _OF_CONSTANTS.match(first) else first.partition(":")[0]
     return mark + (clause if len(clause) <= LONGEST else clause[: LONGEST - 1].rstrip() + "…")
 
 

@@ -66,15 +66,25 @@ def predicted(source: str, given: Given, called: Callable[[str], str], note: Not
     """
     for identity, field in ANSWERED.items():
         if given.values.get(identity) is not None:
-            raise ValueError(
-                f"{called(identity)}: {source} says that itself ({field}); change it there, or give its .var instead"
-            )
+            raise ValueError(f"{called(identity)}: {source} says that itself ({field}); change it there{_or_its_var(source)}")
     from rotor.formats.spcat.predict import predict_file
 
     prediction = predict_file(source, **basis)
     for text in prediction.notes:
         note(text)
     return with_names(prediction, Path(source))
+
+
+def _or_its_var(source: str) -> str:
+    """The other way out, where the constants of the parameter file have names."""
+    from rotor.formats.read_write import read_spcat_top
+
+    path = Path(source).with_suffix(".var")
+    try:
+        read_spcat_top(path)
+    except (OSError, ValueError):
+        return ""
+    return f", or give {path} instead, which has no such settings"
 
 
 def with_names(prediction: Prediction, source: Path) -> Prediction:

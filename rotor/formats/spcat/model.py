@@ -12,6 +12,7 @@ from rotor.formats.spcat.hamiltonian.codes import (
     constants_of,
     is_linear,
     parameters_of,
+    split_code,
     state_digits,
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
@@ -173,6 +174,12 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
     return Top.from_constants(
         constants, dipole_abc_debye=dipole, spin_weights=weights, name=name, symmetry_checked=False
     )
+
+
+def names_what_is_not_there(parameters: ParameterFile) -> bool:
+    """Whether a parameter of a file with one state and no spin is of a spin or of another state, which the program passes over."""
+    digits = [split_code(parameter.code) for parameter in parameters.parameters]
+    return any(d.i1 or d.i2 or (d.v1 != d.v2 and 9 not in (d.v1, d.v2)) or (d.v1 == d.v2 and 0 < d.v1 < 9) for d in digits)
 
 
 def parameter_file(top: Top, kmax: int) -> ParameterFile:

@@ -56,7 +56,8 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     Returns
     -------
     Top
-        Constants of state 0, `states` and `spin_constants`. The Hamiltonian is that of the files with every K to N in the basis.
+        Constants of state 0, `states` and `spin_constants`; `notes` says which parameters are left out, as SPCAT
+        leaves them out. The Hamiltonian is that of the files with every K to N in the basis.
 
     Raises
     ------
@@ -67,14 +68,11 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     _refuse(file, states)
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     odd = phases_of(file, len(states), frozenset()).odd
-    left_out += real_ones(lines, odd, frozenset())[1] + with_their_spins(lines, states)[1]
-    left_out += reasons_of_states(file, len(states))
+    lines, imaginary = real_ones(lines, odd, frozenset())
+    lines, without_spins = with_their_spins(lines, states)
+    left_out += imaginary + without_spins + reasons_of_states(file, len(states))
     if odd and any(axis_of(line.typ) for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
-    if left_out:
-        raise ValueError(
-            f"{left_out[0]}; leave it out of the file, or predict from the files themselves, with rotor spectrum FILE.int"
-        )
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
     letter, own = _letter(file, rows), _own_parameters(rows, len(states))
@@ -90,7 +88,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
     couplings, dipoles = _couplings(rows, len(states), first, turned), _dipoles(intensities, len(states), turned)
     _refuse_phases(couplings, dipoles)
-    return Top.from_constants(
+    top = Top.from_constants(
         constants[0],
         name=file.title,
         dipole_abc_debye=dipoles.get((0, 0), (0.0, 0.0, 0.0)) if intensities else None,
@@ -99,6 +97,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         states=_states(constants, energies, couplings, weights, dipoles),
         spin_constants=_spins(rows, states, turned, first.nvib < 0, errors),
     )
+    return replace(top, notes=(*top.notes, *left_out))
 
 
 def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
