@@ -66,7 +66,9 @@ def predicted(source: str, given: Given, called: Callable[[str], str], note: Not
     """
     for identity, field in ANSWERED.items():
         if given.values.get(identity) is not None:
-            raise ValueError(f"{called(identity)}: {source} says that itself ({field}); change it there{_or_its_var(source)}")
+            raise ValueError(
+                f"{called(identity)}: {source} says that itself ({field}); change it there{_or_its_var(source)}"
+            )
     from rotor.formats.spcat.predict import predict_file
 
     prediction = predict_file(source, **basis)

@@ -179,7 +179,9 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
 def names_what_is_not_there(parameters: ParameterFile) -> bool:
     """Whether a parameter of a file with one state and no spin is of a spin or of another state, which the program passes over."""
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    return any(d.i1 or d.i2 or (d.v1 != d.v2 and 9 not in (d.v1, d.v2)) or (d.v1 == d.v2 and 0 < d.v1 < 9) for d in digits)
+    return any(
+        d.i1 or d.i2 or (d.v1 != d.v2 and 9 not in (d.v1, d.v2)) or (d.v1 == d.v2 and 0 < d.v1 < 9) for d in digits
+    )
 
 
 def parameter_file(top: Top, kmax: int) -> ParameterFile:
