@@ -8,7 +8,7 @@ Seeds are the commands and scenes of benchmarks/corpus_cases, examples/scenes, t
 SPFIT in tests/oracles. Case k changes numbers inside their ranges (factors near 1, now and then of a hundred, a sign or zero), swaps
 molecules, adds an option or a key that another seed of the verb has; one case in twelve is one of fuzz.py (hostile text). Counted as
 defects: a traceback, "this is a defect", an exit code other than 0, 1, 2, a process that dies, files left by a refused command, nan or
-inf in the results of exit code 0, JSON that does not parse, more than 20 s of processor time. A line of JSON per piece of 1000 cases
+inf in the results of exit code 0, JSON that does not parse, more than 20 s of processor time. A line of JSON per piece of 250 cases
 (50 whole commands) goes to the state file, from which a stopped run resumes; its first line has the exit code and the seconds of every
 seed, by which seeds are drawn.
 """
@@ -42,7 +42,7 @@ import fuzz
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "fuzz_values.jsonl"
-PIECE = 1000
+PIECE = 250
 WHOLE_PIECE = 50  # whole commands take longer: less is lost where a run is stopped
 SEED_S = 1.0  # bound on a seed as it stands: longer ones are left out
 NUMBER = re.compile(r"(?<![\w.(])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
@@ -357,15 +357,18 @@ def weights_of(seeds: list[Seed], outcomes: list[dict[str, float]]) -> list[floa
     weights: list[float] = []
     for outcome in outcomes:
         left_out = outcome["code"] is None or outcome["seconds"] > SEED_S / 2
-        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2 / (1 if outcome["code"] == 0 else 3))
+        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2.5 / (1 if outcome["code"] == 0 else 3))
     verbs = [(seed.kind, seed.words[0] if seed.words else "") for seed in seeds]
     sums, costs = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
     for verb, weight, outcome in zip(verbs, weights, outcomes, strict=True):
         sums[verb] += weight
         costs[verb] += weight * (0.02 + outcome["seconds"])
     counts = Counter(verbs)
+    valid = {
+        verb for verb, outcome in zip(verbs, outcomes, strict=True) if outcome["code"] == 0 and verb[1] not in SHOWS
+    }
     shares = {
-        verb: counts[verb] ** 0.5 * total / costs[verb] * (0.05 if verb[1] in SHOWS else 1.0)
+        verb: counts[verb] ** 0.5 * (total / costs[verb]) ** 1.5 * (1.0 if verb in valid else 0.05)
         for verb, total in sums.items()
         if total
     }
