@@ -353,11 +353,11 @@ def seed_outcomes(seeds: list[Seed]) -> Iterator[Answer]:
 
 
 def weights_of(seeds: list[Seed], outcomes: list[dict[str, float]]) -> list[float]:
-    """Seeds of a verb by their speed, a third of the usual for those that are refused as they stand; verbs by speed and number of seeds."""
+    """Seeds of a verb by their speed, a hundredth for those that are refused as they stand; verbs by speed and number of seeds."""
     weights: list[float] = []
     for outcome in outcomes:
         left_out = outcome["code"] is None or outcome["seconds"] > SEED_S / 2
-        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2.5 / (1 if outcome["code"] == 0 else 3))
+        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2.5 / (1 if outcome["code"] == 0 else 100))
     verbs = [(seed.kind, seed.words[0] if seed.words else "") for seed in seeds]
     sums, costs = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
     for verb, weight, outcome in zip(verbs, weights, outcomes, strict=True):
@@ -368,7 +368,7 @@ def weights_of(seeds: list[Seed], outcomes: list[dict[str, float]]) -> list[floa
         verb for verb, outcome in zip(verbs, outcomes, strict=True) if outcome["code"] == 0 and verb[1] not in SHOWS
     }
     shares = {
-        verb: counts[verb] ** 0.5 * (total / costs[verb]) ** 1.5 * (1.0 if verb in valid else 0.05)
+        verb: counts[verb] ** 0.5 * (total / costs[verb]) ** 2.5 * (1.0 if verb in valid else 0.05)
         for verb, total in sums.items()
         if total
     }

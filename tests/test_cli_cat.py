@@ -100,6 +100,20 @@ def test_a_catalogue_is_shown_and_filtered(call, tmp_path):
     assert content["lines"][0]["quanta_upper"] == [content["lines"][0]["quanta_lower"][0] + 1]
 
 
+def test_the_lines_that_are_left_go_to_tables(call, tmp_path):
+    """As CSV and Parquet, every number as in the file."""
+    source = str(SAMPLES / "ocs" / "sample.cat")
+    assert call("cat", source, "--range", "30:50GHz", "--csv", "a.csv", "--parquet", "a.parquet")[0] == 0
+    lines = read_cat(SAMPLES / "ocs" / "sample.cat")
+    inside = lines.frequency_mhz[(lines.frequency_mhz > 30e3) & (lines.frequency_mhz < 50e3)]
+    rows = (tmp_path / "a.csv").read_text().splitlines()
+    assert [float(row.split(",")[0]) for row in rows[1:]] == inside.tolist()
+    import duckdb
+
+    found = duckdb.sql(f"select frequency_mhz, error_mhz from '{tmp_path / 'a.parquet'}'").fetchall()
+    assert [row[0] for row in found] == inside.tolist()
+
+
 def test_a_comparison_counts_and_measures(call, tmp_path):
     whole = read_cat(OCS)
     write_cat(whole.take(slice(2, None)), tmp_path / "less.cat")

@@ -185,6 +185,21 @@ def test_wrong_input_is_one_line(call, folder, arguments, said):
     assert list(folder.iterdir()) == []
 
 
+def test_frequencies_of_a_geometry_are_noted(call):
+    """Methanol of the g2 set, 2 % off; not carbon monoxide, which was measured."""
+    noted = call("emission", "CH3OH", "--range", "90:100GHz", "--excitation", "50")[2]
+    assert "constants follow from a geometry good to 2 %, frequencies are off by so much" in noted
+    assert call("emission", "CO", "--band", "ALMA3")[2] == ""
+
+
+@pytest.mark.parametrize(("typed", "hint"), [("115:116", True), ("115:116MHz", False)])
+def test_a_range_without_a_unit_is_pointed_out_where_no_line_is_inside(call, typed, hint):
+    code, out, _ = call("emission", "CO", "--range", typed)
+    assert code == 0
+    assert "no lines" in out
+    assert ("--range 115:116 has no unit, so it is MHz: write 115:116GHz for GHz" in out) == hint
+
+
 def test_every_option_and_key_is_documented(call):
     part = (DOCS / "verbs" / "emission.md").read_text(encoding="utf-8")
     assert undocumented("emission", call("emission", "--help-all")[1]) == set()

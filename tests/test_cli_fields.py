@@ -93,6 +93,22 @@ def test_stark_writes_lines_spectra_mixtures_and_tables(call):
     assert Path("l.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "file"),
+    [("--line", "1 - 0", "--coefficients c.csv"), ("--light", "perpendicular", "--lines c.csv"), ("--spread", "0.01", "--spectrum c.csv"),
+     ("--temperature", "2K", "--mixture c.csv"), ("--linewidth", "2MHz", "--spectrum c.csv"),
+     ("--populations", "adiabatic", "--lines c.csv")],
+)  # fmt: skip
+def test_stark_refuses_what_changes_no_file_that_is_written(call, folder, option, value, file):
+    words = ("stark", "OCS", "--field", "0,1", "--states", "1", option, value)
+    code, out, err = call(*words)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {option}: changes nothing of the map itself; give ")
+    assert file.split()[0] in err
+    assert list(folder.iterdir()) == []
+    assert call(*words, *file.split())[0] == 0
+
+
 def test_stark_with_the_spin_of_a_nucleus(call):
     """A linear top in a weak field: three levels of J = 1 (F = 0, 1, 2) with their M_F, the picture too."""
     arguments = ("--constants", "B=4549 MHz", "--dipole-abc", "3.73,0,0", "--spin-constants", "chi_aa(14N)=-4.3 MHz")

@@ -25,6 +25,25 @@ def test_a_dipole_too_large(call):
     assert implausible(rotor.Top.from_constants("B=9 GHz", dipole_abc_debye=(19.0, 0, 0))) == ()
 
 
+@pytest.mark.parametrize("name", ["water", "H2", "HCN", "CCl4", "CH3I"])
+def test_coordinates_in_bohr(name):
+    """Those of the library are noted when they are divided by the Bohr radius, and not as they are."""
+    from ase import Atoms
+
+    molecule = rotor.read(name).molecule
+    for scale, notes in ((1.0, 0), (1 / 0.529177, 1)):
+        top = rotor.read(Atoms(molecule.symbols, scale * molecule.positions_angstrom))
+        said = [text for text in implausible(top) if "multiply them by 0.529177" in text]
+        assert len(said) == notes
+
+
+def test_atoms_that_form_no_molecule_anyway_are_not_taken_for_bohr():
+    from ase import Atoms
+
+    assert implausible(rotor.read(Atoms("ArN2", [(0, 0, 0), (3.7, 0.55, 0), (3.7, -0.55, 0)]))) == ()
+    assert implausible(rotor.read(Atoms("He2", [(0, 0, 0), (5.0, 0, 0)]))) == ()
+
+
 @pytest.mark.parametrize(("q", "noted"), [("5", True), ("178.1", False), ("400", False), ("5000", True)])
 def test_a_partition_function_far_from_the_sum(call, q, noted):
     code, _, err = call("spectrum", "water", "--q", q, "--jmax", "2")

@@ -360,6 +360,17 @@ def test_the_summary_shows_results(folder):
         assert columns["q"][row] == lines.partition.q
 
 
+def test_what_a_molecule_does_not_have_is_a_dash_in_the_summary(call, folder):
+    """A of a linear molecule, which is not a number in the table."""
+    text = 'schema = 1\nkind = "info"\nmolecule = "CO"\n[sweep]\nmolecule = ["CO", "water"]\n'
+    (folder / "s.toml").write_text(text)
+    code, out, _ = call("run", "s.toml")
+    assert code == 0
+    row = next(line for line in out.splitlines() if line.split()[:1] == ["CO"])
+    assert " - " in row
+    assert "nan" not in out
+
+
 def test_ten_thousand_points_begin_at_once(folder):
     """Points are made when they are needed: the first result comes before the last scene is checked."""
     scene = levels(sweep={"observables.jmax": list(range(10_000))}, observables=LevelsObservables(max_energy="1 MHz"))

@@ -65,6 +65,8 @@ class Outputs:
     """Files to write."""
 
     out: str | None = file_option(".cat", ".cat.gz", help="Write the lines that are left (.cat, .cat.gz).")
+    csv: str | None = file_option(".csv", help="Write the lines that are left as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write the lines that are left as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the lines (.png, .pdf, .svg).")
     json: str | None = json_option()
 
@@ -144,9 +146,13 @@ def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
 
 
 def _writers(lines: Catalogue, content: dict[str, Any], found: Comparison | None, view: View) -> dict[str, Writer]:
+    from rotor.formats import write
     from rotor.formats.spcat.text.cat import write_cat
 
+    settings = {key: content[key] for key in ("command", "input")}
     return {
+        "--csv": lambda path: write(lines, path, settings=settings),
+        "--parquet": lambda path: write(lines, path, settings=settings),
         "--out": lambda path: write_cat(lines, path),
         "--plot": lambda path: draw(lines, path, content, found, view),
     }

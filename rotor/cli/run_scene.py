@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -249,7 +250,10 @@ def _some_rows(table: Columns) -> Table:
 
 
 def _cell(value: Any) -> str:
-    return f"{value:.8g}" if hasattr(value, "dtype") and value.dtype.kind == "f" else str(value)
+    number = hasattr(value, "dtype") and value.dtype.kind == "f"
+    return (
+        ("-" if math.isnan(value) else f"{value:.8g}") if number else str(value)
+    )  # what a molecule does not have: A of a linear one
 
 
 def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:

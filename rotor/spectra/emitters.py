@@ -9,7 +9,7 @@ thousandth of the least optical depth, so that what they add up to is known.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -203,10 +203,19 @@ def _of_top(
         quanta=tuple(lines.quanta_names),
         effects=tuple(lines.levels.effects),
         hyperfine=hyperfine_facts(top, lines.levels),
-        notes=tuple(lines.warnings),
+        notes=(*_notes_of_geometry(top), *lines.warnings),
         q_error=lines.partition.relative_error,
         left_out_depth=BELOW * least_depth + depth_of_blends(*weak, source),
     )
+
+
+def _notes_of_geometry(top: Top) -> Iterator[str]:
+    """That frequencies are those of a geometry, which a telescope's resolution makes useless for finding lines."""
+    if top.molecule is not None and top.molecule.uncertainty and top.source == top.molecule.source:
+        yield (
+            f"{top.name}: constants follow from a geometry good to {100 * top.molecule.uncertainty:.2g} %, frequencies are off by so much: "
+            "a catalogue of JPL or CDMS (.cat) has measured ones"
+        )
 
 
 def depth_of_blends(frequency_mhz: Floats, depth: Floats, source: Source) -> float:

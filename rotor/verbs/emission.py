@@ -19,7 +19,16 @@ from rotor.requests.fill import Given, read_instance, written_fields
 from rotor.requests.readers import Names, Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
-from rotor.verbs.molecule import FIELDS, STATES, MoleculeInput, Reading, read_molecule, top_of, with_some_dipole
+from rotor.verbs.molecule import (
+    FIELDS,
+    STATES,
+    MoleculeInput,
+    Reading,
+    range_without_unit,
+    read_molecule,
+    top_of,
+    with_some_dipole,
+)
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.tables import Section, entries_of, said
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb
@@ -268,7 +277,10 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         )
     show_facts(facts)
     if not len(answer.lines):
-        print("\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth")
+        print(
+            "\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth"
+            + range_without_unit(report.given)
+        )
     elif report.shown.top_lines:
         print()
         show_table(_table(answer, report.shown.top_lines))

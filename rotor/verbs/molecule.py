@@ -241,6 +241,14 @@ def has_unit(text: str) -> bool:
     return bool(re.search(r"[\d).]\s*(?:[kMGT]?Hz|cm(?:-1|\^-1|⁻¹)|1/cm|K)(?!\w)", text))
 
 
+def range_without_unit(given: Given) -> str:
+    """The end of a sentence on why there are no lines: what a range that was typed without a unit was read as."""
+    text = given.values.get("conditions.range")
+    if given.style != "option" or text is None or has_unit(text):
+        return ""
+    return f"; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
+
+
 def _from_source(reading: Reading) -> Top:
     from rotor.formats import read
     from rotor.tops.top import Top

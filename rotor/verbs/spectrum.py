@@ -19,7 +19,7 @@ from rotor.requests.readers import Custom, Flag, Quantity, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
-from rotor.verbs.molecule import has_unit, with_some_dipole
+from rotor.verbs.molecule import range_without_unit, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
 
@@ -215,10 +215,7 @@ def show(answer: SpectrumAnswer, report: Report) -> None:
 
 def _why_none(answer: SpectrumAnswer, given: Given) -> str:
     reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
-    text = given.values.get("conditions.range")
-    if given.style != "option" or text is None or has_unit(text):
-        return reason
-    return f"{reason}; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
+    return reason + range_without_unit(given)
 
 
 def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -13,6 +13,7 @@ from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, table_of_states
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
+from rotor.requests.field import own_fields
 from rotor.requests.fill import Given
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
@@ -36,6 +37,17 @@ Examples:
   rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
 
 
+_LINES = frozenset({"lines", "lobes", "coefficients"})
+_POPULATED = frozenset({"lines", "lobes", "spectrum", "mixture"})
+# which files each field of a sample changes
+OUTPUTS_OF_SAMPLE = {
+    "light": frozenset({"lines", "lobes", "spectrum"}),
+    "line": _LINES,
+    **dict.fromkeys(("temperature_k", "populations"), _POPULATED),
+    **dict.fromkeys(("linewidth_mhz", "range_mhz", "spread"), frozenset({"spectrum"})),
+}
+
+
 @dataclass(frozen=True)
 class StarkShown(FieldSample, Shown):
     """What lines, spectra and mixtures are of."""
@@ -48,9 +60,14 @@ def prepare(top: Top, reading: Reading, given: Given) -> Top:
 
 
 def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
-    """ValueError for a picture of a single field."""
+    """ValueError for a picture of a single field, and for what nothing that is written depends on."""
     if "plot" in outputs and len(request.fields_kv_per_cm) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    for name, field in own_fields(FieldSample).items():
+        files = OUTPUTS_OF_SAMPLE[name]
+        if getattr(shown, name) != field.default and not files & set(outputs):
+            names = " or ".join(f"--{one}" for one in sorted(files))
+            raise ValueError(f"{field.option}: changes nothing of the map itself; give {names} beside it")
 
 
 def _further(name: str) -> Writer:
