@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import math
+import signal
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -286,6 +288,46 @@ def test_executors_change_nothing():
             for e in (None, pool)
         )
     assert np.array_equal(one.cosines["cos2theta"], two.cosines["cos2theta"])
+
+
+def test_pieces_of_a_pulse_change_nothing(monkeypatch):
+    """Calls of the compiled loop end where signals are handled: the numbers are those of one call, to the last bit of a product."""
+    times = np.linspace(-0.2, 20, 101)
+    whole = align(OCS, GaussianPulse(5e12, 0.1), times, temperature_k=4.0)
+    monkeypatch.setattr(propagate, "PRODUCTS_OF_A_CALL", 10_000)
+    assert len(propagate._pieces(np.zeros(50, dtype=bool), (20, 3))) == 7  # 8 stages of 1200 products each
+    pieces = align(OCS, GaussianPulse(5e12, 0.1), times, temperature_k=4.0)
+    assert np.allclose(whole.cosines["cos2theta"], pieces.cosines["cos2theta"], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="this system has no SIGALRM")
+def test_a_long_pulse_obeys_a_signal():
+    """300 states at once through 40,000 stages, 4e10 complex products, take some 30 s in one call."""
+
+    class RangError(Exception):
+        pass
+
+    def ring(*_):
+        raise RangError
+
+    contraction = Contraction(acted_on(OCS, "polarizability"), np.diag([-1, -1, 2.0]) / 3)
+    block = field_space(OCS, 110, [contraction]).blocks(0)[0]
+    window = timeline([SwitchedPulse(2e12, 0.3, 0.2, 0.1)])[0]
+    operator = propagate.decompose(block.matrix(contraction))
+    grid = propagate.grid_of(window, 5e-5, np.zeros(0))
+    plan = propagate.kick_plan(window, grid, propagate.splitting("nystrom 4"))
+    start, edge = np.eye(len(block), 300, dtype=complex), block.j > 108
+    assert len(plan.which) * len(block) ** 2 * 300 > 2e10
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 1.0)
+        began = time.process_time()
+        with pytest.raises(RangError):
+            propagate.split_through(plan, RAD_PER_PS_MHZ * block.energies_mhz, operator, start, edge)
+        assert time.process_time() - began < 4.0  # s
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_harmonic_sums_on_even_and_uneven_times():

@@ -57,6 +57,8 @@ BAD = [
         "conditions.temperature: expected a number or a text, found true or false",
     ),
     (HEAD + "[conditions]\ntemperature = ", "not a TOML file"),
+    (HEAD + "[observables]\njmax = 3", "[observables] has no key 'jmax'; it is a key of [numerics]"),
+    (HEAD + "jmax = 3", "a scene of this kind has no key 'jmax'; it is a key of [numerics]"),
     (HEAD + '[conditions]\naccuracy = "1 kHz"', "[conditions] has no key 'accuracy'; it stands before the first table"),
     ('schema = 1\nkind = "align"\nmolecule = "OCS"', "s.toml: the key 'pulses' is missing"),
     (

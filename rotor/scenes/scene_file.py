@@ -11,9 +11,9 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Union, get_args, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -62,7 +62,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     """
     kind = _kind_of(content, where)
     rest = {key: value for key, value in content.items() if key != "kind"}
-    _refuse_unknown_keys(rest, kind, where, "", kind.__struct_fields__)
+    _refuse_unknown_keys(rest, kind, where, "", kind)
     try:
         found: Scene = msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
@@ -81,23 +81,32 @@ def _kind_of(content: Mapping[str, Any], where: str) -> type[Scene]:
     return KINDS[kind]
 
 
-def _refuse_unknown_keys(
-    content: Mapping[str, Any], kind: Any, where: str, place: str, outermost: Sequence[str]
-) -> None:
-    """Refuse keys that a table of a scene has not; outermost: those of the scene itself, which stand before its first table."""
+def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, place: str, scene: type[Scene]) -> None:
+    """Refuse keys that a table of a scene has not, with the place where the scene has such a key."""
     hints = get_type_hints(kind)
     for key, value in content.items():
         if kind.__struct_config__.tag_field == key:
             continue
         if key not in kind.__struct_fields__:
             of = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
-            belongs = place and key in outermost and not isinstance(value, Mapping)
-            near = "; it stands before the first table" if belongs else _nearest(key, kind.__struct_fields__)
-            raise ValueError(f"{where}: {of} has no key {key!r}{near}")
+            elsewhere = "" if isinstance(value, Mapping) else _other_place(key, scene)
+            raise ValueError(f"{where}: {of} has no key {key!r}{elsewhere or _nearest(key, kind.__struct_fields__)}")
         inside = f"{place}.{key}" if place else key
         _refuse_unknown_tags(hints[key], value, where, inside)
         for one, item, number in _tables_in(hints[key], value):
-            _refuse_unknown_keys(item, one, where, inside + number, outermost)
+            _refuse_unknown_keys(item, one, where, inside + number, scene)
+
+
+def _other_place(key: str, scene: type[Scene]) -> str:
+    """Where a scene has a key of that name, outside tables of lists; empty for nowhere."""
+    if key in scene.__struct_fields__:
+        return "; it stands before the first table"
+    tables = [
+        name
+        for name, hint in get_type_hints(scene).items()
+        if get_origin(hint) is not list and any(key in one.__struct_fields__ for one in structures_in(hint))
+    ]
+    return f"; it is a key of {' and '.join(f'[{name}]' for name in tables)}" if tables else ""
 
 
 def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -117,13 +118,14 @@ def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spin
     return False
 
 
-def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> list[int]:
+@lru_cache(maxsize=4096)
+def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> tuple[int, ...]:
     """Of A (or B) and of E levels in the Wang block of a species, whichever axis K is along."""
     one, other = np.array([ka]), np.array([kc])
     if state.fold < 3:
-        return [int(state.class_weight(one, other, odd_spins)[0])]
+        return (int(state.class_weight(one, other, odd_spins)[0]),)
     along = {int(k): state.block_weights(one, other, np.array([k]))[0] for k in (ka, kc)}
-    return sorted({int(weight) for found in along.values() for weight in found})
+    return tuple(sorted({int(weight) for found in along.values() for weight in found}))
 
 
 SpeciesPairs = frozenset[tuple[str, str]]
