@@ -67,6 +67,27 @@ def test_a_long_list_is_the_same_in_every_format(call, folder, monkeypatch, shor
                                                               "b.cat.provenance.json", "b.parquet"]  # fmt: skip
 
 
+def test_a_long_list_is_written_as_csv(call, folder, monkeypatch, short):
+    """From the disk, with the columns of a list in memory, its numbers and its provenance."""
+    code, _, err = call(*TYPED, "--csv", "a.csv")
+    assert (code, err) == (0, "")
+    assert _in_memory(call, monkeypatch, *TYPED, "--csv", "b.csv")[0] == 0
+    streamed, whole = (np.genfromtxt(f"{name}.csv", delimiter=",", names=True) for name in "ab")
+    assert streamed.dtype.names == whole.dtype.names
+    assert len(streamed) == len(whole) > 10_000
+    assert np.all(np.diff(streamed["frequency_mhz"]) >= 0)
+    order = [np.lexsort((c["lgint"], c["j_lower"], c["frequency_mhz"].round(6))) for c in (streamed, whole)]
+    for name in ("frequency_mhz", "lgint", "energy_lower_cm", "j_upper"):
+        np.testing.assert_allclose(streamed[name][order[0]], whole[name][order[1]], rtol=1e-9, atol=1e-9)
+    assert json.loads(Path("a.csv.provenance.json").read_text())["lines"] == len(streamed)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "a.csv",
+        "a.csv.provenance.json",
+        "b.csv",
+        "b.csv.provenance.json",
+    ]
+
+
 def test_a_scene_makes_a_long_list_on_disk(folder, short):
     scene = parse_scene(
         f'schema = 1\nkind = "spectrum"\n[molecule]\nconstants = "{CONSTANTS}"\ndipole_abc = [1.2, 1.9, 0.4]\n'

@@ -174,7 +174,7 @@ def test_a_pool_that_forks_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("path", "settings", "words"),
     [
-        ("a.csv", {}, r"streamed list is written as \.parquet or \.cat"),
+        ("a.json", {}, r"streamed list is written as \.parquet, \.csv or \.cat"),
         ("a.cat", {"jmax": 0}, "J max = 0"),
         ("a.cat", {"piece_lines": 0}, "piece_lines = 0"),
         ("a.cat", {"memory_mb": 5}, "memory_mb = 5"),

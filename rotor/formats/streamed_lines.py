@@ -73,10 +73,16 @@ class SortedLines:
     memory_mb: int
 
     def write(self, target: Path, tag: int = 0) -> None:
-        """Write the list as .parquet or .cat by the suffix of the name."""
+        """Write the list as .parquet, .csv or .cat by the suffix of the name."""
         if target.suffix.lower() == ".parquet":
             with atomic_path(target) as unfinished:
                 shutil.copyfile(self.file, unfinished)
+            return
+        if target.suffix.lower() == ".csv":
+            with atomic_path(target) as unfinished, _engine(self.plan.folder, self.memory_mb) as engine:
+                text = f"COPY (SELECT * FROM read_parquet({quoted(str(self.file))})) TO {quoted(str(unfinished))} (FORMAT csv, HEADER)"
+                run(engine, text, target)
+            write_beside(target, dict(self.record) | {"lines": self.count})
             return
         count = 0
         with open_atomic(target) as handle:
@@ -151,7 +157,7 @@ def stream_lines(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> StreamedList:
-    """The lines of `rotor.api.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
+    """The lines of `rotor.api.line_list`, rising in frequency, written to a .parquet, .csv or .cat file without being in memory.
 
     Pieces stand in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
     them; the same call goes on from there.
@@ -198,8 +204,8 @@ def stream_lines(
         another list.
     """
     target = Path(path)
-    if target.suffix.lower() not in (".parquet", ".cat"):
-        raise ValueError(f"{path}: a streamed list is written as .parquet or .cat; the suffix names the format")
+    if target.suffix.lower() not in (".parquet", ".csv", ".cat"):
+        raise ValueError(f"{path}: a streamed list is written as .parquet, .csv or .cat; the suffix names the format")
     with locked_file(target):
         made = sorted_lines(
             top,

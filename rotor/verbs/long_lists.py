@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 TRANSITIONS = 2_000_000  # before the cut, beyond which a list is made on disk: in memory each takes some 0.3 kB
 STRONGEST = 1_000  # lines that are in memory
-STREAMED = frozenset({"cat", "parquet"})  # outputs that are written from the disk
+STREAMED = frozenset({"cat", "csv", "parquet"})  # outputs that are written from the disk
 SMALL = frozenset({"json", "save_scene"})  # outputs beside them: a scene has no lines, JSON has all while they are few
 JSON_LINES = 200_000  # the text of a line takes some 0.6 kB, and the whole text is in memory
 
