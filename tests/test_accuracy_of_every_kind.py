@@ -53,6 +53,45 @@ def test_an_accuracy_is_reached_and_named_with_its_unit(call, folder, kind, accu
     assert call("plan", "s.toml")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("kind", "body", "accuracy"),
+    [
+        ("spectrum", 'molecule = "SO2"\n[conditions]\nrange = "80:120GHz"\n[observables]\nmin_lgint = -5\n', "10 %"),
+        ("spectrum", 'molecule = "CO"\n', "0.001 %"),
+        ("raman", 'molecule = "O2"\n[observables]\nmin_relative = 1e-3\n', "1 %"),
+    ],
+)
+def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accuracy):
+    """Against lists without a cut."""
+    from dataclasses import replace
+
+    from rotor.scenes.numerics import verb_of
+    from rotor.scenes.run import run_scene
+    from rotor.verbs.verb import Work
+
+    result = run_scene(parse_scene(HEAD.format(kind, accuracy) + body))
+    name, column = {
+        "spectrum": ("min_lgint", "intensity_nm2_mhz"),
+        "raman": ("min_relative", "cross_section_cm2_per_sr"),
+    }[kind]
+    whole = verb_of(kind).answer(replace(result.request, **{name: None, "jmax": 150}), Work())
+    part, true = (getattr(one.lines, column).sum() for one in (result.answer, whole))
+    assert 0 <= 100 * (1 - part / true) <= result.reached.error <= result.reached.asked
+
+
+def test_a_cut_is_lowered_where_it_leaves_out_too_much():
+    """The accuracy of one that is given by hand is refused instead."""
+    from rotor.scenes.accuracy_intensities import choose_cut
+    from rotor.scenes.kind import kind_of
+
+    scene = parse_scene(HEAD.format("raman", "2e-4 %") + 'molecule = "N2"\n')
+    request = kind_of(scene).request(scene, ".")
+    assert choose_cut(scene, request, 1e-3).request.min_relative == request.min_relative
+    lowered = choose_cut(scene, request, 8e-5)
+    assert lowered.request.min_relative < request.min_relative
+    assert lowered.error <= 8e-5
+
+
 @pytest.mark.parametrize(("accuracy", "value"), [("1 mK", 1e-3), ("2 K", 2.0)])
 def test_brightness_is_asked_for_in_kelvin(accuracy, value):
     assert asked_of(parse_scene(HEAD.format("emission", accuracy) + EMISSION)) == pytest.approx(value)

@@ -9,6 +9,7 @@ the error.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -155,7 +156,7 @@ def ladder(
     >>> [(one.label, one.own) for one in ladder([1e-2, 1e-4], 1e-3, lambda tolerance: None)]
     [('0.01', False), ('0.001', True), ('0.0001', False)]
     """
-    values = list(values)
+    values = [own if own is not None and math.isclose(one, own, rel_tol=1e-9) else one for one in values]
     falling = len(values) > 1 and values[0] > values[-1]
     every = sorted({*values, *(() if own is None else (own,))}, reverse=falling)
     return tuple(Setting(text(one), make(one), one == own) for one in every)

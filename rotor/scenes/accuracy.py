@@ -32,7 +32,7 @@ from rotor.scenes.scene import Scene
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
 MOST_CONFIRMED = 6  # J max that are confirmed by whole runs of an alignment, before the one of its tolerance is taken
-LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
+LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried, times the accuracy
 
 
 def asked_of(scene: Scene) -> float | None:
@@ -231,14 +231,6 @@ def error_of_list(answer: Any, unit: str) -> float:
     return _levels_error(answer.lines.top, answer.lines.levels)
 
 
-def error_of_intensities(answer: Any) -> float:
-    """The error of the intensities of lines in percent: of Q, and of strengths whose vectors are rounded."""
-    lines = answer.lines
-    return 100.0 * (
-        float(lines.partition.relative_error) + ROUNDING * max(1, int(lines.levels.rotational.max(initial=0)))
-    )
-
-
 def error_of_levels(answer: Any, unit: str) -> float:
     """The error of the levels of an answer."""
     return _levels_error(answer.request.top, answer.table.levels)
@@ -257,7 +249,7 @@ def _levels_error(top: Any, levels: Any) -> float:
 
 
 def choose_basis(scene: Any, request: Any, asked: float) -> Choice:
-    """The loosest tolerance, in decades, whose error as it is found by a run is what was asked for, and then the smallest J max.
+    """The loosest tolerance of those tried whose error as it is found by a run is what was asked for, and then the smallest J max.
 
     A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """

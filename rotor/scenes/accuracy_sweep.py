@@ -28,7 +28,7 @@ from rotor.scenes.scene import Scene
 from rotor.table import Table
 
 Progress = Callable[[str, str], object]
-SHORT_SECONDS, ROUNDS = 0.2, 5  # settings that are shorter are timed in so many rounds
+SHORT_SECONDS, ROUNDS = 1.0, 5  # settings that are shorter are timed in so many rounds
 LEAST_SCATTER = 0.1  # of a time: processor time depends on what else uses memory and caches
 LEAST_SECONDS = 5e-3  # of one timing: shorter calls are repeated in it
 COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated

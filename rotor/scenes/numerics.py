@@ -42,10 +42,12 @@ class Numerics:
 
 _TABLE = {
     "spectrum": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_list", sweeps="knobs.of_levels:spectrum",
-                         relative="accuracy:error_of_intensities", plan="plan:plan_of_spectrum", levels=True),
+                         relative="accuracy_intensities:error_of_intensities", choose_relative="accuracy_intensities:choose_cut",
+                         plan="plan:plan_of_spectrum", levels=True),
     "levels": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_levels", sweeps="knobs.of_levels:levels",
                        plan="plan:plan_of_levels", levels=True),
     "raman": Numerics(choose="accuracy:choose_spins", error="accuracy:error_of_list", sweeps="knobs.of_levels:raman",
+                      relative="accuracy_intensities:error_of_intensities", choose_relative="accuracy_intensities:choose_cut",
                       plan="plan:plan_of_raman", levels=True),
     "thermo": Numerics("", percent=True, sweeps="knobs.of_fields:thermo", plan="plan:plan_of_thermo"),
     "stark": Numerics(sweeps="knobs.of_fields:stark", plan="plan_in_fields:plan_in_field"),

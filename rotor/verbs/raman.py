@@ -121,6 +121,6 @@ VERB = Verb(
     notes=lambda answer: answer.lines.warnings,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="cm-1",
-    accuracy="of the shifts",
+    accuracy="of the shifts, or of the cross sections of each line and of all together (%)",
     start={"molecule": "N2", "conditions.temperature": "300 K", "outputs.csv": "raman.csv"},
 )

@@ -316,5 +316,5 @@ VERB = Verb(
     build=build,
     adapt=adapt,
     check=check,
-    accuracy="of the frequencies, or of the intensities (%)",
+    accuracy="of the frequencies, or of the intensities of each line and of all together (%)",
 )
