@@ -119,7 +119,7 @@ def measured(name: str, shared: Path) -> list[Point]:
     from rotor.formats.molecules.library import library_molecule
     from rotor.formats.spcat.compare import compare
     from rotor.formats.spcat.text.cat import read_cat
-    from rotor.scenes.knobs.of_levels import order_of, to_order
+    from rotor.quantum.estimates.accuracy import order_of, to_order
 
     tag = library_molecule(name).catalogue
     paths = (shared / "reference" / folder / f"{tag.tag}.cat.gz" for folder in ("catalogues", "library_lines"))

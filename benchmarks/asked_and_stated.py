@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from rotor.scenes.accuracy import error_of, unit_of
+from rotor.scenes.accuracy import unit_of
 from rotor.scenes.kind import kind_of
+from rotor.scenes.numerics import numerics_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene_file import parse_scene
 
@@ -312,7 +313,7 @@ def _torsion(scene: Any, request: Any, answer: Any) -> Reference:
 
 
 def _fluid(scene: Any, request: Any, answer: Any) -> Reference:
-    from rotor.scenes.knobs.of_motion import conserved_k
+    from rotor.fluids.numerics import conserved_k
 
     return conserved_k(answer), "root mean square of every step of the run about the mean"
 
@@ -381,7 +382,7 @@ def measured(number: int, kind: str, asked: str, body: str, folder: Path) -> Mea
         words, request = coarse
         try:
             coarse_seconds, answer = timed(lambda: answer_of(request, work))
-            error = max(error_of(kind, answer, reached.unit), 0.0)
+            error = max(numerics_of(kind).goals[reached.unit].error(answer), 0.0)
             if kind == "tumble":
                 error = answer.errors.numerical
         except ValueError as reason:

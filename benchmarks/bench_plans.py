@@ -22,8 +22,8 @@ from pathlib import Path
 
 import msgspec
 
+from rotor.requests.plan import peak_mb
 from rotor.scenes.plan import plan_of
-from rotor.scenes.plan_parts import peak_mb
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
     GasScene,

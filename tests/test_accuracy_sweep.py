@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotor.quantum.estimates.accuracy import energies_like, to_order
 from rotor.requests.knob import Measure, Setting, Sweep
 from rotor.scenes import accuracy_sweep, numerics
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
-from rotor.scenes.knobs.of_levels import energies_like, to_order
 from rotor.scenes.scene import (
     KINDS,
     AlignScene,
@@ -49,6 +49,7 @@ from rotor.scenes.sections import (
     ThermoConditions,
     TumbleConditions,
 )
+from rotor.verbs.verb import verb_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -198,12 +199,12 @@ def test_raman_lines():
     assert found["1e-06"] < 1e-3 < found["0.1"]  # percent of all cross sections
 
 
-@pytest.mark.parametrize("kind", sorted(numerics._TABLE))
+@pytest.mark.parametrize("kind", sorted(KINDS))
 def test_the_numerics_of_every_kind_can_be_loaded(kind):
-    assert kind in KINDS
     entry = numerics.numerics_of(kind)
-    for name in filter(None, (entry.choose, entry.error, entry.sweeps, entry.plan)):
-        assert callable(numerics.load(name))
+    assert entry.goals
+    assert all(callable(goal.error) for goal in entry.goals.values())
+    assert (entry.plan is not None) == bool(verb_of(kind).numerics)
 
 
 def test_a_fit_and_a_source():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.scenes.motion_steps import expected_steps, first_share, steps_of
+from rotor.classical.motion_steps import expected_steps, first_share, steps_of
 from rotor.scenes.scene_file import parse_scene
 
 TUMBLE = """schema = 1

@@ -11,7 +11,7 @@ import rotor
 from rotor.formats.spcat.hamiltonian.codes import _whole_code
 from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.wang import wang_matrix
-from rotor.scenes.plan_parts import _extrapolated
+from rotor.requests.plan import Growth
 
 # Refusals
 
@@ -316,10 +316,17 @@ def test_a_box_that_fails_is_stopped_with_the_step(box, monkeypatch):
 
 def test_a_cost_proportional_to_the_work_is_extrapolated_exactly():
     """t = 10 + 3 n from n = 4 and 8 gives 310 at n = 100; a call that is no larger is measured itself."""
-    measured = _extrapolated(lambda call: call(), lambda n: 10.0 + 3.0 * n, float, (4, 8), 100)
+
+    def taken(cost, size):
+        """What a clock would say of a call; the short calls are long enough."""
+        growth = Growth(cost, size, (4, 8))
+        growth.__dict__["enough"] = (min(4, size), min(8, size))
+        return growth.extrapolated(lambda call: call(), float)
+
+    measured = taken(lambda n: 10.0 + 3.0 * n, 100)
     assert measured == pytest.approx(310.0, rel=1e-14)  # round-off of three operations
-    assert _extrapolated(lambda call: call(), lambda n: 10.0 + 3.0 * n, float, (4, 8), 6) == 28.0
-    falling = _extrapolated(lambda call: call(), lambda n: 10.0 - n, float, (4, 8), 100)
+    assert taken(lambda n: 10.0 + 3.0 * n, 6) == 28.0
+    falling = taken(lambda n: 10.0 - n, 100)
     assert falling == 2.0  # noise of a clock: no cost falls with the work
 
 
@@ -394,11 +401,11 @@ def test_the_truncation_of_a_torsion_is_compared_at_a_bounded_j(monkeypatch, jma
     """A plan of J = 90 would otherwise solve J = 90 twice before anything is computed."""
     from types import SimpleNamespace
 
+    from rotor.quantum.estimates.plans import MOST_J_COMPARED, torsional_parts
     from rotor.quantum.internal_rotation import levels, truncation
-    from rotor.scenes.plan_parts import MOST_J_COMPARED, _torsional_parts
 
     monkeypatch.setattr(levels, "turning_tops", lambda top, constants: None)
     monkeypatch.setattr(truncation, "truncation_mhz", lambda model, j, vt_max, count: 1e-3 * j)
-    texts = dict(_torsional_parts(None, SimpleNamespace(functions=9, tops=1, vt_max=0), jmax))
+    texts = dict(torsional_parts(None, SimpleNamespace(functions=9, tops=1, vt_max=0), jmax))
     assert MOST_J_COMPARED[1] == 30
     assert texts["truncation"] == f"at most {1e-3 * compared:.1g} MHz at J = {compared}, v_t up to 0"

@@ -16,15 +16,16 @@ import rotor
 from rotor import units
 from rotor.classical.driven import DrivenRequest, answer_driven
 from rotor.classical.effects.gravity import GravityAboutPivot
+from rotor.classical.numerics import step_error
 from rotor.fluids.analysis import Diffusion, yeh_hummer_correction
 from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.numerics import left_out_of_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
+from rotor.quantum.estimates.left_out import stray_field
 from rotor.quantum.solve import solve_levels
-from rotor.scenes import left_out
 from rotor.scenes.kind import kind_of
 from rotor.scenes.plan import plan_of
-from rotor.scenes.plan_steps import step_error
 from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
 from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sections import (
@@ -34,6 +35,7 @@ from rotor.scenes.sections import (
     SpectrumConditions,
     SpectrumObservables,
 )
+from rotor.spectra.widths import pressure_width
 
 SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
 ATM_PER_BAR, TORR_PER_BAR = 1 / 1.01325, 760 / 1.01325
@@ -49,15 +51,15 @@ MEASURED = [  # half widths at half maximum, MHz per bar
 
 @pytest.mark.parametrize(("name", "kelvin", "half_width"), MEASURED, ids=["OCS", "CO"])
 def test_the_pressure_width(name, kelvin, half_width):
-    estimated = left_out.pressure_width(rotor.read(name), kelvin, 1.0).size
+    estimated = pressure_width(rotor.read(name), kelvin, 1.0).size
     assert 1 / 3 < estimated / (2 * half_width) < 3  # the factor that is claimed
 
 
 def test_widths_are_those_of_the_conditions_of_the_scene():
     """Without a pressure no width is claimed; Doppler's is that inside the range."""
-    alone = left_out.pressure_width(rotor.read("OCS"), 2.0, None)
+    alone = pressure_width(rotor.read("OCS"), 2.0, None)
     assert alone.size is None
-    assert f"{left_out.pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
+    assert f"{pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
     scene = SpectrumScene(molecule="H2CO", conditions=SpectrumConditions(temperature="30 K", range="100:105GHz"))
     widths = {one.name: one for one in plan_of(scene).left_out}
     assert "at 105000 MHz" in widths["Doppler width"].basis
@@ -90,7 +92,7 @@ def test_the_shift_of_an_asymmetric_top_in_a_stray_field(name):
     found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=1, m_values=(1,), tolerance_mhz=1e-6)
     energy = found.energy_mhz.reshape(-1, 2)  # both fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
-    assert 1 / 3 < left_out.stray_field(top).size / shift < 3  # the other levels of J = 0 and 2 are left out
+    assert 1 / 3 < stray_field(top).size / shift < 3  # the other levels of J = 0 and 2 are left out
 
 
 def normal(count: int) -> np.ndarray:
@@ -108,7 +110,7 @@ def test_the_quantum_correction_is_that_of_oscillators(u):
     )
     omega = u * units.EV_PER_K * kelvin / units.HBAR_CLASSICAL
     force = -np.sqrt(bodies.mass[:, None] * units.EV_PER_K * kelvin) * omega * normal(count)  # -mΩ²x
-    found = {one.name: one for one in left_out.of_fluid(bodies, force, 0 * force, kelvin, 2.0)}
+    found = {one.name: one for one in left_out_of_fluid(bodies, force, 0 * force, kelvin, 2.0)}
     exact = 3 * np.log(np.sinh(u / 2) / (u / 2))
     tolerance = (
         0.05 + u**2 / 50
@@ -131,7 +133,7 @@ def test_the_step_error_is_that_of_librators():
         bodies.inverse_moments > 0, 1 / np.where(bodies.inverse_moments > 0, bodies.inverse_moments, 1), 0
     )
     torque = -np.sqrt(moments * units.EV_PER_K * kelvin) * omega * angles
-    found = {one.name: one for one in left_out.of_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
+    found = {one.name: one for one in left_out_of_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
     s = 0.25
     assert found["finite step"].size / 100 == pytest.approx(
         1 - s * np.sqrt(1 - s**2) / np.arcsin(s), rel=0.1
@@ -144,7 +146,7 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
     edge = (count * 18.015 * units.ATOMIC_MASS_KG / 997.0) ** (1 / 3) * 1e10
     slowed = yeh_hummer_correction(Diffusion(0.0, 0.0), 298.0, 0.9e-3, edge).corrected / 2.3e-9
     bodies, _ = bodies_of(Atoms("Ar2", positions=[[0, 0, 0], [9, 0, 0]]), np.arange(2))
-    share = left_out.of_fluid(bodies, np.zeros((2, 3)), np.zeros((2, 3)), 298.0, 1.0)
+    share = left_out_of_fluid(bodies, np.zeros((2, 3)), np.zeros((2, 3)), 298.0, 1.0)
     size = next(one.size for one in share if one.name == "finite box") * (2 / count) ** (1 / 3)  # of two: N^(-1/3)
     assert 1 / 3 < size / 100 / slowed < 3
 
@@ -178,7 +180,7 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     sizes = []
     for _ in range(20):
         dynamics.run(10)
-        found = left_out.of_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
+        found = left_out_of_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
         sizes.append({one.name: one.size for one in found if one.size is not None})
     for name in ("quantum mechanics of nuclei", "finite step"):
         assert 1 / 3 < planned[name] / np.mean([one[name] for one in sizes]) < 3

@@ -16,14 +16,12 @@ from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
+from rotor.fluids.numerics import answer_followed, conserved_bound_k, conserved_k, followed, force_error, made_of
 from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.accuracy import asked_of, unit_of
-from rotor.scenes.accuracy_sampled import conserved_bound_k, force_error, made_of
 from rotor.scenes.kind import kind_of
-from rotor.scenes.knobs.of_levels import line_error
-from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
     AlignScene,
@@ -60,6 +58,7 @@ from rotor.scenes.sections import (
     TumbleConditions,
     TumbleNumerics,
 )
+from rotor.spectra.numerics import line_error
 from rotor.thermodynamics.classical_gas import answer_gas
 from rotor.tops.top import Top
 

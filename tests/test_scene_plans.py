@@ -13,16 +13,19 @@ import rotor
 from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
 from rotor.quantum.estimates.beyond import next_order
+from rotor.quantum.estimates.left_out import left_out_of_levels, stray_field
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
-from rotor.scenes import left_out
-from rotor.scenes.plan import allowed_lines, plan_of
+from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import LevelsScene
 from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sections import LevelsObservables
+from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
+from rotor.spectra.widths import doppler
 from rotor.thermodynamics.classical_limit import classical_partition_function
+from rotor.thermodynamics.gas_numerics import left_out_of_gas
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 
@@ -92,8 +95,8 @@ def test_the_shift_in_a_stray_field(name):
     found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=0 if linear else 1, tolerance_mhz=1e-9)
     energy = found.energy_mhz.reshape(-1, 2)  # all fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
-    assert 1 / 3 < left_out.stray_field(top).size / shift < 3  # claimed; a closed form to second or first order
-    assert left_out.stray_field(rotor.read("CH4")) is None
+    assert 1 / 3 < stray_field(top).size / shift < 3  # claimed; a closed form to second or first order
+    assert stray_field(rotor.read("CH4")) is None
 
 
 SPINS = [
@@ -108,7 +111,7 @@ SPINS = [
 @pytest.mark.parametrize("j", [1, 4])
 def test_known_couplings_of_spins(name, constants, effect, j):
     top = replace(rotor.read(name), spin_constants=SpinConstants.parse(constants))
-    size = next(one.size for one in left_out.of_levels(top, j, SEMI_RIGID) if one.name == effect)
+    size = next(one.size for one in left_out_of_levels(top, j, SEMI_RIGID) if one.name == effect)
     split = solve_levels(top, j, jmin=j, effects=(*SEMI_RIGID, *spin_effects(top)))
     plain = solve_levels(top, j, jmin=j)
     names = [name for name in plain.quanta if name != "j"]
@@ -123,7 +126,7 @@ def test_the_doppler_width_is_that_of_the_profile():
     grid = np.linspace(115271.0, 115273.0, 20001)
     shape = list(Spectrum.from_lines(lines, grid, profile="gaussian").columns.values())[1]
     above = grid[shape > shape.max() / 2]
-    assert np.isclose(left_out.doppler(top, 115271.0, 300.0).size, np.ptp(above), rtol=2e-3)  # grid of 1e-4 MHz
+    assert np.isclose(doppler(top, 115271.0, 300.0).size, np.ptp(above), rtol=2e-3)  # grid of 1e-4 MHz
 
 
 @pytest.mark.parametrize(("name", "kelvin"), [("water", 300.0), ("CO", 50.0), ("H2", 300.0), ("OCS", 20.0)])
@@ -134,7 +137,7 @@ def test_quantum_corrections_of_a_classical_gas(name, kelvin):
         / classical_partition_function(truncated(top, 2), kelvin)
         - 1
     )
-    size = next(one.size for one in left_out.of_classical_gas(top, kelvin) if one.name == "quantum corrections")
+    size = next(one.size for one in left_out_of_gas(top, kelvin) if one.name == "quantum corrections")
     assert 1 / 3 < size / 100 / abs(exact) < 3  # the first term of a series
 
 
@@ -188,7 +191,7 @@ def test_nothing_is_written_by_a_plan(call, folder):
 
 def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
     top = rotor.read("HCN")
-    said = {one.name: one.basis for one in left_out.of_levels(top, 8, SEMI_RIGID)}
+    said = {one.name: one.basis for one in left_out_of_levels(top, 8, SEMI_RIGID)}
     assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
-    with_spins = left_out.of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
+    with_spins = left_out_of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
     assert not any("effects.hyperfine" in one.basis for one in with_spins)

@@ -13,8 +13,7 @@ from rotor.cli.shared.options import argument, grouped
 from rotor.cli.shared.output import Files, deliver, json_text, show_facts
 
 if TYPE_CHECKING:
-    from rotor.scenes.left_out import LeftOut
-    from rotor.scenes.plan_parts import Plan
+    from rotor.requests.plan import LeftOut, Plan
     from rotor.scenes.scene import Scene
 
 EXAMPLES = """\b

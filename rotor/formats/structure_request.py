@@ -14,6 +14,7 @@ from rotor.formats.family_file import FamilyFile
 from rotor.molecules.molecule import Molecule
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
+from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.readers import Flag, NameList, Text
 from rotor.structures.budgets import lengths_budget
 from rotor.structures.consistency import PlanarMoment, Without, doubts, gains, moments_across_planes, without_each
@@ -229,3 +230,6 @@ def _fitted_record(one: FittedStructure) -> dict[str, Any]:
         "positions_angstrom": one.molecule.positions_angstrom,
         "moments": [{**vars(moment), "difference": moment.difference} for moment in one.moments],
     }
+
+
+STRUCTURE = Numerics({"Å": Goal("bond lengths")})

@@ -3,8 +3,9 @@
     relative_error: float = declared(1e-6, Quantity(above=0), "Of Q, U and C_v", "numerics.relative_error", knob=Knob(
         (1e-1, 1e-2, 1e-3), 1e-13, (Measure("Q", "%", error_of_q),), "sums to {:g}", least=1e-13))
 
-A sweep makes answers with each step and compares them with that of the finest value; an accuracy goes to a field whose value bounds
-the error.
+A sweep makes answers with each step and compares them with that of the finest value. An accuracy goes to a field whose value bounds
+the error, or is searched through the values to be tried, the coarsest first. What a verb has beside the knobs of its fields, and its
+plan, stand in one `Numerics` beside its request.
 """
 
 from __future__ import annotations
@@ -14,7 +15,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rotor.requests.field import Field, all_fields
+from rotor.requests.field import Field, all_fields, own_fields
+
+NOTHING_CHEAPER = "exact: nothing cheaper"
+LOOSEST = ", nothing cheaper: the loosest there is"
+DECADES = tuple(10.0**-n for n in range(13))  # values of a search
+Answering = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -82,8 +88,9 @@ class Knob:
 
     steps: values of a sweep, coarsest first. finest: that of the reference. Both may be functions of the request. measures: errors of an
     answer beside the reference. against: the reference in words, with {:g} for its value, or a function of it. least: the finest value
-    of a field that bounds the error in the unit of the accuracy; None of other fields. change: the request with a value. prepare: the
-    request of a sweep. used: whether a request has a use for the field.
+    of a field that bounds the error in the unit of the accuracy; None of other fields. tried: of a field that does not, the values of a
+    search for an accuracy, coarsest first. change: the request with a value. prepare: the request of a sweep. used: whether a request
+    has a use for the field.
     """
 
     steps: Iterable[Any] | Callable[[Any], Iterable[Any]]
@@ -94,6 +101,7 @@ class Knob:
     change: Callable[[Any, str, Any], Any] = with_field
     prepare: Callable[[Any], Any] = lambda request: request
     used: Callable[[Any], bool] = lambda request: True
+    tried: tuple[Any, ...] = ()
 
     def sweep(self, field: Field, request: Any, answer: Callable[[Any], Any]) -> Sweep:
         """The settings of this knob for a request, that of the request among them."""
@@ -112,14 +120,47 @@ class Knob:
         reference = self.change(plain, field.name, finest)
         return Sweep(field.key or field.name, self.measures, settings, reference, against, answer)
 
-    def choose(self, field: Field, request: Any, accuracy: float) -> Choice:
-        """The request whose field is an accuracy; ValueError where that is finer than possible, and where the field was given too."""
+    def choose(self, field: Field, request: Any, accuracy: float, answer: Answering) -> Choice:
+        """The request whose field is an accuracy, or the first value that reaches it.
+
+        Raises ValueError where that is finer than possible, and where the field was given too.
+        """
+        refuse_given(request, field.name)
+        name = field.last.replace("_", " ")
+        if self.tried:
+            return loosest(self.tried, lambda value: self.change(request, field.name, value), answer, accuracy, name)
         assert self.least is not None
-        if getattr(request, field.name) != field.default:
-            raise ValueError(f"accuracy and {field.key}: give one of them")
         if accuracy < self.least:
             raise ValueError(f"accuracy: {accuracy:g}: the finest that is possible here is {self.least:g}")
         return Choice(self.change(request, field.name, accuracy), f"{field.last} {accuracy:g}")
+
+
+def refuse_given(request: Any, *names: str) -> None:
+    """ValueError where a field that an accuracy chooses was given."""
+    structure: Any = type(request)
+    fields = own_fields(structure)
+    for name in names:
+        if getattr(request, name) != fields[name].default:
+            raise ValueError(f"accuracy and {fields[name].key}: give one of them")
+
+
+def stated(answer: Any) -> float:
+    """The numerical error that an answer states; infinite where it states none."""
+    error = answer.errors.numerical
+    return float("inf") if error is None else float(error)
+
+
+def loosest(
+    values: Iterable[float], change: Callable[[float], Any], answer: Answering, accuracy: float, name: str,
+    error: Callable[[Any], float] = stated,
+) -> Choice:  # fmt: skip
+    """The request with the first of some values whose answer is within an accuracy; the last where none is, which a run refuses."""
+    values = list(values)
+    for value in values:
+        request = change(value)
+        if error(answer(request)) <= accuracy:
+            break
+    return Choice(request, f"{name} {value:g}" + (LOOSEST if value == values[0] else ""))
 
 
 def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:

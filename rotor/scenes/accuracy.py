@@ -6,12 +6,12 @@
 | stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
 | align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
-| tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
+| tumble | attitude, "1e-6 rad" | see `rotor.classical.tolerance_search`; free motion is exact | from finer steps |
 | spectrum | intensities, "0.1 %" | nothing: Q is summed to 1e-8 | of the sum Q, and rounding |
 | emission | brightness, "1 mK" | the largest least depth, in decades | lines left out, Q |
 | fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades | the next step |
 | torsion | levels | nothing: exact | functions, terms of the series |
-| gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
+| gas, fluid | see `rotor.thermodynamics.gas_numerics`, `rotor.fluids.numerics` | | |
 
 It is the numerical error with the constants as given. Their own uncertainty, and orders of distortion that they do not have, are
 beside it in a plan. What double precision cannot give is refused.
@@ -22,17 +22,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-from rotor.scenes.choice import NOTHING_CHEAPER, Accuracy, Choice, Reached, TotalAccuracy, quantity
-from rotor.scenes.numerics import choose, choose_by_knob, error_of, numerics_of
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.knob import Choice
+from rotor.scenes.choice import Accuracy, Reached, TotalAccuracy, quantity
+from rotor.scenes.numerics import choose, numerics_of
 from rotor.scenes.scene import Scene
 
-EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
-LOOSEST_COSINE = 0.05
-MOST_CONFIRMED = 6  # J max that are confirmed by whole runs of an alignment, before the one of its tolerance is taken
-LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried, times the accuracy
+CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
 
 
 def asked_of(scene: Scene) -> float | None:
@@ -45,23 +41,17 @@ def asked_of(scene: Scene) -> float | None:
     given = accuracy_text(scene)
     if given is None:
         return None
-    numerics = numerics_of(scene.kind)
-    if numerics.units:
-        return _sampled(scene, given)
-    text, scale = str(given).strip(), 1.0
-    if text.endswith("%"):
-        text, scale = text[:-1], 0.01
-    if numerics.unit == "rad":
-        text = text.removesuffix("rad").strip()
-    if scale != 1.0 and numerics.relative:
-        scale = 1.0  # in percent
-    elif scale != 1.0 and not numerics.percent:
-        raise ValueError(f"accuracy: {given!r}: expected {numerics.unit}, not a percentage")
-    unit = numerics.unit if numerics.unit in ("MHz", "K", "Å") and unit_of(scene) != "%" else ""
-    value = scale * quantity("accuracy", text, unit)
-    if not value > 0.0:
+    goals, unit, text = numerics_of(scene.kind).goals, unit_of(scene), str(given).strip()
+    if unit not in goals:
+        units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
+        raise ValueError(f"accuracy: {given!r}: expected a unit: {units}")
+    percent = text.endswith("%")
+    if percent and unit not in ("", "%"):
+        raise ValueError(f"accuracy: {given!r}: expected {unit}, not a percentage")
+    number = quantity("accuracy", text.removesuffix("%").removesuffix("rad").strip(), unit if unit in CONVERTED else "")
+    if not number > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
-    return value
+    return 0.01 * number if percent and not unit else number
 
 
 def accuracy_text(scene: Any) -> str | float | None:
@@ -77,17 +67,12 @@ def unit_of(scene: Scene) -> str:
     >>> [unit_of(GasScene(molecule="water", accuracy=one)) for one in ("1 K", "0.1 %", 0.02)]
     ['K', '%', '']
     """
-    numerics = numerics_of(scene.kind)
-    text = str(accuracy_text(scene)).strip()
-    if not numerics.units:
-        return "%" if numerics.relative and text.endswith("%") else numerics.unit
-    return "" if _of_curves(scene, text) else "%" if text.endswith("%") else "K"
-
-
-def _of_curves(scene: Any, text: str) -> bool:
-    """Whether an accuracy is that of C1 and C2: a number, or a percentage where their times are asked for; both are 1 at first."""
-    percent = text.endswith("%") and scene.kind == "gas" and scene.observables.times is not None
-    return percent or _is_number(text)
+    numerics, text = numerics_of(scene.kind), str(accuracy_text(scene)).strip()
+    first = next(iter(numerics.goals))
+    if text.endswith("%"):
+        unit = numerics.percent(scene)
+        return unit if unit in numerics.goals else first
+    return "" if _is_number(text) and ("" in numerics.goals or not numerics.bare) else first
 
 
 def _is_number(text: str) -> bool:
@@ -96,21 +81,6 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _sampled(scene: Scene, given: str | float) -> float:
-    """The accuracy of a gas or fluid in K, percent, or as a number.
-
-    Raises ValueError for a unit that the kind has not.
-    """
-    text = str(given).strip()
-    if _is_number(text) and "" not in numerics_of(scene.kind).units:
-        raise ValueError(f"accuracy: {given!r}: expected a unit: K of the conserved energy, or % of the forces")
-    percent = text.endswith("%")
-    value = quantity("accuracy", text.removesuffix("%"), "" if percent or _is_number(text) else "K")
-    if not value > 0.0:
-        raise ValueError(f"accuracy: {given!r}: expected more than 0")
-    return 0.01 * value if percent and _of_curves(scene, text) else value
 
 
 def chosen(scene: Scene, request: Any) -> Choice:
@@ -128,7 +98,7 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     asked = asked_of(scene)
     assert asked is not None
     unit = unit_of(scene)
-    error = max(error_of(scene.kind, answer, unit), choice.error)
+    error = max(numerics_of(scene.kind).goals[unit].error(answer), choice.error)
     if error > asked:
         raise out_of_reach(asked, error, unit, choice.how)
     if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):
@@ -172,115 +142,3 @@ def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
         raise ValueError(
             f"{requested} cannot be given: the total is {total:.2g} {unit}".rstrip() + f"; {largest}; {alone}"
         )
-
-
-def choose_spins(scene: Any, request: Any, asked: float) -> Choice:
-    """Spins whose constants are known are taken where they are larger than what was asked for, several by the cheapest method.
-
-    All orders of distortion that the constants have are taken: of J ≤ 40 of water, 13 ms, the orders above J⁴ are 3 ms, and those
-    above are not small beside 1 kHz.
-    """
-    top, present = request.top, request.effects
-    has_spins = any(effect.spins(top) for effect in present)
-    if top.spin_constants is None or not (has_spins or scene.effects.hyperfine is None):
-        return Choice(request, NOTHING_CHEAPER)
-    size = _spin_size(top)
-    if size <= asked and not has_spins:
-        return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
-    if len(top.spin_constants.twice) > 1 and scene.effects.hyperfine_method == EXACT:
-        return _cheapest_method(request, size, asked)
-    if has_spins:
-        return Choice(request, "with spins of nuclei: exact, nothing cheaper")
-    from rotor.quantum.effects.of_top import effects_of
-
-    return Choice(
-        replace(request, effects=effects_of(top, True)), f"with spins of nuclei, {size:.2g} MHz: exact, nothing cheaper"
-    )
-
-
-def _cheapest_method(request: Any, size: float, asked: float) -> Choice:
-    """Spins by the cheapest method that is estimated to be within what was asked for; the estimate is in the error stated.
-
-    One nucleus is exact at no more cost (docs/accuracy.md).
-    """
-    from rotor.quantum.effects.of_top import effects_of
-    from rotor.quantum.effects.watson import Centrifugal
-
-    tolerance = FOR_METHOD * asked
-    taken = effects_of(request.top, True, "auto", tolerance)
-    if not any(isinstance(one, Centrifugal) for one in request.effects):
-        taken = tuple(one for one in taken if not isinstance(one, Centrifugal))
-    how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
-    return Choice(replace(request, effects=taken), how)
-
-
-def _spin_size(top: Any) -> float:
-    """The largest size of known couplings of spins at J = 1."""
-    from rotor.quantum.effects.of_top import spin_effects
-
-    return max((effect.size_mhz(top, 1) for effect in spin_effects(top)), default=0.0)
-
-
-def rounding_mhz(levels: Any) -> float:
-    """Of the eigenvalues of some levels: that of the largest."""
-    return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
-
-
-def error_of_list(answer: Any, unit: str) -> float:
-    """The error of the lines of an answer."""
-    return _levels_error(answer.lines.top, answer.lines.levels)
-
-
-def error_of_levels(answer: Any, unit: str) -> float:
-    """The error of the levels of an answer."""
-    return _levels_error(answer.request.top, answer.table.levels)
-
-
-def _levels_error(top: Any, levels: Any) -> float:
-    """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
-    from rotor.quantum.hyperfine_method import used_method
-
-    rounding = rounding_mhz(levels)
-    has_spins = any(effect.spins(top) for effect in levels.effects)
-    if has_spins:
-        used = used_method(levels)
-        return rounding + (used.estimate_mhz if used else 0.0)
-    return rounding + (0.0 if top.spin_constants is None else _spin_size(top))
-
-
-def choose_basis(scene: Any, request: Any, asked: float) -> Choice:
-    """The loosest tolerance of those tried whose error as it is found by a run is what was asked for, and then the smallest J max.
-
-    A tolerance bounds each source of error; what a run finds is often a hundred times less.
-    """
-    from rotor.alignment.request import answer_align
-
-    found = choose_by_knob(request, asked)
-    for looser in LOOSER:
-        tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
-        trace = answer_align(tried).trace
-        if trace.error_estimate > asked:
-            continue
-        if request.jmax is not None:
-            return Choice(replace(request, tolerance=tried.tolerance), f"tolerance {tried.tolerance:g}")
-        return _least_basis(request, tried.tolerance, trace, asked)
-    return found
-
-
-def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Choice:
-    """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
-    from rotor.alignment.align import BasisTooSmallError, truncation_apart
-    from rotor.alignment.basis import least_jmax
-    from rotor.alignment.request import answer_align
-
-    first, truncation = least_jmax(trace, asked - truncation_apart(trace))
-    for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
-        smaller = replace(request, tolerance=tolerance, jmax=jmax)
-        try:
-            found = answer_align(replace(smaller, classical_molecules=0)).trace
-        except BasisTooSmallError:
-            continue
-        error = truncation_apart(found) + max(found.edge_population, truncation)
-        if error <= asked:
-            return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
-    return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")

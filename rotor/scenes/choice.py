@@ -8,10 +8,7 @@ from typing import Annotated
 import msgspec
 
 from rotor.requests.field import Field
-from rotor.requests.knob import Choice as Choice
 from rotor.requests.readers import Quantity as Number
-
-NOTHING_CHEAPER = "exact: nothing cheaper"
 
 
 class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -20,7 +20,8 @@ from rotor.temporary import locked_file
 from rotor.verbs.verb import verb_of
 
 if TYPE_CHECKING:
-    from rotor.scenes.choice import Choice, Reached
+    from rotor.requests.knob import Choice
+    from rotor.scenes.choice import Reached
     from rotor.table import Table
 
 

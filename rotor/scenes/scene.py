@@ -24,8 +24,8 @@ from rotor.verbs.tables import said
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
 if TYPE_CHECKING:
+    from rotor.requests.plan import Plan
     from rotor.scenes.choice import Reached
-    from rotor.scenes.plan_parts import Plan
     from rotor.table import Table
 
 SCHEMA = 1

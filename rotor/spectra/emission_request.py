@@ -21,7 +21,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hamiltonian_input import effects_of_each_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, part
-from rotor.requests.knob import Knob, Measure
+from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.readers import Custom, Each, Quantity, Range
 from rotor.spectra.emission import (
     BACKGROUND_K,
@@ -138,7 +138,7 @@ def _brightness_error(answer: Any, reference: Any) -> float:
 
 DEPTH = Knob(
     lambda request: [request.least_depth * more for more in (1e5, 1e4, 1e3, 1e2, 1e1)], lambda request: 1e-2 * request.least_depth,
-    (Measure("brightness", "K", _brightness_error),), "a least depth of {:g}",
+    (Measure("brightness", "K", _brightness_error),), "a least depth of {:g}", tried=DECADES,
 )  # fmt: skip
 
 

@@ -258,6 +258,7 @@ VERB = Verb(
     read_extras=read_pulses,
     build=build,
     sound=False,
+    numerics="rotor.alignment.numerics:ALIGN",
     accuracy="of the cosines",
     accuracy_example=1e-4,
     start={

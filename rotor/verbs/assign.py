@@ -182,6 +182,7 @@ VERB = Verb(
     answer=lambda request, work: answer_assign(request),
     table=lambda answer: answer.table,
     rows="assignments",
+    numerics="rotor.assignment.numerics:ASSIGN",
     show=show,
     outputs=(
         Output("csv", (".csv",), "Write every peak with its assignment as CSV", example="assigned.csv"),

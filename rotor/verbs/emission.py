@@ -358,6 +358,7 @@ VERB = Verb(
     notes=lambda answer: answer.notes,
     drawn="MHz",
     spectral=True,
+    numerics="rotor.spectra.numerics:EMISSION",
     accuracy="of the brightness",
     accuracy_example="1 mK",
     start={

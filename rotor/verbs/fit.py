@@ -351,6 +351,7 @@ VERB = Verb(
     content=content,
     notes=lambda answer: (*answer.request.notes, *answer.fit.notes),
     drawn=None,
+    numerics="rotor.formats.fit_numerics:FIT",
     accuracy="of the frequencies of the lines, or of the constants (% of their standard errors)",
     sound=False,
     build=build,

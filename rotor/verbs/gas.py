@@ -161,6 +161,7 @@ VERB = Verb(
     drawn="ps",
     scaled=False,
     adapt=adapt,
+    numerics="rotor.thermodynamics.gas_numerics:GAS",
     accuracy="of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)",
     accuracy_example="1 K",
     start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "gas.csv"},

@@ -157,6 +157,7 @@ VERB = Verb(
             "--k", "A:B", "First and last |K|, or Ka (Kc of a near-oblate top); or one K", _span("k"), (), OBSERVABLES
         ),
     ),
+    numerics="rotor.quantum.estimates.accuracy:LEVELS",
     accuracy="of the energies",
     start={"molecule": "water", "observables.jmax": 10, "outputs.csv": "levels.csv"},
 )

@@ -121,6 +121,7 @@ VERB = Verb(
     notes=lambda answer: answer.lines.warnings,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="cm-1",
+    numerics="rotor.spectra.numerics:RAMAN",
     accuracy="of the shifts, or of the cross sections of each line and of all together (%)",
     start={"molecule": "N2", "conditions.temperature": "300 K", "outputs.csv": "raman.csv"},
 )

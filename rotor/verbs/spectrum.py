@@ -316,5 +316,6 @@ VERB = Verb(
     build=build,
     adapt=adapt,
     check=check,
+    numerics="rotor.spectra.numerics:SPECTRUM",
     accuracy="of the frequencies, or of the intensities of each line and of all together (%)",
 )

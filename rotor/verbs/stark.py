@@ -215,6 +215,7 @@ VERB = Verb(
     workers="blocks of states",
     check=check,
     sound=False,
+    numerics="rotor.quantum.fields.numerics:STARK",
     accuracy="of the energies",
     start={"molecule": "OCS", "conditions.field": "0:200kV/cm:201", "outputs.csv": "stark.csv"},
 )

@@ -213,6 +213,7 @@ VERB = Verb(
     ),
     subject=Isotopologues(),
     shown=ErrorsShown,
+    numerics="rotor.formats.structure_request:STRUCTURE",
     accuracy="of the bond lengths",
     accuracy_example="0.001 Å",
     notes=lambda answer: answer.notes,

@@ -176,6 +176,7 @@ VERB = Verb(
             True,
         ),
     ),
+    numerics="rotor.thermodynamics.numerics:THERMO",
     accuracy="of Q, U and C_v",
     accuracy_example="0.1 %",
     start={"molecule": "water", "conditions.temperature": "10:1000K:100", "outputs.csv": "thermo.csv"},

@@ -153,6 +153,7 @@ VERB = Verb(
     ),
     content=content,
     notes=lambda answer: answer.warnings,
+    numerics="rotor.thermodynamics.numerics:TORSION",
     accuracy="of the levels",
     sound=False,  # a potential is read, and a scan fails, where it is made
     drawn="",

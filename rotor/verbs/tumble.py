@@ -311,6 +311,7 @@ VERB = Verb(
     build=build,
     check=check,
     short=is_short,
+    numerics="rotor.classical.numerics:TUMBLE",
     accuracy="of the attitude",
     accuracy_example="1e-6 rad",
     start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "tumble.csv"},

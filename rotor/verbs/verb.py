@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +196,8 @@ class Verb:
     to draw. drawn: unit of the horizontal axis of the picture, None where there is none to change; spectral: a picture of a spectrum;
     scaled: with --plot-scale. workers: what --workers spreads. start: what a template has switched on. extras: options that stand for
     several fields. short: of a request that plain Python answers before a compiler would be loaded.
-    accuracy: of what a scene may ask one. sound: a request that was accepted has no mistake of the user.
+    accuracy: of what a scene may ask one. numerics: "module:name" of a `rotor.requests.numerics.Numerics`, loaded where it is used.
+    sound: a request that was accepted has no mistake of the user.
 
     withheld: of files that are named, why some are not written. failure: why an answer that is shown is no result.
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
@@ -224,6 +226,7 @@ class Verb:
     extras: tuple[Extra, ...] = ()
     accuracy: str = ""
     accuracy_example: Any = "1 kHz"
+    numerics: str = ""
     sound: bool = True
     short: Callable[[Any], bool] = lambda request: False
     withheld: Callable[[Any, Sequence[str]], Mapping[str, str]] = lambda answer, names: {}
@@ -233,6 +236,13 @@ class Verb:
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
     read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     records: Callable[[Any], Table | None] | None = None
+
+    def load_numerics(self) -> Any:
+        """How accuracy is chosen, swept and planned; the knobs of the fields alone where nothing else is named."""
+        from rotor.requests.numerics import Numerics
+
+        module, _, name = self.numerics.partition(":")
+        return getattr(import_module(module), name) if module else Numerics()
 
     @cached_property
     def fields(self) -> dict[str, Field]:

@@ -198,6 +198,7 @@ VERB = Verb(
     workers="blocks of states",
     check=check,
     sound=False,
+    numerics="rotor.quantum.fields.numerics:ZEEMAN",
     accuracy="of the energies",
     accuracy_example="1 Hz",
     start={"molecule": "OCS", "magnetic.g": [-0.03], "conditions.field": "0:5T:51", "outputs.csv": "zeeman.csv"},

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 from rotor.classical.step_errors import error_by_finer
-from rotor.scenes.choice import NOTHING_CHEAPER, Choice
-from rotor.scenes.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
+from rotor.requests.knob import Choice
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -90,31 +90,14 @@ class Planned:
         return tolerance_of(self.decade)
 
 
-def planned_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Planned:
+def planned_tolerance(request: DrivenRequest, asked: float) -> Planned:
     """The loosest tolerance, in decades, that reaches an accuracy in radians, by the whole motion or, of a long one, by its first part.
 
-    Parameters
-    ----------
-    scene : TumbleScene
-        Without a tolerance or step of its own.
-    request : DrivenRequest
-        That of the scene.
-    asked : float
-        In radians, of the attitude at every time.
-
-    Returns
-    -------
-    Planned
-        The same for a plan and for a run.
-
-    Raises
-    ------
-    ValueError
-        Where a knob is given by hand as well, and where double precision does not reach it.
+    The same for a plan and for a run. Raises ValueError where a knob is given too, and where double precision does not reach it.
     """
     from rotor.classical.driven import DEFAULT_TOLERANCE
 
-    if scene.numerics.tolerance != DEFAULT_TOLERANCE or scene.numerics.step is not None:
+    if request.tolerance != DEFAULT_TOLERANCE or request.step is not None:
         raise ValueError("accuracy and numerics: give one of them")
     if _is_long(request, asked):
         _refuse_endless(request, asked)
@@ -184,29 +167,12 @@ def _growth(middle: float, end: float) -> float:
     return float(BEGINNINGS**REGULAR)
 
 
-def choose_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Choice:
-    """The request with the tolerance that a plan names, and the error that is found with it.
+def choose_tolerance(request: DrivenRequest, asked: float) -> Choice:
+    """The request with the tolerance that a plan names, or a finer one where that misses, and the error that is found with it.
 
-    Parameters
-    ----------
-    scene : TumbleScene
-        Without a tolerance or step of its own.
-    request : DrivenRequest
-        That of the scene.
-    asked : float
-        In radians, of the attitude at every time.
-
-    Returns
-    -------
-    Choice
-        With the error that was found; of a finer tolerance where that of the plan misses.
-
-    Raises
-    ------
-    ValueError
-        Where a knob is given by hand as well, and where double precision does not reach it.
+    Raises ValueError where a knob is given too, and where double precision does not reach it.
     """
-    planned = planned_tolerance(scene, request, asked)
+    planned = planned_tolerance(request, asked)
     if planned.error is not None:
         return Choice(replace(request, tolerance=planned.tolerance), planned.how, planned.error)
     motions = _Motions(request)
@@ -244,21 +210,3 @@ def _refusal(asked: float, error: float) -> str:
         f"accuracy: {asked:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
         "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
     )
-
-
-def choose(scene: Any, request: Any, asked: float) -> Choice:
-    """The settings of a motion: nothing of a free one, else the tolerance."""
-    from rotor.classical.tumble import TumbleRequest
-
-    return (
-        Choice(request, NOTHING_CHEAPER)
-        if isinstance(request, TumbleRequest)
-        else choose_tolerance(scene, request, asked)
-    )
-
-
-def error_of_motion(answer: Any, unit: str) -> float:
-    """Round-off of a free motion; the error of steps was found when they were chosen."""
-    from rotor.classical.tumble import TumbleAnswer
-
-    return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0

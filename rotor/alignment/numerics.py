@@ -1,0 +1,115 @@
+"""Accuracy and plans of alignment: the loosest tolerance and the smallest J max whose cosines are within an accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from rotor.alignment.align import BasisTooSmallError, truncation_apart
+from rotor.alignment.basis import least_jmax, trace_with
+from rotor.alignment.request import AlignRequest, answer_align, cosine_error
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.plans import of_top
+from rotor.quantum.fields.knobs import largest_difference
+from rotor.requests.field import own_fields
+from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps, ladder
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import Plan, peak_mb, timed
+
+MORE_J = 6  # in the reference
+SHARES_OF_J = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+LOOSEST_COSINE = 0.05
+MOST_CONFIRMED = 6  # J max that are confirmed by whole runs, before the one of its tolerance is taken
+LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried, times the accuracy
+
+
+def sweeps_of_align(request: Any) -> Sweeps:
+    """J max of the basis, and the number of classical molecules."""
+    found = answer_align(replace(request, classical_molecules=0)).trace
+    shares = {round(share * found.jmax) for share in SHARES_OF_J} | {found.jmax - 1}
+    values = sorted(j for j in shares if j >= found.ensemble.jmax)
+    basis = tuple(Setting(str(j), j, j == found.jmax) for j in values)
+    beyond, measure = found.jmax + MORE_J, Measure("cosine", "", cosine_error)
+    knobs = [Sweep("numerics.jmax", (measure,), basis, beyond, f"J max {beyond}", partial(trace_with, found))]
+    if request.classical_molecules:
+        knobs.append(_classical(request))
+    return Sweeps(tuple(knobs))
+
+
+def _classical(request: Any) -> Sweep:
+    """The number of classical molecules, whose error is that of a mean."""
+
+    def error(found: Any, reference: Any) -> float:
+        return max(largest_difference(found.classical[name], true) for name, true in reference.classical.items())
+
+    coarse = replace(request, tolerance=max(request.tolerance, 1e-2))  # the quantum gas beside it does not matter here
+    own = request.classical_molecules
+    counts = ladder(
+        (own / 64, own / 16, own / 4),
+        own,
+        lambda n: replace(coarse, classical_molecules=max(int(n), 2)),
+        "{:.0f}".format,
+    )
+    most = replace(coarse, classical_molecules=16 * own, seed=request.seed + 1)
+    measure = Measure("cosine of the classical gas", "", error)
+    return Sweep(
+        "observables.classical_molecules", (measure,), counts, most, f"{16 * own} other molecules", answer_align
+    )
+
+
+def choose_basis(scene: Any, request: Any, asked: float) -> Choice:
+    """The loosest tolerance of those tried whose error as it is found by a run is what was asked for, and then the smallest J max.
+
+    A tolerance bounds each source of error; what a run finds is often a hundred times less.
+    """
+    structure: Any = AlignRequest
+    field = own_fields(structure)["tolerance"]
+    found: Choice = field.knob.choose(field, request, asked, answer_align)
+    for looser in LOOSER:
+        tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
+        trace = answer_align(tried).trace
+        if trace.error_estimate > asked:
+            continue
+        if request.jmax is not None:
+            return Choice(replace(request, tolerance=tried.tolerance), f"tolerance {tried.tolerance:g}")
+        return _least_basis(request, tried.tolerance, trace, asked)
+    return found
+
+
+def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Choice:
+    """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
+    first, truncation = least_jmax(trace, asked - truncation_apart(trace))
+    for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
+        smaller = replace(request, tolerance=tolerance, jmax=jmax)
+        try:
+            found = answer_align(replace(smaller, classical_molecules=0)).trace
+        except BasisTooSmallError:
+            continue
+        error = truncation_apart(found) + max(found.edge_population, truncation)
+        if error <= asked:
+            return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
+    return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
+
+
+def plan_of_align(request: Any) -> Plan:
+    """The plan of a gas under pulses: timed with a coarse tolerance, by whose fourth root the steps grow."""
+    coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
+    trace = answer_align(coarse).trace
+    seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
+    described = of_top(request.top, max(trace.ensemble.jmax, 1), SEMI_RIGID)
+    basis = f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"
+    method = f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree"
+    return Plan(
+        kind="align",
+        effects=(*described["effects"], *(f"pulse on the {one.acts_on}" for one in request.pulses)),
+        good=("M",) if all(one.axis == (0, 0, 1) for one in request.pulses) else (),
+        parts=(("basis", f"J to {request.jmax}" if request.jmax else basis), ("method", method)),
+        counts={"initial states": trace.states, "times": request.points},
+        seconds=seconds,
+        memory_mb=peak_mb(lambda: answer_align(replace(coarse, points=request.points))),
+        left_out=described["left_out"],
+    )
+
+
+ALIGN = Numerics({"": Goal("cosines", choose_basis)}, sweeps=sweeps_of_align, plan=plan_of_align)

@@ -1,0 +1,38 @@
+"""Plan of a search for constants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotor.requests.knob import Sweeps
+from rotor.requests.numerics import Numerics
+from rotor.requests.plan import Plan
+
+
+def plan_of_assign(request: Any) -> Plan:
+    """What a search for constants will do; its time is bounded by the seconds of the request."""
+    peaks = request.peaks
+    known = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
+    bounds = request.bounds
+    limits = ", ".join(
+        f"{name} {low:g} to {high:g}" for name, low, high in zip("ABC", bounds.low, bounds.high, strict=True)
+    )
+    return Plan(
+        kind="assign",
+        effects=("rigid", "quartic distortion"),
+        good=("J",),
+        parts=(
+            ("method", "families of three lines on the strongest peaks, evidence against chance, refinement by a fit"),
+            ("bounds", f"{limits} MHz"),
+            ("temperature", known),
+        ),
+        counts={"peaks": len(peaks), "species": request.species},
+        seconds=float(min(request.seconds, 1.0 + request.species)),
+        memory_mb=150.0,
+    )
+
+
+ASSIGN = Numerics(
+    sweeps=lambda request: Sweeps((), ("search: seeded; how sure the answer is stands with it as a probability",)),
+    plan=plan_of_assign,
+)

@@ -1,0 +1,166 @@
+"""Accuracy and plan of the motion of one body: exact where it is free, else the steps, their tolerance and their number."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rotor.classical.driven import answer_driven
+from rotor.classical.motion_steps import beginning, expected_steps, first_share, is_compiled, some_steps, steps_of
+from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
+from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
+from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import LONG_SEARCH, LeftOut, Plan, peak_mb, timed
+
+if TYPE_CHECKING:
+    from rotor.classical.driven import DrivenRequest
+
+ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
+NAME = "error of the steps"
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+FINEST_TOLERANCE = 1e-13
+DIVISIONS = (8, 16, 32, 64, 128)  # of the duration: steps of a splitting, times 16
+ORDERS = (2, 4, 6, 8)
+
+
+def choose(scene: Any, request: Any, asked: float) -> Choice:
+    """The settings of a motion: nothing of a free one, else the tolerance."""
+    free = isinstance(request, TumbleRequest)
+    return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, asked)
+
+
+def error_of_motion(answer: Any) -> float:
+    """Round-off of a free motion; the error of steps was found when they were chosen."""
+    return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
+
+
+def sweeps_of_tumble(request: Any) -> Sweeps:
+    """Tolerance and step of a driven motion."""
+    if isinstance(request, TumbleRequest):
+        return Sweeps((), (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",))
+    measure = Measure("attitude", "rad", lambda answer, reference: apart(answer.motion, reference.motion))
+    finest = replace(request, step=None, tolerance=min(FINEST_TOLERANCE, 1e-2 * request.tolerance))
+    against = f"steps to {finest.tolerance:g}"
+    own = request.tolerance if request.step is None else None
+    settings = ladder(TOLERANCES, own, lambda one: replace(request, step=None, tolerance=one))
+    knobs = [Sweep("numerics.tolerance", (measure,), settings, finest, against, answer_driven)]
+    remark = _refusal(request)
+    if remark is None:
+        knobs += [_splitting(request, order, finest, measure, against) for order in ORDERS]
+    return Sweeps(tuple(knobs), () if remark is None else (f"numerics.step: {remark}",))
+
+
+def _refusal(request: Any) -> str | None:
+    """Why no splitting serves these effects; None where one does."""
+    first, second = request.times[:2]
+    try:
+        answer_driven(replace(request, times=(first, second), step=(second - first) / 4))
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+def _splitting(request: Any, order: int, finest: Any, measure: Measure, against: str) -> Sweep:
+    span = abs(request.times[-1] - request.times[0])
+    own = request.step if request.step is not None and request.order == order else None
+    steps = [span / (16 * number) for number in DIVISIONS]
+    settings = ladder(steps, own, lambda one: replace(request, step=one, order=order), "{:.3g}".format)
+    return Sweep(f"numerics.step, order {order}", (measure,), settings, finest, against, answer_driven)
+
+
+def step_error(request: Any, steps: int) -> LeftOut:
+    """The largest error of an attitude in radians at the times of a request whose motion has so many steps."""
+    if steps <= (MOST_STEPS if is_compiled(request) else MOST_CALLED):
+        term = answer_driven(request).errors.truncation
+        return LeftOut(NAME, term.value, "rad", f"{term.source}; chaos makes it grow")
+    if request.step is not None:
+        return LeftOut(NAME, None, "rad", "halve numerics.step")
+    basis = f"at most, {steps} steps each to {request.tolerance:g} of |L| and of a radian; chaos makes it grow"
+    return LeftOut(NAME, steps * request.tolerance, "rad", basis)
+
+
+def plan_of_motion(request: Any) -> Plan:
+    """The plan of a free or driven motion with the settings of its request."""
+    if not isinstance(request, TumbleRequest):
+        return _driven(request)
+    return Plan(
+        kind="tumble",
+        effects=("free rotation",),
+        good=("energy", "angular momentum in space"),
+        parts=(("method", "the exact free motion (theta functions): no step, round-off alone"),),
+        counts={"times": len(request.times or ()) or 201},
+        seconds=timed(lambda: answer_tumble(request)),
+        memory_mb=peak_mb(lambda: answer_tumble(request).table.columns),
+    )
+
+
+def planned(scene: Any, request: Any, asked: float) -> tuple[Plan, Choice | None]:
+    """The plan of a motion with the tolerance that its run takes, and that choice where the whole motion was searched.
+
+    Of a long motion that is found by its first part; the run then makes a motion a hundred times finer beside it, for the error.
+    """
+    if isinstance(request, TumbleRequest):
+        choice = choose(scene, request, asked)
+        plan = plan_of_motion(request)
+        return replace(plan, parts=(*plan.parts, ("accuracy", choice.how))), choice
+    searched: list[Planned] = []
+    search = timed(lambda: searched.append(planned_tolerance(request, asked)), LONG_SEARCH)
+    found = searched[-1]
+    chosen = replace(request, tolerance=found.tolerance)
+    plan = _driven(chosen, found.steps, found.error)
+    parts = (*plan.parts, ("accuracy", found.how))
+    if found.steps is not None:
+        choice = Choice(chosen, found.how, found.error or 0.0)
+        return replace(plan, parts=parts, seconds=search + plan.seconds), choice
+    finer = 10.0 ** (FINER / ORDER)  # times as many steps
+    return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds), None
+
+
+def _driven(request: DrivenRequest, known_steps: int | None = None, known_error: float | None = None) -> Plan:
+    steps = expected_steps(request) if known_steps is None else known_steps
+    if known_error is None:
+        error = step_error(request, steps)
+    else:
+        error = LeftOut(NAME, known_error, "rad", f"{steps} steps, found by the search for the accuracy")
+    return Plan(
+        kind="tumble",
+        effects=tuple(type(effect).__name__ for effect in request.effects),
+        good=("energy",) if all(effect.conserves_energy for effect in request.effects) else (),
+        parts=(("method", _stepping(request, steps)),),
+        counts={"steps": steps, "times": len(request.times)},
+        seconds=_seconds_of_steps(request, steps),
+        memory_mb=_memory_mb(request),
+        left_out=(error,),
+    )
+
+
+def _stepping(request: DrivenRequest, steps: int) -> str:
+    if request.step is not None:
+        return f"splitting of order {request.order}, step {request.step:g}"
+    mean = abs(request.times[-1] - request.times[0]) / steps
+    return f"Runge-Kutta of order {ORDER}, adaptive, tolerance {request.tolerance:g} of a step; {mean:.3g} a step in the mean"
+
+
+def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
+    """Processor time of a driven motion: its first steps are made one by one and the further ones compiled, so two parts are timed."""
+    some, more = some_steps(request)
+    if steps < more * some:
+        return timed(lambda: steps_of(request, 1.0))
+    counts, seconds = [], []
+    for share in (some / steps, more * some / steps):
+        seconds.append(timed(lambda share=share: counts.append(steps_of(request, share))))  # type: ignore[misc]
+    near, far = counts[0], counts[-1]
+    rate = max(seconds[1] - seconds[0], 0.0) / max(far - near, 1)
+    return seconds[0] + rate * max(steps - near, 0)
+
+
+def _memory_mb(request: DrivenRequest) -> float:
+    first = beginning(request, first_share(request))
+    return peak_mb(lambda: answer_driven(first).table.columns) * len(request.times) / len(first.times)
+
+
+TUMBLE = Numerics(
+    {"rad": Goal("attitude", choose, error_of_motion)}, sweeps=sweeps_of_tumble, plan=plan_of_motion, planned=planned
+)

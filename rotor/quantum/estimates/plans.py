@@ -1,0 +1,114 @@
+"""What a plan says of levels: effects with their sizes, good quantum numbers, basis, blocks and method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.estimates.left_out import left_out_of_levels
+from rotor.requests.plan import Growth, Plan
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.internal_rotation import InternalRotationConstants
+    from rotor.tops.top import Top
+
+SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
+ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
+MOST_J_COMPARED = {1: 30, 2: 8}  # J up to which the truncation of the torsion is compared, by the number of tops
+
+
+def of_top(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
+    """Effects, good quantum numbers and what is left out, as fields of a plan."""
+    left_out = left_out_of_levels(top, j, effects)
+    return {"effects": effect_texts(top, j, effects), "good": good_numbers(top, effects), "left_out": left_out}
+
+
+def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
+    """Basis, blocks and method of the levels of a top."""
+    from rotor.quantum.estimates.convergence import converges_to
+    from rotor.quantum.wang.basis import wang_blocks
+    from rotor.quantum.wang.rotation import representation_of
+
+    spins = [spin for effect in effects for spin in effect.spins(top)]
+    if top.internal_rotation is not None:
+        return torsional_parts(top, top.internal_rotation, jmax)
+    if top.kind in ("linear", "spherical", "prolate", "oblate"):
+        basis, method = f"J to {jmax}; no matrix", f"closed form: H is diagonal in the basis of a {top.kind} top"
+    else:
+        largest = max(block.size for block in wang_blocks(jmax, representation_of(top)))
+        basis = f"J to {jmax}; four Wang blocks of each J, of up to {largest} states"
+        method = f"Wang blocks one by one, {representation_of(top)}; {ENERGY}"
+    parts = [("basis", basis), ("method", method)]
+    if (reach := converges_to(top, jmax, effects)) < jmax:
+        parts.append(
+            (
+                "warning",
+                f"the distortion series converges to J = {reach}; energies above at the highest K are not to be trusted",
+            )
+        )
+    if spins:
+        size = math.prod(spin.twice + 1 for spin in spins)
+        parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))
+    return parts
+
+
+def _names(spins: Sequence[Any]) -> str:
+    return ", ".join(dict.fromkeys(spin.name for spin in spins))
+
+
+def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
+    from rotor.quantum.effect import effect_sizes
+
+    return tuple(f"{one.name}, {one.size_mhz:.2g} MHz at J = {j}" for one in effect_sizes(top, j, effects))
+
+
+def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
+    """Quantum numbers that stay good under the effects, as the levels have them."""
+    from rotor.quantum.solve import solve_levels
+
+    return solve_levels(top, 1, effects=effects, vectors=False).quanta_names
+
+
+def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -> list[tuple[str, str]]:
+    """Basis, method and truncation error of levels with an internal rotor."""
+    from rotor.quantum.internal_rotation.levels import turning_tops
+    from rotor.quantum.internal_rotation.truncation import truncation_mhz
+
+    count = constants.functions
+    size = (2 * jmax + 1) * count
+    compared = min(jmax, MOST_J_COMPARED[constants.tops])
+    error = truncation_mhz(turning_tops(top, constants), compared, constants.vt_max, count)
+    functions = "torsional functions" if constants.tops == 1 else "products of torsional functions"
+    return [
+        ("basis", f"J to {jmax}; {count} {functions} for each K, blocks of up to {size} states"),
+        ("method", f"torsion of each K and species first; {ENERGY}"),
+        ("truncation", f"at most {error:.1g} MHz at J = {compared}, v_t up to {constants.vt_max}"),
+    ]
+
+
+def plan_of_levels(request: Any) -> Plan:
+    """The plan of a list of levels."""
+    from rotor.quantum.request import answer_levels
+
+    top, jmax, first = request.top, request.jmax, request.jmin
+    plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
+
+    def work(j: int) -> float:
+        """Blocks of an asymmetric top are diagonalised."""
+        return (j + 1.0) ** (3 if top.kind == "asymmetric" else 1)
+
+    count = (jmax + 1) ** 2 - first**2 if top.kind == "asymmetric" else jmax + 1 - first
+    if top.kind in ("prolate", "oblate"):
+        count = (jmax + 1) * (jmax + 2) // 2 - first * (first + 1) // 2
+    cost = Growth(lambda j: answer_levels(replace(plain, jmax=j)).table.columns, jmax, SHORT_J, work, work)
+    return Plan(
+        kind="levels",
+        **of_top(top, max(jmax, 1), request.effects),
+        parts=tuple(level_parts(top, jmax, request.effects)),
+        counts={"levels": count},
+        seconds=cost.seconds,
+        memory_mb=cost.memory_mb,
+    )

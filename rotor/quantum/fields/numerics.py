@@ -1,0 +1,110 @@
+"""Accuracy and plans of levels in a field: J max of the basis, beside the knob of the tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rotor.quantum.effects.stark import map_request
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.plans import of_top
+from rotor.quantum.fields.block_states import block_states
+from rotor.quantum.fields.field_map import each_block
+from rotor.quantum.fields.knobs import ENERGY, largest_difference
+from rotor.quantum.fields.stark_request import answer_stark
+from rotor.quantum.fields.zeeman_request import answer_zeeman
+from rotor.requests.knob import Measure, Setting, Sweep, Sweeps, ladder
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import Growth, Plan
+
+MORE_J = 6  # in the reference
+SHORT_FIELDS = (2, 20)  # of the calibration
+
+
+def sweeps_of_stark(request: Any) -> Sweeps:
+    """J max of the basis of levels in an electric field."""
+    # energies alone decide on a basis that is to be seen failing
+    plain = replace(request, diabatic_gap_mhz=None, most_at_edge=1.0)
+    jmax = int(answer_stark(plain).states.jmax)
+    basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda one: (plain, int(one)))
+    beyond, energy = jmax + MORE_J, Measure("energy", "MHz", largest_difference)
+    return Sweeps((Sweep("numerics.jmax", (energy,), basis, (plain, beyond), f"J max {beyond}", _energies),))
+
+
+def sweeps_of_zeeman(request: Any) -> Sweeps:
+    """J max of the basis of levels in a magnetic field, where it is given."""
+    if request.jmax is None:
+        return Sweeps(())
+    beyond = replace(request, jmax=request.jmax + MORE_J)
+    settings = (Setting(str(request.jmax), request, True),)
+    return Sweeps((Sweep("numerics.jmax", (ENERGY,), settings, beyond, f"J max {beyond.jmax}", answer_zeeman),))
+
+
+def _energies(asked: tuple[Any, int]) -> Any:
+    """Energies of all states of a map with one J max of the basis, however small: a map itself refuses one that is too small."""
+    request, jmax = asked
+    of_map = map_request(
+        request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
+        request.direction, request.tolerance_mhz, None, request.effects,
+    )  # fmt: skip
+    parts = each_block(of_map, jmax, partial(_of_block, of_map, jmax))
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _of_block(request: Any, jmax: int, block: Any) -> Any:
+    found = block_states(request, block, request.fields, jmax)
+    return found.energies[:, block.levels.j[found.rows] <= request.j_highest]
+
+
+def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: dict[str, str]) -> Plan:
+    """The plan of levels in a field: J max and the error are those at the ends of the fields. name: of the request's fields."""
+    fields, top, j = getattr(request, name), request.top, max(request.j_highest, 1)
+
+    def at(values: tuple[float, ...]) -> Any:
+        """The answer at some of the fields."""
+        return answer(replace(request, **{name: values}))
+
+    facts = at(tuple(dict.fromkeys((min(fields), max(fields))))).facts()
+    lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
+    cost = Growth(lambda n: at(tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
+    described = of_top(top, j, request.effects or SEMI_RIGID)
+    acts = words["acts"].format(max(map(abs, fields)))
+    error = f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off"
+    return Plan(
+        kind=words["kind"],
+        effects=(*described["effects"], acts),
+        good=() if getattr(request, "tilted", False) else ("M_F" if request.hyperfine else "M",),
+        parts=(
+            ("basis", f"J to {facts['jmax']}: the tolerance of {request.tolerance_mhz:g} MHz at the highest field"),
+            ("method", f"exact blocks of one {words['good']} (and K, or D2 species), every field diagonalised"),
+            ("error", error),
+        ),
+        counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
+        seconds=cost.seconds,
+        memory_mb=cost.memory_mb,
+        left_out=tuple(one for one in described["left_out"] if one.name != words.get("within")),
+    )
+
+
+def _plan_of_stark(request: Any) -> Plan:
+    words = {
+        "kind": "stark",
+        "acts": "dipole in the field, up to {:g} kV/cm",
+        "good": "|M|",
+        "within": "Stark shift of a stray field",
+    }
+    followed = replace(request, diabatic_gap_mhz=None)
+    return plan_in_field(followed, answer_stark, "fields_kv_per_cm", words)
+
+
+def _plan_of_zeeman(request: Any) -> Plan:
+    words = {"kind": "zeeman", "acts": "magnetic moments in the field, up to {:g} T", "good": "M"}
+    return plan_in_field(request, answer_zeeman, "fields_tesla", words)
+
+
+STARK = Numerics({"MHz": Goal("energies")}, sweeps=sweeps_of_stark, plan=_plan_of_stark)
+ZEEMAN = Numerics({"MHz": Goal("energies")}, sweeps=sweeps_of_zeeman, plan=_plan_of_zeeman)

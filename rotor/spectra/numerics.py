@@ -1,0 +1,256 @@
+"""Accuracy and plans of lists of lines and of Raman lines: frequencies, intensities, J max; widths that a list leaves out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rotor.quantum.estimates.accuracy import (
+    choose_spins,
+    distortion,
+    energies_like,
+    hyperfine,
+    largest,
+    levels_error,
+    of_states,
+    rounding_of,
+)
+from rotor.quantum.estimates.left_out import left_out_of_levels
+from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, of_top
+from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_of_whole
+from rotor.spectra.intensity_accuracy import Cut, error_of_intensities
+from rotor.spectra.widths import doppler, pressure_width
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+SHARES_OF_J = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)  # of the J max of the scene
+BEYOND = 1.3  # times that J max: the reference
+
+
+def line_error(found: Any, reference: Any) -> float:
+    """The largest difference in MHz of a frequency of the reference's lines, from the levels of another list."""
+    energies = energies_like(reference.levels, found.levels)
+    return largest(energies[reference.upper] - energies[reference.lower] - reference.frequency_mhz)
+
+
+def shift_error(found: Any, reference: Any) -> float:
+    """The largest difference in MHz of a Raman shift of the reference's lines, from the levels of another list."""
+    energies = energies_like(reference.levels, found.levels)
+    return largest(energies[reference.final] - energies[reference.initial] - reference.shift_mhz)
+
+
+def error_of_list(answer: Any) -> float:
+    """The error of the frequencies of lines in MHz."""
+    return levels_error(answer.lines.top, answer.lines.levels)
+
+
+def sweeps_of_lines(
+    request: Any, answer: Callable[[Any], Any], measure: Measure, error: Callable[[Any, Any], float], of: str
+) -> Sweeps:
+    """J max by a measure; orders of distortion and methods of hyperfine structure by the error of the frequencies."""
+    jmax = answer(request).lines.jmax
+    fixed, beyond = replace(request, jmax=jmax), math.ceil(BEYOND * jmax) + 1
+    values = sorted({max(1, round(share * jmax)) for share in SHARES_OF_J})
+    settings = tuple(Setting(str(j), replace(request, jmax=j), j == jmax) for j in values)
+    reach = Sweep("numerics.jmax", (measure,), settings, replace(request, jmax=beyond), f"J max {beyond}", answer)
+
+    def of_lines(found: Any, reference: Any) -> float:
+        return error(found.lines, reference.lines)
+
+    further = (*distortion(fixed, of_lines, of, answer), *hyperfine(fixed, of_lines, of, answer))
+    return Sweeps((reach, *further), of_states(request.top))
+
+
+def _sweeps_of_spectrum(request: Any) -> Sweeps:
+    from rotor.spectra.request import INTENSITY, answer_spectrum
+
+    return sweeps_of_lines(request, answer_spectrum, INTENSITY, line_error, "frequency of a line")
+
+
+def _sweeps_of_raman(request: Any) -> Sweeps:
+    from rotor.spectra.raman_request import SECTION, answer_raman
+
+    return sweeps_of_lines(request, answer_raman, SECTION, shift_error, "shift of a line")
+
+
+def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
+    """J max of a list of lines, and why."""
+    from rotor.spectra.intensity import jmax_for_cut
+    from rotor.thermodynamics import partition_function
+
+    if request.jmax is not None:
+        return request.jmax, "given"
+    top, kelvin = request.top, request.temperature_k
+    cut = -math.inf if request.min_lgint is None else request.min_lgint
+    q = request.q or partition_function(top, kelvin).q
+    dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
+    return jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "what the cut needs"
+
+
+def allowed_lines(top: Top, jmax: int) -> int:
+    """How many dipole lines of a semi-rigid top the selection rules allow up to a J max: blocks that a component connects.
+
+    μ_a keeps the parity of Ka, μ_c that of Kc, μ_b changes both; lines of a linear or symmetric top have ΔJ = 1 and ΔK = 0. Levels
+    of spin weight 0 do not exist.
+
+    >>> from rotor.tops.top import Top
+    >>> allowed_lines(Top.from_constants("A=10 B=6 C=4 GHz", dipole_abc_debye=(1, 0, 0)), 1)  # 1(0,1)-0(0,0), 1(1,0)-1(1,1)
+    2
+    """
+    from rotor.quantum.solve import solve_levels
+    from rotor.quantum.wang.basis import wang_blocks
+    from rotor.quantum.wang.rotation import representation_of
+
+    dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
+    if not any(dipole):
+        return 0
+    if top.kind != "asymmetric":
+        levels = solve_levels(top, jmax, vectors=False)
+        return int(((levels.weight > 0) & (levels.rotational < jmax)).sum())
+    weights = top.spin_weights.to_mapping()
+    blocks = [
+        {b.species: b.size for b in wang_blocks(j, representation_of(top)) if weights.get(b.species, 1)}
+        for j in range(jmax + 1)
+    ]
+    flips = [flip for mu, flip in zip(dipole, ((False, True), (True, True), (True, False)), strict=True) if mu]
+    total = 0
+    for j, level in enumerate(blocks):
+        for up in (level, blocks[j + 1]) if j < jmax else (level,):
+            pairs = sum(size * up.get(_flipped(species, flip), 0) for species, size in level.items() for flip in flips)
+            total += pairs // 2 if up is level else pairs
+    return total
+
+
+def _flipped(species: str, flip: tuple[bool, bool]) -> str:
+    return "".join({"e": "o", "o": "e"}[one] if change else one for one, change in zip(species, flip, strict=True))
+
+
+def plan_of_spectrum(request: Any) -> Plan:
+    """The plan of a list of lines."""
+    from rotor.quantum.estimates.limits import populated_j
+    from rotor.spectra.request import answer_spectrum
+
+    top, kelvin = request.top, request.temperature_k
+    jmax, why = _jmax_of_spectrum(request)
+    j = min(populated_j(top, kelvin), max(jmax, 1))
+    cost = Growth(
+        lambda j: answer_spectrum(replace(request, jmax=j)),
+        jmax,
+        (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
+        lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1),
+        lambda j: (j + 1.0) ** (1 if top.kind == "linear" else 2),
+    )
+    seconds = cost.seconds
+    lines = allowed_lines(top, jmax)  # after the calibration, which refuses a J that no list has
+    _, b, c = top.rotational_constants_mhz
+    pressure = request.layer.pressure_bar if request.layer else None
+    lowest, highest = request.range_mhz or (0.0, math.inf)
+    frequency = min(max((b + c) * (j + 1), lowest), highest)  # of the lines that are most populated, inside the range
+    widths = [
+        doppler(top, frequency, kelvin) if request.shape == "sticks" else None,
+        pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
+    ]
+    described = of_top(top, j, request.effects)
+    absent = largest_first([*described.pop("left_out"), *(one for one in widths if one is not None)])
+    return Plan(
+        kind="spectrum",
+        **described,
+        parts=(("J max", f"{jmax}: {why}"), *level_parts(top, jmax, request.effects)),
+        counts={"allowed lines of one state, without spins, before range and cut": lines},
+        seconds=seconds,
+        memory_mb=cost.memory_mb,
+        left_out=absent,
+    )
+
+
+def plan_of_raman(request: Any) -> Plan:
+    """The plan of Raman lines: milliseconds for what is not an asymmetric top."""
+    from rotor.quantum.estimates.limits import populated_j
+    from rotor.spectra.raman_request import answer_raman
+
+    def describe(answer: Any) -> dict[str, Any]:
+        """J max is that of the answer."""
+        top, jmax = request.top, answer.lines.jmax
+        parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
+        described = of_top(top, populated_j(top, request.temperature_k), request.effects)
+        return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
+
+    return plan_of_whole("raman", lambda: answer_raman(request), describe)
+
+
+def _rounding_of_raman(request: Any) -> float:
+    from rotor.spectra.raman_request import answer_raman
+
+    return rounding_of(request.top, int(answer_raman(request).lines.jmax))
+
+
+def _choose_cut_of_lines(scene: Any, request: Any, accuracy: float) -> Choice:
+    from rotor.spectra.request import answer_spectrum, intensity_left_out
+
+    cut = Cut("min_lgint", lambda cut, decades: cut - decades, intensity_left_out, answer_spectrum)
+    return cut.choose(scene, request, accuracy)
+
+
+def _choose_cut_of_raman(scene: Any, request: Any, accuracy: float) -> Choice:
+    from rotor.spectra.raman_request import answer_raman, section_left_out
+
+    cut = Cut("min_relative", lambda cut, decades: cut * 10.0**-decades, section_left_out, answer_raman)
+    return cut.choose(scene, request, accuracy)
+
+
+SPECTRUM = Numerics(
+    {
+        "MHz": Goal("frequencies", choose_spins, error_of_list),
+        "%": Goal("intensities", _choose_cut_of_lines, error_of_intensities),
+    },
+    sweeps=_sweeps_of_spectrum,
+    plan=plan_of_spectrum,
+    rounding=lambda request: rounding_of(request.top, _jmax_of_spectrum(request)[0]),
+)
+RAMAN = Numerics(
+    {
+        "MHz": Goal("shifts", choose_spins, error_of_list),
+        "%": Goal("cross sections", _choose_cut_of_raman, error_of_intensities),
+    },
+    sweeps=_sweeps_of_raman,
+    plan=plan_of_raman,
+    rounding=_rounding_of_raman,
+)
+
+
+def plan_of_emission(request: Any) -> Plan:
+    """The plan of a source; the whole request is timed, which takes seconds at the most."""
+    from rotor.spectra.emission_request import answer_emission
+
+    return plan_of_whole("emission", lambda: answer_emission(request), lambda answer: _source_facts(request, answer))
+
+
+def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
+    from rotor.quantum.estimates.limits import populated_j
+    from rotor.tops.top import Top
+
+    effects, absent = [], [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
+    for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
+        if not isinstance(top, Top):
+            continue
+        j, taken = populated_j(top, source.excitation_k), lines.effects
+        effects += [f"{name}: {text}" for text in effect_texts(top, j, taken)]
+        largest = [one for one in left_out_of_levels(top, j, taken) if one.size is not None][:1]
+        absent += [replace(one, name=f"{name}: {one.name}") for one in largest]
+    return {
+        "effects": tuple(effects),
+        "parts": (
+            ("method", "optical depths of all lines added, one excitation temperature a molecule, one background"),
+            ("grid", "eight points to a width of the lines"),
+        ),
+        "counts": {"molecules": len(request.molecules), "lines": len(answer.lines), "points": len(answer.spectrum)},
+        "left_out": largest_first(absent),
+    }
+
+
+EMISSION = Numerics({"K": Goal("brightness")}, plan=plan_of_emission)

@@ -1,0 +1,214 @@
+"""Accuracy and plan of a classical gas: how many molecules; their motion is exact.
+
+| accuracy of | molecules | error stated |
+|---|---|---|
+| temperature of the kinetic energy, "1 K" | z T √(2/fN) | the same |
+| heat capacity var(E)/kT², "1 %" | z √((2 + 12/f)/N) | the same |
+| C1 and C2 at each time, "2 %" or 0.02 | z s/√N, s of a small gas | from the spread in the run |
+
+The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
+kurtosis κ = 12/f. Of N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
+two-sided quantile of the confidence of the scene. What a gas of rigid classical molecules leaves out are parts of Q: a/T and d T of ln Q
+(`rotor.thermodynamics.classical_limit`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder, refuse_given, with_field
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
+
+if TYPE_CHECKING:
+    from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest
+    from rotor.tops.top import Top
+
+PILOT_MOLECULES = 2_000
+MOLECULES = (100, 300, 1_000, 3_000, 10_000)
+SEEDS = 8  # gases whose errors are averaged
+MOST_IN_REFERENCE = 200_000
+SHORT_GAS = (500, 2000)  # of the calibration
+BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
+
+
+def quantile(confidence: float) -> float:
+    """z of a two-sided interval of a normal distribution.
+
+    >>> round(quantile(0.99), 4)
+    2.5758
+    """
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+def degrees_of(request: GasRequest) -> int:
+    """Degrees of freedom of one molecule whose energy is drawn; bare constants have no translation."""
+    from rotor.statistics.degrees_of_freedom import count_degrees
+
+    one = count_degrees([request.top.moments_u_angstrom2])
+    return round(one.rotation + (one.translation if request.top.mass_u is not None else 0))
+
+
+def relative_spread(unit: str, degrees: int) -> float:
+    """Standard error times √N of the temperature ("K") or of the heat capacity ("%"), as a part of it.
+
+    >>> relative_spread("K", 6), relative_spread("%", 6)
+    (0.5773502691896257, 2.0)
+    """
+    return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
+
+
+def choose_molecules(unit: str, request: GasRequest, asked: float) -> Choice:
+    """The request with as many molecules as an accuracy in K of the temperature, % of the heat capacity, or of C1 and C2 needs."""
+    from rotor.thermodynamics.classical_gas import MOST_MOLECULES
+
+    refuse_given(request, "molecules")
+    z = quantile(request.confidence)
+    count = max(math.ceil((z * _spread(request, asked, unit) / asked) ** 2), 2)
+    if count > MOST_MOLECULES:
+        raise ValueError(
+            f"accuracy: {asked:g} {unit}".rstrip()
+            + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; ask for less"
+        )
+    return Choice(replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}")
+
+
+def _spread(request: GasRequest, asked: float, unit: str) -> float:
+    """Standard error times √N in the unit of the accuracy."""
+    if unit:
+        scale = request.temperature_k if unit == "K" else 100.0
+        return scale * relative_spread(unit, degrees_of(request))
+    if request.times_ps is None:
+        raise ValueError(f"accuracy: {asked:g}: is of correlation functions; give observables.times, or a unit, K or %")
+    from rotor.thermodynamics.classical_gas import answer_gas
+
+    pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
+    return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)  # the spread itself is known to some percent
+
+
+def _largest_error(answer: GasAnswer) -> float:
+    """The largest standard error of C1 and C2."""
+    curves = answer.correlations
+    assert curves is not None
+    return max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)
+
+
+def error_of_gas(unit: str, answer: GasAnswer) -> float:
+    """Within what the result is, at the confidence asked for."""
+    request = answer.request
+    z = quantile(request.confidence)
+    if not unit:
+        return z * _largest_error(answer)
+    scale = request.temperature_k if unit == "K" else 100.0
+    return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
+
+
+def sweeps_of_gas(request: Any) -> Sweeps:
+    """The number of molecules, whose error is statistical."""
+    from rotor.thermodynamics.classical_gas import answer_gas
+
+    def answers(asked: Any) -> list[Any]:
+        return [answer_gas(replace(asked, seed=asked.seed + 10 * n)) for n in range(SEEDS)]
+
+    still = replace(request, times_ps=None)
+    counts = [n for n in MOLECULES if n < request.molecules]
+    exact = (Measure("temperature", "K", _temperature_error), Measure("heat capacity", "%", _heat_capacity_error))
+    settings = ladder(counts, request.molecules, partial(_with_molecules, still), "{:.0f}".format)
+    knobs = [Sweep("numerics.molecules", exact, settings, None, "kT/2 in every degree of freedom", answers, SEEDS)]
+    if request.times_ps is not None:
+        most = min(100 * request.molecules, MOST_IN_REFERENCE)
+        many = replace(request, molecules=most, seed=request.seed + 1)
+        curves = Measure("C1 and C2", "", _curve_error)
+        own = ladder(counts, request.molecules, partial(_with_molecules, request), "{:.0f}".format)
+        reference, against = many, f"{most} other molecules"
+        knobs.append(Sweep("numerics.molecules", (curves,), own, reference, against, answer_gas))
+    return Sweeps(tuple(knobs), (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",))
+
+
+def _with_molecules(request: Any, count: float) -> Any:
+    return with_field(request, "molecules", int(count))
+
+
+def _mean_square(errors: list[float]) -> float:
+    return math.sqrt(sum(one * one for one in errors) / len(errors))
+
+
+def _temperature_error(found: list[Any], _: Any) -> float:
+    """Root mean square error in K of the temperature that the kinetic energy of a gas has."""
+    return _mean_square([_energies(one).mean() / _degrees(one) * 2 - one.request.temperature_k for one in found])
+
+
+def _heat_capacity_error(found: list[Any], _: Any) -> float:
+    """Root mean square error in percent of C_v = var(E)/kT² of a molecule, f k/2 for f degrees of freedom."""
+    return _mean_square(
+        [100 * (_energies(one).var() / (0.5 * _degrees(one) * one.request.temperature_k**2) - 1) for one in found]
+    )
+
+
+def _energies(answer: Any) -> Any:
+    """The kinetic energy over k of each molecule in K."""
+    from rotor import units
+
+    return sum(answer.ensemble.kinetic.energies.values()) / units.EV_PER_K
+
+
+def _degrees(answer: Any) -> int:
+    return len(answer.ensemble.kinetic.energies)
+
+
+def _curve_error(found: Any, reference: Any) -> float:
+    pairs = [(getattr(found.correlations, name), getattr(reference.correlations, name)) for name in ("c1", "c2")]
+    return max(float(np.max(np.abs(one - true))) for one, true in pairs if one is not None)
+
+
+def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
+    """What a classical gas of rigid molecules leaves out, as parts of Q in percent, largest first."""
+    from rotor.thermodynamics.classical_limit import classical_limit
+
+    limit = classical_limit(top)
+    quantum, distortion = abs(limit.a) / temperature_k, abs(limit.d) * temperature_k
+    return largest_first(
+        [
+            LeftOut("quantum corrections", 100 * quantum, "%", f"a/T of ln Q at {temperature_k:g} K"),
+            LeftOut("centrifugal distortion", 100 * distortion, "%", f"d T of ln Q at {temperature_k:g} K"),
+        ]
+    )
+
+
+def plan_of_gas(request: Any) -> Plan:
+    """The plan of a classical gas."""
+    from rotor.classical.gas.ensembles import PIECE
+    from rotor.thermodynamics.classical_gas import answer_gas
+
+    together = min(request.molecules, PIECE)
+    cost = Growth(lambda n: answer_gas(replace(request, molecules=n)), request.molecules, SHORT_GAS)
+    rest = BYTES_A_MOLECULE * (request.molecules - together) / 1e6
+    return Plan(
+        kind="gas",
+        effects=("free rotation of rigid molecules", "free flight"),
+        good=("energy and angular momentum of every molecule",),
+        parts=(("method", "exact free motion of every molecule (theta functions); no step"),),
+        counts={"molecules": request.molecules, "times": len(request.times_ps or ())},
+        seconds=cost.seconds,
+        memory_mb=replace(cost, size=together).memory_mb + rest,
+        left_out=left_out_of_gas(request.top, request.temperature_k),
+    )
+
+
+def _goal(of: str, unit: str) -> Goal:
+    return Goal(of, lambda _, request, asked: choose_molecules(unit, request, asked), partial(error_of_gas, unit))
+
+
+GAS = Numerics(
+    {"K": _goal("temperature", "K"), "%": _goal("heat capacity", "%"), "": _goal("C1 and C2", "")},
+    percent=lambda scene: "%" if scene.observables.times is None else "",  # C1 and C2 are 1 at first
+    sweeps=sweeps_of_gas,
+    plan=plan_of_gas,
+)

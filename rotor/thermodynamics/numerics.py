@@ -1,0 +1,69 @@
+"""Plans of thermodynamic functions and of torsion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from rotor.quantum.estimates.limits import populated_j
+from rotor.quantum.estimates.plans import of_top
+from rotor.requests.knob import Sweeps
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_of_whole, timed
+
+
+def plan_of_thermo(request: Any) -> Plan:
+    """The plan of thermodynamic functions: levels and seconds are those of the highest temperature."""
+    from rotor.thermodynamics.request import answer_thermo
+
+    hottest = max(request.temperatures_k)
+    answers: list[Any] = []
+    seconds = timed(lambda: answers.append(answer_thermo(replace(request, temperatures_k=(hottest,)))))
+    jmax = int(answers[-1].functions.jmax.max())
+    summed = f"levels summed to J = {jmax} at {hottest:g} K" if jmax >= 0 else "classical with corrections: no levels"
+    described = of_top(request.top, populated_j(request.top, hottest), answers[-1].effects)
+    vibration = [] if request.vibrations else [LeftOut("vibration", None, "", "no states given")]
+    return Plan(
+        kind="thermo",
+        effects=described["effects"],
+        good=described["good"],
+        parts=(("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
+        counts={"temperatures": len(request.temperatures_k)},
+        seconds=seconds,
+        memory_mb=peak_mb(lambda: answer_thermo(request)),
+        left_out=(*described["left_out"], *vibration),
+    )
+
+
+def plan_of_torsion(request: Any) -> Plan:
+    """The plan of a torsion."""
+    from rotor.thermodynamics.torsion_request import answer_torsion
+
+    def describe(answer: Any) -> dict[str, Any]:
+        """Basis and potential are those of the answer."""
+        scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
+        return {
+            "effects": (f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
+            "good": ("species",) if answer.torsion.fold > 1 else (),
+            "parts": (("basis", f"exp(imα) up to m = {answer.waves}, {answer.torsion.fold} species{scanned}"),),
+            "counts": {"levels": len(answer.levels), "temperatures": len(request.temperatures_k)},
+            "left_out": (LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),),
+        }
+
+    return plan_of_whole("torsion", lambda: answer_torsion(request), describe)
+
+
+def _sweeps_of_thermo(request: Any) -> Sweeps:
+    return Sweeps((), ("vibration: its states are summed in closed form",) if request.vibrations else ())
+
+
+def _sweeps_of_torsion(request: Any) -> Sweeps:
+    """Without a scan nothing is left to choose, since the basis follows from the energies."""
+    from rotor.thermodynamics.torsion_request import is_scan
+
+    why = "basis: its size follows from the highest energy; the error is stated with each run"
+    return Sweeps((), () if is_scan(request.potential) else (why,))
+
+
+THERMO = Numerics({"": Goal("Q, U and C_v")}, sweeps=_sweeps_of_thermo, plan=plan_of_thermo)
+TORSION = Numerics({"MHz": Goal("levels")}, sweeps=_sweeps_of_torsion, plan=plan_of_torsion)
