@@ -7,10 +7,8 @@ and removes it.
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -20,6 +18,7 @@ from pathlib import Path
 def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """A new folder in `parent` whose name begins with `prefix`, locked and at the end removed; abandoned ones are removed first.
 
+    >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as place, locked_folder(Path(place), "work-") as folder:
     ...     folder.name.startswith("work-"), folder.is_dir()
     (True, True)
@@ -36,6 +35,8 @@ def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
     """The folder and its lock; made again where another process took it for abandoned before it was locked."""
+    import tempfile
+
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         lock = _lock(folder)
@@ -89,6 +90,7 @@ def locked_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
     Raises ValueError where another run holds it, with the number of its process.
 
+    >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, locked_file(Path(folder) / "a.csv"):
     ...     [path.name for path in Path(folder).iterdir()]
     ['.rotor-lock-a.csv']
@@ -99,6 +101,8 @@ def locked_file(path: str | os.PathLike[str]) -> Iterator[None]:
         return
     lock = target.parent / f"{_LOCK}{target.name}"
     if len(os.fsencode(lock.name)) > _LONGEST_NAME:
+        import hashlib
+
         lock = lock.with_name(f"{_LOCK}{hashlib.sha256(os.fsencode(target.name)).hexdigest()}")
     handle = _locked_handle(lock, path)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,7 +70,7 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
     """What a molecule file says, by the keys of docs/verbs. symmetry: whether the point group of the geometry is looked for."""
     from rotor.formats.molecules.molecule_file import read_molecule_file
 
-    file = read_molecule_file(path)
+    file = read_molecule_file(path, listed=not symmetry)
     top = _top_of(file) if symmetry or file.constants is None else _top_of_constants(file)
     return {
         "name": file.name,
@@ -90,7 +91,7 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
         "unverified": sorted(file.unverified),
         "sources": dict(file.sources),
         "file": str(path),
-        "own": _is_own(path),
+        "own": _is_own(path.parent),
     }
 
 
@@ -110,10 +111,11 @@ def _top_of_constants(file: MoleculeFile) -> Top:
     return replace(Top.from_constants(file.constants), dipole_abc_debye=file.dipole_abc_debye)
 
 
-def _is_own(path: Path) -> bool:
+@cache
+def _is_own(folder: Path) -> bool:
     from rotor.molecules.nuclei import data_folder
 
-    return path.parent != data_folder() / "molecules"
+    return folder != data_folder() / "molecules"
 
 
 _COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "J ≤", "K ≤", "within/MHz", "unverified", "from")

@@ -210,6 +210,8 @@ def _unique(axes: Floats, moments: Floats, masses: Floats, positions: Floats, eq
     for powers in _ODD_MOMENTS:
         values = _moments_along(tensors[sum(powers)], candidates, powers)
         candidates = candidates[values > values.max() - _SAME]
+        if len(candidates) == 1:
+            break
     return np.asarray(candidates[0])
 
 

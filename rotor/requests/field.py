@@ -30,7 +30,7 @@ _DECLARED, _PART = "declared", "part"
 REQUIRED: Any = MISSING  # the default of a field that must be given
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Field:
     """What is known of a field.
 
@@ -119,7 +119,7 @@ class Field:
             raise ValueError(f"{self.name}: {error}") from None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Part:
     """A field of a request that is made from several declared values, which stand in a dataclass of their own.
 

@@ -43,7 +43,7 @@ class Reader:
         return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Text(Reader):
     """A text, or one of several words. words: those allowed; empty: any."""
 
@@ -59,7 +59,7 @@ class Text(Reader):
         return given
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Flag(Reader):
     """True or false. off: whether there is an option --no-... too."""
 
@@ -73,7 +73,7 @@ class Flag(Reader):
         return given
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Whole(Reader):
     """A whole number between bounds."""
 
@@ -107,7 +107,7 @@ class Whole(Reader):
             raise ValueError(f"{value}: expected a whole number {bounds}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Quantity(Reader):
     """A number with a unit. above, below: bounds that are not allowed themselves; least, most: bounds that are."""
 
@@ -178,7 +178,7 @@ def check_temperature(value: float, text: str) -> None:
         raise ValueError(f"{text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Grid(Reader):
     """Numbers in a unit: start:stop:count, a list between commas, or a list. points: the count of a grid that gives none."""
 
@@ -223,7 +223,7 @@ class Grid(Reader):
         return f"{len(value)} from {value[0]:g} to {value[-1]:g} {self.unit}".rstrip()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Range(Reader):
     """Two ends first:last in a unit; all of it for (0, infinity)."""
 
@@ -248,7 +248,7 @@ class Range(Reader):
         return "" if value == INFINITE else self.write(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Numbers(Reader):
     """Numbers between commas, in a unit, or a list of numbers; counts: how many there may be, empty: any number of them."""
 
@@ -281,7 +281,7 @@ class Numbers(Reader):
         return ",".join(f"{one:g}" for one in value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Names(Reader):
     """Texts: an option that may be repeated, a list in a scene."""
 
@@ -305,7 +305,7 @@ class Names(Reader):
 _COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # those in brackets are part of a name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class NameList(Reader):
     """Names: a text with commas, or a list; each once. words: those allowed; empty: any. A comma in brackets is part of a name."""
 
@@ -334,7 +334,7 @@ class NameList(Reader):
         return ",".join(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pairs(Reader):
     """Numbers by name: `ee=1,eo=3`, or a table. number: the type of the values. what: the names are of."""
 
@@ -368,7 +368,7 @@ class Pairs(Reader):
         return re.fullmatch(pattern, text) is not None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Array(Reader):
     """A vector or a matrix, whose shape the thing that it belongs to checks: numbers between commas, rows between semicolons."""
 
@@ -390,7 +390,7 @@ class Array(Reader):
         return value.tolist() if hasattr(value, "tolist") else list(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Custom(Reader):
     """A value that functions read and write."""
 
@@ -423,7 +423,7 @@ def whole_range(text: str) -> tuple[int, int]:
     return first, last
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Each(Quantity):
     """Numbers with a unit, one for all or one for each of several things, between commas; a scene holds one for all."""
 

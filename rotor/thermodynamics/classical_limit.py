@@ -245,8 +245,9 @@ def _distortion(top: Top) -> tuple[float, float, float]:
     )  # Gauss and Hermite, as Golub and Welsch
     weight = np.array([math.prod(p) for p in product((vectors[0] ** 2).tolist(), repeat=3)])
     points = np.array(list(product(nodes.tolist(), repeat=3))).T * np.sqrt(_variances(top))[:, None]
-    h4, h6 = (_classical_energy(operators, order, *points) for order in (2, 3))
-    means = [weight @ _classical_energy(first, order, *points) for order in (2, 3, 4)]
+    energies = [_classical_energy(first, order, *points) for order in (2, 3, 4)]
+    h4, h6 = energies[:2] if first is operators else (_classical_energy(operators, order, *points) for order in (2, 3))
+    means = [weight @ energy for energy in energies]
     h4, h6 = h4 - weight @ h4, h6 - weight @ h6
     second = weight @ h4**2 / 2 - means[1]
     third = weight @ (h4 * h6) - weight @ h4**3 / 6 - means[2]

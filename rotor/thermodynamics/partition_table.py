@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.thermodynamics.classical_limit import classical_partition_function
+from rotor.thermodynamics.classical_limit import ClassicalLimit, classical_limit, classical_partition_function
 from rotor.thermodynamics.level_sums import AT_WORST, Progress, refusal
 from rotor.thermodynamics.partition import PartitionFunction, partition_function, partition_functions
 from rotor.thermodynamics.spin_factor import spin_functions
@@ -19,15 +19,18 @@ _KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
 
 
 def partition_facts(
-    top: Top, partition: PartitionFunction, effects: Sequence[QuantumEffect] = SEMI_RIGID
+    top: Top,
+    partition: PartitionFunction,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    limit: ClassicalLimit | None = None,
 ) -> dict[str, Any]:
     """Q at one temperature beside its classical limit, by the keys of docs/verbs; both count the spins of the effects.
 
-    No classical limit beside internal rotation: that of the rigid top has no torsional states.
+    No classical limit beside internal rotation: that of the rigid top has no torsional states. limit: of the top, where it is known.
     """
     classical = None
     if top.internal_rotation is None:
-        classical = spin_functions(top, effects) * classical_partition_function(top, partition.temperature_k)
+        classical = spin_functions(top, effects) * float((limit or classical_limit(top)).q(partition.temperature_k))
     return {
         "temperature_k": partition.temperature_k,
         "q": partition.q,
@@ -49,7 +52,8 @@ def partition_table(
     """
     try:
         found = partition_functions(top, temperatures_k, refuse=False, progress=progress)
-        return [_unless_refused(partition_facts(top, one)) for one in found]
+        limit = classical_limit(top)
+        return [_unless_refused(partition_facts(top, one, limit=limit)) for one in found]
     except ValueError:  # levels of one of them cannot be solved: each for itself
         return [_row_alone(top, temperature) for temperature in temperatures_k]
 

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import msgspec
-
 from rotor.requests.field import Field
 from rotor.requests.fill import Given, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.tables import said, section_class
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -51,7 +48,9 @@ class OneMolecule(SubjectKind):
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The key `molecule`: a name, a file, SMILES:... or a table."""
-        return [("molecule", _molecule_type(), msgspec.NODEFAULT)]
+        from msgspec import NODEFAULT
+
+        return [("molecule", _molecule_type(), NODEFAULT)]
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
         """The tables, a name alone being the source."""
@@ -64,16 +63,22 @@ class OneMolecule(SubjectKind):
 
 
 def _molecule_type() -> Any:
+    from rotor.verbs.tables import said
+
     return Annotated[str | molecule_section(), said("a name, a file, SMILES:..., or a table")]
 
 
 def optional_molecule(about: str) -> tuple[str, Any, Any]:
     """Name, type and default of the key `molecule` of scenes that may have none."""
+    from rotor.verbs.tables import said
+
     return "molecule", Annotated[str | molecule_section() | None, said(about, "water")], None
 
 
 def molecule_section() -> Any:
     """The structure of a table of a molecule."""
+    from rotor.verbs.tables import section_class
+
     return section_class("molecule", tuple(FIELDS.values()))
 
 

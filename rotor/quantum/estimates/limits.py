@@ -28,11 +28,11 @@ from rotor import units
 from rotor.arrays import Ints
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
 from rotor.quantum.estimates.beyond import COMPUTE, Limit, known_couplings, next_order
-from rotor.quantum.estimates.internal_rotation import LineShifts, line_shifts
 from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
+    from rotor.quantum.estimates.internal_rotation import LineShifts
     from rotor.quantum.estimates.methyl_groups import MethylGroup
     from rotor.tops.top import Top
 
@@ -246,6 +246,8 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
     """That of the group with the lowest barrier, counted in its F; a bound where no barrier of a similar molecule is known."""
+    from rotor.quantum.estimates.internal_rotation import line_shifts
+
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
     unknown = [one.rotor.f_mhz for one in groups if one.barrier is None]
     if unknown:
