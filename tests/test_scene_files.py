@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rotor.scenes.scene import KINDS, AlignScene, LevelsScene, SpectrumScene, StarkScene
 from rotor.scenes.scene_file import json_schema, parse_scene, read_scene, scene_text, write_scene
 from rotor.scenes.sections import GaussianSection, KickSection, StarkConditions
+from rotor.scenes.sweep.points import points
 from rotor.scenes.template import template
 from rotor.verbs.subjects import molecule_section
 
@@ -104,6 +105,15 @@ def test_every_key_of_a_template_may_be_switched_on(kind):
     switched = [re.sub(r"^# (?=[\w.]+ = |\[)", "", line) for line in lines]
     assert len([a for a, b in zip(lines, switched, strict=True) if a != b]) > 5
     assert parse_scene("\n".join(switched)).kind == kind
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_sweep_of_a_template_is_one_of_its_kind(kind):
+    """`rotor new structure` swept a temperature that a structure has not."""
+    lines = [line.removeprefix("# ") if line.startswith("# sweep") else line for line in template(kind).splitlines()]
+    scene = parse_scene("\n".join(lines).partition("\n[outputs]")[0])
+    assert len(list(points(scene))) >= 2
+    assert next(iter(scene.sweep)).partition(".")[0] in scene.__struct_fields__
 
 
 def test_defaults_of_a_template_are_the_defaults():

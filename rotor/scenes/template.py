@@ -59,6 +59,8 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
             inner.append(
                 (one.name, structures[0], one.name == "body" or (_is_list(hints[one.name]) and not one.required))
             )
+        elif one.name == "sweep" and not place:
+            yield f"# sweep = {_text(sweep_example(kind))}  # example: values by dotted name; every combination is run"
         else:
             yield _key_line(one, hints[one.name], _start(kind).get(f"{place}{one.name}"))
     for name, table, absent in inner:
@@ -69,6 +71,16 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
             yield _in_comment(TAGS[name]) if absent else TAGS[name]
         lines = _lines(table, kind, f"{place}{name}.")
         yield from map(_in_comment, lines) if absent else lines
+
+
+def sweep_example(kind: str) -> dict[str, list[str]]:
+    """What a template sweeps: temperatures where the kind has one, else the first input of its start."""
+    verb = verb_of(kind)
+    if kelvin := next((name for name in ("conditions.temperature", "conditions.excitation") if name in verb.fields), ""):
+        return {kelvin: ["10 K", "100 K", "300 K"]}
+    name, value = next((name, value) for name, value in verb.start.items() if isinstance(value, str))
+    stem, dot, suffix = value.partition(".")
+    return {name: ["CO", "HCl"] if name == "molecule" else [value, f"{stem}2{dot}{suffix}"]}
 
 
 def _is_list(hint: Any) -> bool:
