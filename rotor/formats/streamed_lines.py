@@ -6,14 +6,11 @@ run leaves behind is whole pieces; the next run with the same settings makes the
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,9 +21,10 @@ from rotor import units
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
+from rotor.formats.sorted_pieces import engine_in, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
-from rotor.formats.tables import copy_columns, quoted, run
+from rotor.formats.tables import copy_columns, quoted
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
@@ -40,12 +38,11 @@ from rotor.tops.top import Top
 from rotor.version import version
 
 if TYPE_CHECKING:
-    from duckdb import DuckDBPyConnection
+    pass
 
 PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
 MEMORY_MB = 500  # for the sort, beside the program itself
 _BATCH = 1 << 18  # lines that are made into text at once
-_MANIFEST = "manifest.json"
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ class SortedLines:
         """The lgint that so many lines reach, and the highest J of these; None where the list has no more."""
         from rotor.formats.tables import quoted
 
-        with _engine(self.plan.folder, self.memory_mb) as engine:
+        with engine_in(self.plan.folder, self.memory_mb) as engine:
             rows = engine.execute(
                 f"SELECT lgint, greatest(j_upper, j_lower) FROM read_parquet({quoted(str(self.file))}) WHERE lgint IS NOT NULL "
                 f"ORDER BY lgint DESC LIMIT {count}"
@@ -107,7 +104,7 @@ class SortedLines:
         """The lowest and the highest frequency."""
         from rotor.formats.tables import quoted
 
-        with _engine(self.plan.folder, self.memory_mb) as engine:
+        with engine_in(self.plan.folder, self.memory_mb) as engine:
             row = engine.execute(
                 f"SELECT min(frequency_mhz), max(frequency_mhz) FROM read_parquet({quoted(str(self.file))})"
             ).fetchone()
@@ -259,7 +256,7 @@ def sorted_lines(
     plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, folder)
     ranges = list(_ranges(plan, piece_lines))
     record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
-    _open_folder(plan.folder, record)
+    open_folder(plan.folder, record)
 
     missing = [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
@@ -268,7 +265,7 @@ def sorted_lines(
         if progress is not None:
             progress(done, len(ranges))
     merged = plan.folder / "sorted.parquet"
-    count = _sort([plan.piece(*r) for r in ranges], merged, record, plan.folder, memory_mb)
+    count = sort_pieces([plan.piece(*r) for r in ranges], merged, record, plan.folder, memory_mb)
     return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
 
 
@@ -346,33 +343,6 @@ def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
     )
 
 
-def _open_folder(folder: Path, record: Mapping[str, Any]) -> None:
-    """Make the folder of pieces, or see that what it holds belongs to this list."""
-    text = json.dumps(record, sort_keys=True, ensure_ascii=False)
-    mark = {"sha256": hashlib.sha256(text.encode()).hexdigest(), "list": record}
-    manifest = folder / _MANIFEST
-    if not manifest.exists():
-        folder.mkdir(exist_ok=True)
-        with open_atomic(manifest, "w", encoding="utf-8") as handle:
-            json.dump(mark, handle, indent=1, ensure_ascii=False)
-        return
-    try:
-        before = json.loads(manifest.read_text(encoding="utf-8"))
-        known, differs = before["sha256"], _first_difference(before["list"], json.loads(text))
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"{manifest}: is no manifest of pieces; remove the folder to begin anew") from None
-    if known != mark["sha256"]:
-        raise ValueError(
-            f"{folder}: holds pieces of another list ({differs}); finish that list with its own settings, or remove the "
-            "folder to begin anew"
-        )
-
-
-def _first_difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    keys = [key for key in now if before.get(key) != now[key]]
-    return f"{keys[0]} was {before.get(keys[0])}, is {now[keys[0]]}" if keys else "its settings differ"
-
-
 def _make_piece(plan: _Plan, first: int, last: int) -> None:
     """Lines with lower J from `first` to `last`, sorted, as a Parquet file."""
     top_j = min(last + 1, plan.jmax)
@@ -423,42 +393,11 @@ def _quanta(lines: Lines) -> dict[str, Any]:
     return {name: column.astype(np.int16) for name, column in columns.items()}
 
 
-def _sort(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
-    """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
-    with _engine(folder, memory_mb) as engine:
-        files = ", ".join(quoted(str(piece)) for piece in pieces)
-        text = quoted(json.dumps(record, ensure_ascii=False))
-        run(
-            engine,
-            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {quoted(str(target))} "
-            f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})",
-            target,
-        )
-        return _count(engine, target)
-
-
-@contextmanager
-def _engine(folder: Path, memory_mb: int) -> Iterator[DuckDBPyConnection]:
-    import duckdb
-
-    with duckdb.connect() as engine:
-        engine.execute("SET memory_limit = $limit", {"limit": f"{memory_mb}MB"})
-        engine.execute("SET temp_directory = $folder", {"folder": str(folder / "sort")})
-        engine.execute("SET preserve_insertion_order = true")
-        yield engine
-
-
-def _count(engine: DuckDBPyConnection, path: Path) -> int:
-    row = engine.execute(f"SELECT count(*) FROM read_parquet({quoted(str(path))})").fetchone()
-    assert row is not None  # a count always has one row
-    return int(row[0])
-
-
 def _catalogues(plan: _Plan, merged: Path, tag: int, memory_mb: int) -> Iterator[Catalogue]:
     """The sorted lines as catalogues of some hundred thousand; lines of zero strength have no logarithm."""
     names = plan.quanta_names
-    with _engine(plan.folder, memory_mb) as engine:
-        for start in range(0, _count(engine, merged), _BATCH):
+    with engine_in(plan.folder, memory_mb) as engine:
+        for start in range(0, row_count(engine, merged), _BATCH):
             part = engine.execute(
                 f"SELECT * FROM read_parquet({quoted(str(merged))}, file_row_number = true) WHERE lgint IS NOT NULL "
                 f"AND file_row_number >= {start} AND file_row_number < {start + _BATCH}"

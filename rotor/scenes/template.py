@@ -76,7 +76,9 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
 def sweep_example(kind: str) -> dict[str, list[str]]:
     """What a template sweeps: temperatures where the kind has one, else the first input of its start."""
     verb = verb_of(kind)
-    if kelvin := next((name for name in ("conditions.temperature", "conditions.excitation") if name in verb.fields), ""):
+    if kelvin := next(
+        (name for name in ("conditions.temperature", "conditions.excitation") if name in verb.fields), ""
+    ):
         return {kelvin: ["10 K", "100 K", "300 K"]}
     name, value = next((name, value) for name, value in verb.start.items() if isinstance(value, str))
     stem, dot, suffix = value.partition(".")

@@ -12,8 +12,9 @@ from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Table, plain, show_facts, show_table
 from rotor.reports.sources import source_facts
+from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import STATES
-from rotor.verbs.turning_body import MotionInput, TurningBody, build
+from rotor.verbs.turning_body import TurningBody, build
 from rotor.verbs.verb import PICTURES, Output, Report, Verb
 
 if TYPE_CHECKING:

@@ -1,0 +1,164 @@
+"""Inputs of `tumble`: an ordinary body or bare moments, how it starts, and times with their unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.classical.driven import BODY_EFFECTS, DEFAULT_TOLERANCE
+from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
+from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
+from rotor.units import parse_grid
+
+if TYPE_CHECKING:
+    from rotor.classical.bodies import NamedBody
+    from rotor.classical.tumble import Three
+
+_UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
+MOST_TIMES = 10_000_000
+
+
+def _body(name: Any) -> NamedBody:
+    from rotor.classical.bodies import named_body
+
+    return named_body(name)
+
+
+def three(given: Any, unit: str = "") -> Three:
+    """Three finite numbers, in a unit of their own or in `unit`."""
+    if isinstance(given, str):
+        if given.count(",") != 2 or ":" in given:
+            raise ValueError(f"{given!r}: expected three numbers, such as 0.6,0.8,1.0")
+        given = parse_grid(given, unit)
+    values = [float(one) for one in given]
+    if len(values) != 3:
+        raise ValueError(f"{values}: expected three numbers")
+    x, y, z = values
+    return x, y, z
+
+
+def _four(given: Any) -> tuple[float, float, float, float]:
+    if isinstance(given, str) and (given.count(",") != 3 or ":" in given):
+        raise ValueError(f"{given!r}: expected four numbers, such as 1,0,0,0")
+    values = [float(one) for one in (parse_grid(given, "") if isinstance(given, str) else given)]
+    if len(values) != 4:
+        raise ValueError(f"{values}: expected four numbers, such as 1,0,0,0")
+    w, x, y, z = values
+    return w, x, y, z
+
+
+def _moments(given: Any) -> Three:
+    from rotor.classical.euler import checked_moments
+
+    moments = three(given, "kg*m2" if in_si(given) else "")
+    try:
+        checked_moments(moments)
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(f"{given!r}: {text}" if isinstance(given, str) else text) from None
+    return moments
+
+
+def in_si(moments: Any) -> bool:
+    """Whether moments are given with a unit."""
+    return isinstance(moments, str) and bool(_UNIT_AT_END.search(moments))
+
+
+def _units(given: Any) -> str:
+    if given not in ("", "SI"):
+        raise ValueError(f'{given!r}: expected "SI", or "" for any coherent set')
+    return str(given)
+
+
+class Vector(Reader):
+    """Three numbers, whose unit is that of the body; a text is read where the body is known."""
+
+    scene_type: Any = list[float]
+
+    def __init__(self, metavar: str) -> None:
+        self.metavar = metavar
+
+    def write(self, value: Any) -> list[float]:
+        """The numbers as a list."""
+        return [float(one) for one in value]
+
+
+class Times(Grid):
+    """Times in the unit of the body; a text is read where the body is known."""
+
+    def read(self, given: Any) -> Any:
+        """What was given."""
+        return given
+
+    def write(self, value: Any) -> Any:
+        """A text as it is, numbers as a list."""
+        return value if isinstance(value, str) else super().write(value)
+
+
+@dataclass(frozen=True)
+class BodyInput:
+    """A rigid body instead of a molecule, in any coherent units."""
+
+    body: NamedBody | None = declared(
+        None, Custom(_body, lambda body: body.name, "NAME"), "Ordinary body instead of a molecule: book, phone, racket or wing-nut",
+        "body.name", option="--body", panel=MOLECULE, common=True, example="book",
+    )  # fmt: skip
+    moments: Three | None = declared(
+        None, Custom(_moments, list, "I1,I2,I3", list[float] | str),
+        'Principal moments instead of a molecule, in any order: "1,2,3 kg m2", or plain numbers of any coherent units', "body.moments",
+        panel=MOLECULE, common=True, example=[0.3, 0.35, 0.4],
+    )  # fmt: skip
+    units: str = declared("", Custom(_units), '"SI" (kg m², s, J), or "" for any coherent set', "body.units", option="")
+    angular_momentum: Three | None = declared(
+        None,
+        Vector("L1,L2,L3"),
+        "At time 0 in principal axes",
+        "body.angular_momentum",
+        option="",
+        example=[1.8, 0.4, -0.9],
+    )
+    angular_velocity: Three | None = declared(
+        None, Vector("W1,W2,W3"), "Angular velocity at time 0, in principal axes, instead of the angular momentum: 0.1,10,0 (rad/s; rad/ps "
+        "for a molecule; also rpm, deg/s)", "body.angular_velocity", option="--omega", common=True, example=[0.1, 15.0, 0.1],
+    )  # fmt: skip
+    attitude: tuple[float, float, float, float] | None = declared(
+        None, Custom(_four, list, "W,X,Y,Z", list[float]), "With effects: unit quaternion, body to space, at time 0", "body.attitude",
+        example=[1.0, 0.0, 0.0, 0.0],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MotionInput:
+    """How a body starts, what acts on it, and when it is looked at."""
+
+    temperature_k: float = declared(
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature of the thermal mean |L| of a molecule (K)",
+        "conditions.temperature", common=True,
+    )  # fmt: skip
+    angular_momentum: Three | None = declared(
+        None, Vector("L1,L2,L3"), "At time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
+        "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
+    )  # fmt: skip
+    times: Any = declared(
+        None, Times(), "Times (ps for a molecule, s with SI units); by default two periods", "conditions.times", common=True,
+        example="0:2:201",
+    )  # fmt: skip
+    effects: tuple[Any, ...] = declared(
+        (), BODY_EFFECTS, 'What acts on a body: a name and its parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
+        "effects", option="--effect", common=True,
+    )  # fmt: skip
+    tolerance: float = declared(
+        DEFAULT_TOLERANCE, Quantity(), "With effects: tolerance of a step, relative to |L| and one radian", "numerics.tolerance",
+        typed=DEFAULT_TOLERANCE,
+    )  # fmt: skip
+    step: float | None = declared(
+        None, Custom(lambda given: given, scene_type=float | str, metavar="T"),
+        "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
+        example=0.01,
+    )  # fmt: skip
+    order: int = declared(4, Whole(), "Order of the splitting: 2, 4, 6 or 8", "numerics.order")
+
+
+BODY = {one.name: one for one in all_fields(BodyInput).values()}
+MOTION = {one.name: one for one in all_fields(MotionInput).values()}
