@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import shutil
 import sys
 from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+import toy_format
 import toy_verb
 
+import rotor
+from rotor.formats import registry
 from rotor.requests.field import all_fields
 from rotor.requests.fill import Given, read_fields, written_fields
 from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range, Text, Whole
@@ -57,6 +61,24 @@ def test_a_verb_is_two_files(ring, call, folder):
     assert (folder / "a.csv").read_bytes() == written
     content = json.loads(call("ring", "CO", "--json", "-")[1])
     assert [level["energy_mhz"] for level in content["levels"]] == [0.0, 505379.0]  # 4 B is above the cut of 1e6 MHz
+
+
+def test_a_format_is_one_file(monkeypatch, folder):
+    """The toy format as a file of the folder of formats: read, written and refused as the others, without a row elsewhere."""
+    table = rotor.levels("CO", jmax=3).table
+    with pytest.raises(ValueError, match=r"a\.tabs: a .* can be written as"):
+        rotor.write(table, "a.tabs")
+    (folder / "formats").mkdir()
+    shutil.copy(toy_format.__file__, folder / "formats" / "toy_format.py")
+    monkeypatch.setattr(registry, "FOLDER", folder / "formats")
+    monkeypatch.setattr(registry, "PACKAGE", "")
+    rotor.write(table, "a.tabs")
+    again = rotor.read("a.tabs")
+    assert again.columns["energy_mhz"].tolist() == table.columns["energy_mhz"].tolist()
+    assert ".tabs" in registry.suffixes_for(type(table))
+    Path("b.tabs").write_text("#\na\tb\n1\n")
+    with pytest.raises(ValueError, match=r"b\.tabs, line 3: 1 columns; expected 2"):
+        rotor.read("b.tabs")
 
 
 @pytest.mark.parametrize(

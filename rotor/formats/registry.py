@@ -1,14 +1,16 @@
 """Every file format, registered once: its suffixes, what reads it, and what writes it for each type of thing.
 
 `rotor.read` and `rotor.write` look here and nowhere else. Readers, writers and types are named by text ("module:name"), so
-that nothing is imported before it is used. A writer that is registered for a class serves its subclasses.
+that nothing is imported before it is used. A writer that is registered for a class serves its subclasses. A file of this folder that
+declares `FORMAT = Format(...)` is a format without a row here.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ CATALOGUE = "rotor.formats.spcat.text.catalogue:Catalogue"
 LEVELS = "rotor.quantum.request:SelectedLevels"
 HITRAN = "rotor.formats.hitran:HitranLines"
 
+FOLDER, PACKAGE = Path(__file__).parent, "rotor.formats"
 Writer = Callable[[Any, str | os.PathLike[str], Mapping[str, Any]], None]
 
 
@@ -100,6 +103,19 @@ FORMATS = (
 )
 
 
+def formats() -> Iterator[Format]:
+    """Every format: those of the table first, so that no file is looked into where one of them fits."""
+    yield from FORMATS
+    yield from _declared(FOLDER, PACKAGE)
+
+
+@cache
+def _declared(folder: Path, package: str) -> tuple[Format, ...]:
+    """The formats that files of a folder declare."""
+    files = [one for one in sorted(folder.glob("*.py")) if "\nFORMAT = Format(" in one.read_text(encoding="utf-8")]
+    return tuple(import_module(f"{package}.{one.stem}".lstrip(".")).FORMAT for one in files)
+
+
 def loaded(name: str) -> Any:
     """The object that "module:name" names."""
     module, _, attribute = name.partition(":")
@@ -108,7 +124,7 @@ def loaded(name: str) -> Any:
 
 def reader_of(path: Path) -> Callable[[Path], Any] | None:
     """What reads the file of this name; None where no format here has its suffix."""
-    for one in FORMATS:
+    for one in formats():
         fits = one.reader and path.name.lower().endswith(one.suffixes)
         if fits and (one.recognises is None or loaded(one.recognises)(path)):
             reader: Callable[[Path], Any] = loaded(str(one.reader))
@@ -122,7 +138,7 @@ def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
     Raises ValueError, with the suffixes that there are for such a thing, where no format has the suffix.
     """
     name, types = Path(path).name.lower(), [_name_of(cls) for cls in type(thing).__mro__]
-    for one in FORMATS:
+    for one in formats():
         writers = [one.writers[known] for known in types if known in one.writers]
         if writers and name.endswith(one.suffixes):
             writer: Writer = loaded(writers[0])
@@ -138,7 +154,7 @@ def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
 def suffixes_for(kind: type) -> list[str]:
     """The suffixes of the files into which things of a class can be written."""
     types = {_name_of(cls) for cls in kind.__mro__}
-    return [suffix for one in FORMATS if types & {*one.writers} for suffix in one.suffixes]
+    return [suffix for one in formats() if types & {*one.writers} for suffix in one.suffixes]
 
 
 def _name_of(cls: type) -> str:
