@@ -81,9 +81,10 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
 
 def test_a_cut_is_lowered_where_it_leaves_out_too_much():
     """The accuracy of one that is given by hand is refused instead."""
-    from rotor.scenes.accuracy_intensities import choose_cut
     from rotor.scenes.kind import kind_of
+    from rotor.spectra.numerics import RAMAN
 
+    choose_cut = RAMAN.goals["%"].choose
     scene = parse_scene(HEAD.format("raman", "2e-4 %") + 'molecule = "N2"\n')
     request = kind_of(scene).request(scene, ".")
     assert choose_cut(scene, request, 1e-3).request.min_relative == request.min_relative

@@ -24,7 +24,7 @@ from rotor.formats.provenance import write_beside
 from rotor.formats.sorted_pieces import engine_in, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
-from rotor.formats.tables import copy_columns, quoted
+from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
@@ -76,7 +76,7 @@ class SortedLines:
                 shutil.copyfile(self.file, unfinished)
             return
         if target.suffix.lower() == ".csv":
-            with atomic_path(target) as unfinished, _engine(self.plan.folder, self.memory_mb) as engine:
+            with atomic_path(target) as unfinished, engine_in(self.plan.folder, self.memory_mb) as engine:
                 text = f"COPY (SELECT * FROM read_parquet({quoted(str(self.file))})) TO {quoted(str(unfinished))} (FORMAT csv, HEADER)"
                 run(engine, text, target)
             write_beside(target, dict(self.record) | {"lines": self.count})

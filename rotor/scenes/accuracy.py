@@ -7,7 +7,7 @@
 | align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | see `rotor.classical.tolerance_search`; free motion is exact | from finer steps |
-| spectrum | intensities, "0.1 %" | nothing: Q is summed to 1e-8 | of the sum Q, and rounding |
+| spectrum, raman | intensities, "0.1 %" | see `rotor.spectra.intensity_accuracy` | of the sum Q, of rounding, of weaker lines |
 | emission | brightness, "1 mK" | the largest least depth, in decades | lines left out, Q |
 | fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades | the next step |
 | torsion | levels | nothing: exact | functions, terms of the series |
