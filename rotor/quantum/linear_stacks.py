@@ -7,7 +7,7 @@ one array, padded, so that new constants cost some products of arrays, one diago
     ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r* v_c
 
 more products for the states that are asked for. `blocks` finds the blocks of an operator algebra, `basis.state_elements` and
-`estimates.effect_units` write those of states and spins, `label_tracking` follows named states while constants change.
+`spins.linear_blocks` write those of states and spins, `label_tracking` follows named states while constants change.
 """
 
 from __future__ import annotations
@@ -35,6 +35,16 @@ class LinearBlock(NamedTuple):
     factors: NDArray[Any]
     mix: Floats
     parameters: Ints
+
+    def turned(self, functions: Floats) -> LinearBlock:
+        """The block over other functions, given in rows over those of this one."""
+        lower, found = np.zeros((self.size, self.size)), list[WeightedElements]()
+        for parameter, values in zip(self.parameters.tolist(), (self.factors @ self.mix).T, strict=True):
+            lower[self.rows, self.columns] = values
+            matrix = np.tril(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
+            places = np.flatnonzero(matrix)
+            found.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
+        return linear_block(len(functions), found)
 
 
 class SolvedStack(NamedTuple):
@@ -146,51 +156,35 @@ def stack_numbers(blocks: Sequence[LinearBlock]) -> list[Ints]:
     return [*out, np.array(some)] if some else out
 
 
-class Elements(NamedTuple):
-    """Elements of a matrix that are not zero, of its lower triangle: places row * size + column, rising, and values."""
-
-    places: Ints
-    values: Floats
-
-
-def elements_of(matrix: Floats) -> Elements:
-    """Of a dense matrix (size, size).
-
-    >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
-    [0, 3]
-    """
-    places = np.flatnonzero(matrix)
-    rows, columns = np.divmod(places, matrix.shape[1])
-    places = places[rows >= columns]
-    return Elements(places, matrix.ravel()[places])
-
-
 class WeightedElements(NamedTuple):
-    """Elements of many matrices at once: places as of `Elements`, in any order, and factors (elements, parameters), which add up."""
+    """Elements of the matrices of several parameters: places row * size + column, none twice, factors (elements, parameters), and which
+    parameters."""
 
     places: Ints
     factors: Floats
+    parameters: Ints
 
 
-def linear_block(size: int, units: dict[int, Elements], more: WeightedElements | None = None) -> LinearBlock:
-    """From the unit matrix of every parameter that acts in the block. `more`: elements of other parameters.
+def linear_block(size: int, elements: Sequence[WeightedElements]) -> LinearBlock:
+    """The block of elements of lower triangles, which add up.
 
-    >>> block = linear_block(2, {3: Elements(np.array([0, 2]), np.array([1.0, 0.5]))})
+    >>> found = WeightedElements(np.array([0, 2]), np.array([[1.0], [0.5]]), np.array([3]))
+    >>> block = linear_block(2, [found])
     >>> block.rows.tolist(), block.columns.tolist(), block.factors.ravel().tolist(), block.parameters.tolist()
     ([0, 1, 1], [0, 0, 1], [1.0, 0.5, 0.0], [3])
     """
-    given = [np.arange(size) * (size + 1), *(one.places for one in units.values()), *([more.places] if more else [])]
-    places, of_place = numbered(np.concatenate(given), size * size)
-    bounds = np.cumsum([0, *map(len, given)]).tolist()
-    count = more.factors.shape[1] if more else 1 + max(units, default=-1)
-    factors = np.zeros((len(places), count))
-    if more:
-        np.add.at(factors, of_place[bounds[-2] :], more.factors)
-    for column, start, stop in zip(units, bounds[1:], bounds[2:], strict=False):
-        factors[of_place[start:stop], column] = units[column].values
-    numbers = np.flatnonzero(factors.any(axis=0))
-    rows, columns = np.divmod(places, size)
-    return LinearBlock(size, rows, columns, factors[:, numbers], np.eye(len(numbers)), numbers)
+    diagonal = np.arange(size) * (size + 1)
+    places, of_place = numbered(np.concatenate([diagonal, *(one.places for one in elements)]), size * size)
+    parameters = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(one.parameters for one in elements)]))
+    factors, start = np.zeros((len(places), len(parameters))), size
+    for one in elements:
+        stop = start + len(one.places)
+        factors[of_place[start:stop, None], np.searchsorted(parameters, one.parameters)] += one.factors
+        start = stop
+    acting = np.flatnonzero(factors.any(axis=0))
+    return LinearBlock(
+        size, *np.divmod(places, size), factors[:, acting], np.eye(len(acting)), parameters[acting]
+    )  # fmt: skip
 
 
 def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:

@@ -7,7 +7,7 @@ X^p and the factors of its parameters. Couplings of states, and operators of J t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from rotor.quantum.linear_stacks import LinearBlock, numbered
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
-from rotor.tops.operators import Operators
+from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -103,6 +103,20 @@ class StateTerms(NamedTuple):
         rows, p, factors = (np.array(column) for column in zip(*found, strict=True))
         made = tuple(_Link(unit, *link) for unit, link in zip(units, links, strict=True))
         return cls(powers, first, rows, np.zeros_like(rows), p, factors, made)
+
+    @property
+    def linked(self) -> list[int]:
+        """The parameters that multiply other operators than powers."""
+        return sorted({int(column) for column in self.columns[self.rows >= len(self.first) * len(self.powers)]})
+
+    def by_power(self) -> Iterator[tuple[int, Powers, int, float]]:
+        """State, powers (p, q, n), parameter and factor of every term that is a power."""
+        states = list(self.first)
+        terms = (column.tolist() for column in (self.rows, self.columns, self.p, self.factors))
+        for row, column, p, factor in zip(*terms, strict=True):
+            state, unit = divmod(row, len(self.powers))
+            if state < len(states):
+                yield states[state], (p, *self.powers[unit]), column, factor
 
     def mix(self, j: int, count: int) -> Floats:
         """How much of each unit matrix each parameter has at one J, (units, count)."""

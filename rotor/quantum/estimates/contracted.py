@@ -26,7 +26,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Plan, SpinBlock
-from rotor.quantum.spins.lines import ALONE, parameter_operators
+from rotor.quantum.spins.linear_blocks import Unit, unit_matrices
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
 from rotor.quantum.spins.rotor import Channel, RotorBlock
 
@@ -38,35 +38,6 @@ _LARGE = 400  # functions of a block from which on this is worth while
 _WIDE = 0.15  # of the spread of energies: a window beyond it holds too many functions
 _LEAST_RATIO = 10.0  # of the window to the length of a column of V
 _SPREAD = 0.01  # of the window: levels so near each other share E₀; the rest is χ²(E - E₀)²/W³
-
-
-class Unit(NamedTuple):
-    """Unit matrices of several parameters over one pair of blocks of the rotation: places of their elements and factors.
-
-    factors : (elements, parameters). parameters : which ones. size : rows and columns
-    """
-
-    rows: Ints
-    columns: Ints
-    factors: Floats
-    parameters: Ints
-    size: tuple[int, int]
-
-    @classmethod
-    def of(cls, matrices: dict[int, Floats]) -> Unit:
-        """From a dense matrix for each parameter."""
-        parameters = sorted(matrices)
-        shape = matrices[parameters[0]].shape
-        places = np.unique(np.concatenate([np.flatnonzero(matrices[i]) for i in parameters]))
-        factors = np.stack([matrices[i].ravel()[places] for i in parameters], axis=1)
-        rows, columns = np.divmod(places, shape[1])
-        return cls(rows, columns, factors, np.array(parameters, dtype=np.int64), (shape[0], shape[1]))
-
-    def matrix(self, values_mhz: Floats) -> Floats:
-        """Σ value times unit matrix."""
-        out = np.zeros(self.size)
-        out[self.rows, self.columns] = self.factors @ values_mhz[self.parameters]
-        return out
 
 
 class _Target(NamedTuple):
@@ -97,10 +68,7 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class ContractedLevels:
-    """Labelled levels for other values of the parameters; see `levels`.
-
-    rotations : of the blocks on which a parameter acts; N = 0 of the lowest state has none, and the energy 0.
-    """
+    """Labelled levels for other values of the parameters; see `levels`. rotations, couplings : see `spins.linear_blocks.Units`."""
 
     count: int
     rotors: dict[int, RotorBlock]
@@ -127,10 +95,8 @@ class ContractedLevels:
 
     def _solved(self, values_mhz: Floats) -> _Solved:
         energies, vectors = {}, {}
-        for number, rotor in self.rotors.items():
-            size = len(rotor.energies_mhz)
-            unit = self.rotations.get(number)
-            energies[number], vectors[number] = _eigen(unit.matrix(values_mhz) if unit else np.zeros((size, size)))
+        for number in self.rotors:
+            energies[number], vectors[number] = _eigen(self.rotations[number].matrix(values_mhz))
         operators = {
             (i, k): {channel: vectors[i].T @ unit.matrix(values_mhz) @ vectors[k] for channel, unit in units.items()}
             for (i, k), units in self.couplings.items()
@@ -144,9 +110,9 @@ class ContractedLevels:
         for part in block.parts:
             own = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
             turned.append(np.matmul(solved.vectors[part.number], own))
-            if unit := self.rotations.get(part.number):
-                pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
-                out[:, unit.parameters] += pairs @ unit.factors
+            unit = self.rotations[part.number]
+            pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
+            out[:, unit.parameters] += pairs @ unit.factors
         for a, up in enumerate(block.parts):
             for b, low in enumerate(block.parts[: a + 1]):
                 for channel, unit in self.couplings.get((up.number, low.number), {}).items():
@@ -291,14 +257,15 @@ def contracted_levels(
     if max(len(block.energies_mhz) for block, _ in blocks) < _LARGE:
         return None
     used = {number for block, _ in blocks for number in (part.number for part in block.parts)}
-    rotations, couplings = _units(top, effects, plan, used, names)
+    rotors = {i: plan.blocks[i] for i in sorted(used)}
+    rotations, couplings = unit_matrices(top, effects, names, plan.shared, rotors)
     own = tuple(_Block(block.parts, _known(plan, block), targets) for block, targets in blocks)
-    found = ContractedLevels(len(rows), {i: plan.blocks[i] for i in used}, rotations, couplings, own, 0.0)
+    found = ContractedLevels(len(rows), rotors, rotations, couplings, own, 0.0)
     window = _window(found, values_mhz)
     spread = min(float(np.ptp(block.energies_mhz)) for block, _ in blocks)
     if window > _WIDE * spread:
         return None
-    return ContractedLevels(found.count, found.rotors, rotations, couplings, own, window)
+    return replace(found, window_mhz=window)
 
 
 def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
@@ -323,32 +290,6 @@ def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock
 def _known(plan: Plan, block: SpinBlock) -> dict[Channel, Floats]:
     known: dict[Channel, Floats] = plan.shared.cache["coupling", block.twice_f]
     return known
-
-
-def _units(
-    top: Top, effects: tuple[QuantumEffect, ...], plan: Plan, used: set[int], names: Sequence[str]
-) -> tuple[dict[int, Unit], dict[tuple[int, int], dict[Channel, Unit]]]:
-    """Unit matrices of every parameter over the functions of the basis, of the rotation and of what couples it to the spins."""
-    operators = parameter_operators(top, effects, names, plan.shared)
-    parts = {i: _in_functions(i, plan.blocks[i]) for i in used}
-    rotations, couplings = dict[int, Unit](), dict[tuple[int, int], dict[Channel, Unit]]()
-    for i, k in [*plan.operators, *((i, i) for i in used if (i, i) not in plan.operators)]:
-        if not {i, k} <= used:
-            continue
-        found: dict[Channel, dict[int, Floats]] = {}
-        for place, operator in enumerate(operators):
-            for channel, element in operator.elements(parts[i], parts[k]).items():
-                if element.any():
-                    found.setdefault(channel, {})[place] = element
-        if alone := found.pop(ALONE, None):
-            rotations[i] = Unit.of(alone)
-        couplings[i, k] = {channel: Unit.of(matrices) for channel, matrices in found.items()}
-    return rotations, couplings
-
-
-def _in_functions(number: int, rotor: RotorBlock) -> SpinPart:
-    every = slice(0, 1)
-    return SpinPart(number, replace(rotor, vectors=np.eye(len(rotor.energies_mhz))), every, every)
 
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.operators import AxialState, Cosines, CosinesWithN, Rotor, Scalar, factors_with_n, tensor_of
 from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
@@ -51,8 +52,8 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
     first = own[0].parts[0]
     section = Section(first.v, first.basis, slice(0, 1), tuple(block.parts[0] for block in own))  # type: ignore[arg-type]
     return Stack(
-        kind, np.array(numbers), np.array([block.n for block in own]), (section,), np.ones((count, 1, 1)), [1] * count,
-        [block.vectors for block in own], [block.energies_mhz for block in own], [True] * count,
+        kind, np.array(numbers), np.array([block.n for block in own]), (section,), np.ones((count, 1, 1)), [1] * count, own,
+        [True] * count,
     )  # fmt: skip
 
 
@@ -97,6 +98,17 @@ def _values(pieces: Sequence[Piece], states: tuple[int, int], pairs: Pairs, k: I
         if piece.bra != piece.ket and acts(piece, *states[::-1]):
             total += (-1.0) ** pairs.rise * powers * _elements(piece.rotor, m, -pairs.rise, k, representation)
     return total
+
+
+def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[RotorBlock]) -> Floats:
+    """N^2p Nz^2q, (N (N + 1))^p K^2q, of every function and of so many parameters, (blocks, count); what changes K does not act."""
+    parts = [block.parts[0] for block in blocks]
+    v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True))
+    x, out = n * (n + 1.0), np.zeros((len(parts), count))
+    for state, (p, q, order), column, factor in terms.by_power():
+        if not order:
+            out[:, column] += np.where(v == state, factor * x**p * k ** (2.0 * q), 0.0)
+    return out
 
 
 def _elements(rotor: Rotor, n: Floats, rise: int, k: Ints, representation: str) -> Floats:

@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.axial import Exist, operators_of_axial_stacks
+from rotor.quantum.basis.state_elements import StateTerms
+from rotor.quantum.spins.axial import Exist, operators_of_axial_stacks, powers_of_axial
 from rotor.quantum.spins.blocks import Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.many_f_levels import Member, existing_blocks
 from rotor.quantum.spins.parts import SpinPart, labels_of_alike
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
-from rotor.quantum.spins.rotor import Channel, RotorPart
+from rotor.quantum.spins.rotor import Channel, RotorPart, parameter_channels
 from rotor.quantum.spins.scheme import Scheme
 
 if TYPE_CHECKING:
-    from rotor.quantum.spins.lines import ParameterOperator
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
 _MOST = 100  # patterns of an F: tables of coefficients grow with the square
@@ -106,17 +108,23 @@ def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) 
     return out
 
 
-def axial_derivatives(operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock], count: int) -> Floats:
+def axial_derivatives(
+    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock], count: int
+) -> Floats:
     """∂E/∂c (count, parameters) of the states of spin blocks, by the rows of their levels."""
-    shared, out = blocks[0].shared, np.zeros((count, len(operators)))
+    shared, out = blocks[0].shared, np.zeros((count, len(names)))
     twice_f = [block.twice_f for block in blocks]
     places = pattern_table(shared.scheme, min(twice_f), max(twice_f)).places
     stacks = shared.axial or []
-    rotors = {number: stack.sections[0].every[i] for stack in stacks for i, number in enumerate(stack.numbers.tolist())}
-    along = _of_powers(operators, [rotors[number] for number in range(len(rotors))])
-    tables = AxialTables([part for _, part in sorted(rotors.items())], shared.scheme, (min(places), max(places)))
-    acting = [(column, channel) for column, operator in enumerate(operators) for channel in operator.channels]
-    pieces = [operators[column].channels[channel] for column, channel in acting]
+    by_number = {
+        number: block for stack in stacks for number, block in zip(stack.numbers.tolist(), stack.blocks, strict=True)
+    }
+    rotors = [by_number[number] for number in range(len(by_number))]
+    along = powers_of_axial(StateTerms.of(top, effects, names, shared.representation), len(names), rotors)
+    tables = AxialTables([rotor.parts[0] for rotor in rotors], shared.scheme, (min(places), max(places)))
+    channels = parameter_channels(top, effects, names, shared.scheme)
+    acting = [(column, channel) for column, own in enumerate(channels) for channel in own]
+    pieces = [channels[column][channel] for column, channel in acting]
     spins = operators_of_axial_stacks(stacks, _REACH, pieces, shared.representation)
     for which, functions in by_size([(block.twice_f, block.parts) for block in blocks], places):
         vectors = np.stack([blocks[i].vectors for i in which])
@@ -127,15 +135,4 @@ def axial_derivatives(operators: Sequence[ParameterOperator], blocks: Sequence[S
             slopes[:, :, column] += (np.matmul(whole, vectors) * vectors).sum(axis=1)
         rows = np.array([blocks[i].start for i in which])[:, None] + np.arange(vectors.shape[2])
         out[rows] = slopes
-    return out
-
-
-def _of_powers(operators: Sequence[ParameterOperator], functions: Sequence[RotorPart]) -> Floats:
-    """N^2p Nz^2q, (N (N + 1))^p K^2q, of every function and parameter; those that change K do not act."""
-    v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in functions), strict=True))
-    x, out = n * (n + 1.0), np.zeros((len(functions), len(operators)))
-    for column, operator in enumerate(operators):
-        for state, powers in operator.powers or ():
-            total = sum(factor * x**p * k ** (2.0 * q) for (p, q, order), factor in powers.items() if not order)
-            out[:, column] += np.where(v == state, total, 0.0)
     return out

@@ -26,14 +26,12 @@ from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, opera
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
-from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
     RotorBlock,
     channels_of,
-    in_both_orders,
     solved_rotor,
     valued_terms,
 )
@@ -210,33 +208,6 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
         alike = (other for other in firsts.values() if other.rank == channel.rank and channels[other] == pieces)
         firsts[channel] = next(alike, channel)
     return firsts
-
-
-def operators_between(
-    up: RotorBlock, low: RotorBlock, channels: Channels, representation: str
-) -> dict[Channel, Floats]:
-    """Σ c ⟨r'|X|r⟩ of every channel that acts between two solved blocks of the rotation.
-
-    Parameters
-    ----------
-    up, low : RotorBlock
-        The blocks of r' (rows) and r (columns).
-    channels : dict of Channel to list of Piece
-        Pieces of the Hamiltonian that share their coefficients of coupling.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    dict of Channel to (n', n) array
-        Contracted matrices in MHz; empty where nothing acts.
-    """
-    bases = up.parts[0].basis, low.parts[0].basis
-    if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState) and bases[0].axial_k != bases[1].axial_k:
-        return {}
-    acting = [channel for channel in channels if abs(up.n - low.n) <= channel.rank <= up.n + low.n]
-    found = {channel: in_both_orders(up, low, channels[channel], representation) for channel in acting}
-    return {channel: operator for channel, operator in found.items() if operator is not None}
 
 
 def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:

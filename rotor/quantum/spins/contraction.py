@@ -2,7 +2,7 @@
 
 Blocks with the same states v and Wang functions in them, which differ in N alone, stand in one stack, padded with zeros to one shape.
 Elements between two stacks whose N differ by one number are one array, by the formulas of `tensors` and `operators` for all these
-N, and are contracted by one product of matrices. Pair by pair the same is `rotor.in_both_orders`.
+N, and are contracted by one product of matrices.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SMALL = 16  # functions up to which blocks of all sizes share a stack; of large
 
 class Stack(NamedTuple):
     """Solved blocks of rising N: which states and Wang functions are in them, as a number, their own numbers, N, eigenvectors
-    (blocks, rows, states) with zeros beyond a block, how many states each has, its own eigenvectors, and its energies."""
+    (blocks, rows, states) with zeros beyond a block, how many states each has, the blocks, and which are contracted one by one."""
 
     kind: int
     numbers: Ints
@@ -32,8 +32,7 @@ class Stack(NamedTuple):
     sections: tuple[Section, ...]
     vectors: Floats
     sizes: list[int]
-    own: list[Floats]
-    energies_mhz: list[Floats]
+    blocks: list[RotorBlock]
     single: list[bool]
 
 
@@ -95,8 +94,7 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
         tuple(sections),
         vectors,
         sizes,
-        [block.vectors for block in own],
-        [block.energies_mhz for block in own],
+        own,
         [len(block.energies_mhz) == 1 or any(part.basis.size == 1 for part in block.parts) for block in own],
     )
 
@@ -120,7 +118,7 @@ def operators_of_stacks(
     Returns
     -------
     list of list of Contracted
-        Of each operator, in MHz, as `rotor.in_both_orders` gives them.
+        Of each operator, in MHz. Coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p').
     """
     between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
@@ -256,12 +254,12 @@ def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]
 
 
 def _one_contracted(up: Stack, low: Stack, place: tuple[int, int], elements: Sequence[Element]) -> Floats:
-    """The same of one pair, to the last bit of `rotor.contracted`: where levels nearly coincide their states depend on it."""
+    """The same of one pair without padding: where levels nearly coincide their states depend on the last bit."""
     total: Floats | None = None
     for left, right, element in elements:
         bra, ket = left.every[place[0]], right.every[place[1]]
         inside = element[: bra.basis.size, : ket.basis.size]
-        own = up.own[place[0]][bra.place].T @ inside @ low.own[place[1]][ket.place]
+        own = up.blocks[place[0]].vectors[bra.place].T @ inside @ low.blocks[place[1]].vectors[ket.place]
         total = own if total is None else total + own
     assert total is not None
     return total

@@ -17,15 +17,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.axial_levels import axial_derivatives
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import operators_of_stacks, powers_of_stacks
-from rotor.quantum.spins.lines import ALONE, ParameterOperator, parameter_operators
+from rotor.quantum.spins.linear_blocks import rotation_blocks
 from rotor.quantum.spins.many_f import Frame, Group, RotationColumns, Tables, frame_of, groups_of, tables_of
 from rotor.quantum.spins.many_f_lines import States, groups_of_blocks, states_of_group
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
-from rotor.quantum.spins.rotor import Channel, Piece, RotorBlock
+from rotor.quantum.spins.rotor import ALONE, Channel, Channels, Piece, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -53,14 +54,13 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared: Shared = levels.blocks[0].shared
-    operators = parameter_operators(top, levels.effects, names, shared)
     if shared.axial is not None:
-        return np.asarray(axial_derivatives(operators, levels.blocks, len(levels))[rows])
+        return np.asarray(axial_derivatives(top, levels.effects, names, levels.blocks, len(levels))[rows])
     frame, groups = _frame_and_groups(levels.blocks, shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row is that of padding
     tables = [
         (couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1]), elements)
-        for channel, elements in _unit_tables(operators, levels.blocks, shared, frame)
+        for channel, elements in _unit_tables(top, levels, names, shared, frame)
     ]
     for group, blocks in groups:
         for alike in _of_like_size(blocks):
@@ -97,35 +97,34 @@ def _of_like_size(blocks: Sequence[SpinBlock]) -> Iterator[list[SpinBlock]]:
 
 
 def _unit_tables(
-    operators: Sequence[ParameterOperator], blocks: Sequence[SpinBlock], shared: Shared, frame: Frame
+    top: Top, levels: Levels, names: Sequence[str], shared: Shared, frame: Frame
 ) -> Iterator[tuple[Channel, dict[Kinds, UnitTables]]]:
     """The elements of all parameters by channel: powers of N, operators of spins, other operators of N."""
-    yield ALONE, _of_powers(operators, shared, frame)
-    channels = dict.fromkeys(channel for operator in operators for channel in operator.channels)
+    terms = StateTerms.of(top, levels.effects, names, shared.representation)
+    yield ALONE, _of_powers(terms, shared, frame)
+    every = parameter_channels(top, levels.effects, names, shared.scheme)
+    channels = dict.fromkeys(channel for own in every for channel in own)
     for rank in {channel.rank for channel in channels}:
         own = [channel for channel in channels if channel.rank == rank]
-        yield from zip(own, _of_spins(operators, own, shared, frame), strict=True)
-    rotors = {part.number: part.rotor for block in blocks for part in block.parts}
-    for column, operator in enumerate(operators):
-        if operator.powers is None:
-            one = np.ones((frame.count_of_n, 1, 1))
-            found = _of_rotation(operator, rotors, frame).items()
-            yield ALONE, {key: UnitTables(table[:, None], np.array([column]), one) for key, table in found}
+        yield from zip(own, _of_spins(every, own, shared, frame), strict=True)
+    if terms.linked:
+        linked = [name if column in terms.linked else "" for column, name in enumerate(names)]
+        of_linked = StateTerms.of(top, levels.effects, linked, shared.representation)
+        yield ALONE, _of_links(of_linked, len(names), terms.linked, levels.blocks, frame)
 
 
 def _of_spins(
-    operators: Sequence[ParameterOperator], channels: Sequence[Channel], shared: Shared, frame: Frame
+    every: Sequence[Channels], channels: Sequence[Channel], shared: Shared, frame: Frame
 ) -> Iterator[dict[Kinds, UnitTables]]:
     """Operators of spins in some channels of one rank: a unit for each operator of N, which a parameter has ½(N'^2p + N^2p) times."""
-    units = [_units([operator.channels.get(channel, []) for operator in operators]) for channel in channels]
-    reach = min(_REACH, channels[0].rank)
-    every = [[unit] for own in units for unit in own]
-    contracted = iter(operators_of_stacks(shared.stacks or [], reach, every, shared.representation))
+    units = [_units([by_channel.get(channel, []) for by_channel in every]) for channel in channels]
+    reach, alone = min(_REACH, channels[0].rank), [[unit] for own in units for unit in own]
+    contracted = iter(operators_of_stacks(shared.stacks or [], reach, alone, shared.representation))
     for channel, own in zip(channels, units, strict=True):
         terms = [
             (own.index(_unit(piece)), piece, column)
-            for column, operator in enumerate(operators)
-            for piece in operator.channels.get(channel, ())
+            for column, by_channel in enumerate(every)
+            for piece in by_channel.get(channel, ())
         ]
         columns = sorted({column for _, _, column in terms})
         tables = [tables_of(next(contracted), frame) for _ in own]
@@ -159,26 +158,31 @@ def _side_by_side(tables: Sequence[Tables]) -> dict[Kinds, Floats]:
     return found
 
 
-def _of_rotation(operator: ParameterOperator, rotors: dict[int, RotorBlock], frame: Frame) -> Tables:
-    """The elements of operators of N that no powers describe."""
-    found: Tables = {}
-    for number, rotor in rotors.items():
-        own = operator.rotation(rotor)
-        if own is not None:
-            kind, size = frame.kinds[number], len(own)
-            of_kind = frame.energies_mhz[kind]
-            table = found.setdefault((kind, kind, 0), np.zeros((*of_kind.shape, of_kind.shape[1])))
-            table[rotor.n - frame.lowest, :size, :size] = own
-    return found
+def _of_links(
+    terms: StateTerms, count: int, linked: Sequence[int], blocks: Sequence[SpinBlock], frame: Frame
+) -> dict[Kinds, UnitTables]:
+    """Parameters that multiply other operators of N than powers, each a unit."""
+    rotors = {part.number: part.rotor for block in blocks for part in block.parts}
+    found: dict[Kinds, Floats] = {}
+    linear = rotation_blocks(terms, count, list(rotors.values()), blocks[0].shared.representation)
+    for (number, rotor), block in zip(rotors.items(), linear, strict=True):
+        kind, size = frame.kinds[number], block.size
+        states = frame.energies_mhz[kind].shape[1]
+        table = found.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
+        lower = np.zeros((len(block.parameters), size, size))
+        lower[:, block.rows, block.columns] = (block.factors @ block.mix).T
+        whole = lower + np.tril(lower, -1).transpose(0, 2, 1)
+        units = [linked.index(parameter) for parameter in block.parameters.tolist()]
+        table[rotor.n - frame.lowest, units, :size, :size] = rotor.vectors.T @ whole @ rotor.vectors
+    mix = np.tile(np.eye(len(linked)), (frame.count_of_n, 1, 1))
+    return {key: UnitTables(table, np.array(linked), mix) for key, table in found.items()}
 
 
-def _of_powers(operators: Sequence[ParameterOperator], shared: Shared, frame: Frame) -> dict[Kinds, UnitTables]:
+def _of_powers(every: StateTerms, shared: Shared, frame: Frame) -> dict[Kinds, UnitTables]:
     """Powers of N, N^2p ½[Nz^2q, N₊^2n + N₋^2n]₊: a unit for each (v, q, n), which a parameter has N^2p times at each N."""
+    others = every.linked
     terms = [
-        ((v, q, n), p, column, factor)
-        for column, operator in enumerate(operators)
-        for v, by_powers in operator.powers or ()
-        for (p, q, n), factor in by_powers.items()
+        ((v, q, n), p, column, factor) for v, (p, q, n), column, factor in every.by_power() if column not in others
     ]
     units = list(dict.fromkeys(unit for unit, *_ in terms))
     columns = sorted({column for _, _, column, _ in terms})

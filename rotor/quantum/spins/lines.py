@@ -1,4 +1,4 @@
-"""Elements of molecule-fixed tensors between levels with spins, and those of ∂H/∂c of each parameter.
+"""Elements of molecule-fixed tensors between levels with spins.
 
 A dipole touches no spin: its element between two functions is that of the rotation times a product of 6j symbols,
 
@@ -9,32 +9,22 @@ see `coupling.tensor_coefficients`. Elements of the rotation are computed once f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.blocks import Shared, SpinBlock, operators_between, product
+from rotor.quantum.spins.blocks import Shared, SpinBlock, product
 from rotor.quantum.spins.contraction import by_numbers, tensors_of_stacks
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
-from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
+from rotor.quantum.spins.operators import AxialState, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
+from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.spins.stack_elements import MOST_RANK
-from rotor.quantum.spins.terms import SpinTerm
-from rotor.quantum.states import Coupling, State
 from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
 from rotor.quantum.tensors import acting_on as body_acting_on
 from rotor.quantum.wang.basis import WangBlock
-from rotor.quantum.wang.j_operators import JOperator, between_blocks
-from rotor.tops.operators import Operators
-
-if TYPE_CHECKING:
-    from rotor.quantum.effect import QuantumEffect
-    from rotor.tops.top import Top
 
 _FEW = 10_000  # elements between two F; where there are more, they are made when they are needed
 ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
@@ -231,120 +221,3 @@ def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Flo
     (up, left), (low, right) = (scheme.recoupling(int(own[0, -1])) for own in (bra, ket))
     found = left.T @ tensor_coefficients(scheme.twice, rank, up, low) @ right
     return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
-
-
-class Declared(NamedTuple):
-    """What effects declare: operators of N by state, couplings, spin terms."""
-
-    states: Sequence[tuple[int, Mapping[str, Operators]]]
-    couplings: list[Coupling]
-    spin_terms: list[SpinTerm]
-
-    @classmethod
-    def of(cls, top: Top, effects: Sequence[QuantumEffect]) -> Declared:
-        """The declarations of all effects, in their order."""
-        states = [
-            (one.v, one.terms) for effect in effects for one in (State(0, effect.operators(top)), *effect.states(top))
-        ]
-        return cls(
-            states,
-            [one for effect in effects for one in effect.couplings(top)],
-            [term for effect in effects for term in effect.spin_terms(top)],
-        )
-
-
-def parameter_operators(
-    top: Top, effects: Sequence[QuantumEffect], names: Iterable[str], shared: Shared
-) -> list[ParameterOperator]:
-    """∂H/∂c of several parameters."""
-    declared = Declared.of(top, effects)
-    return [ParameterOperator(top, effects, name, shared, declared) for name in names]
-
-
-class ParameterOperator:
-    """∂H/∂c of one parameter over the parts of spin blocks, each element of the rotation computed once."""
-
-    def __init__(
-        self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared, declared: Declared | None = None
-    ) -> None:
-        """declared: what the effects declare, where operators of many parameters are made."""
-        self._top, self._effects, self._name, self._shared = top, effects, name, shared
-        declared = declared or Declared.of(top, effects)
-        terms = [term for term in declared.spin_terms if term.name == name]
-        self.channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
-        self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
-        self._by_n: dict[int, list[tuple[int, int, JOperator]]] = {}
-        self._own = [(v, operators) for v, terms in declared.states if (operators := terms.get(name))]
-        self._couplings = [one for one in declared.couplings if one.name == name]
-
-    @property
-    def powers(self) -> list[tuple[int, Operators]] | None:
-        """By states the powers of N that the parameter multiplies; None where it multiplies other operators of N."""
-        others = self._couplings or any(
-            effect.j_operator(self._top, self._name, 1, self._shared.representation) is not None
-            for effect in self._effects
-            if self._name in effect.parameters(self._top)
-        )
-        return None if others else self._own
-
-    def connects(self, up: SpinPart, low: SpinPart) -> bool:
-        """Whether there may be elements between two parts: an operator of the rotation alone has them within one solved block."""
-        return bool(self.channels) or up.number == low.number
-
-    def elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
-        """Elements between the states of the rotation of two parts, by channel."""
-        key = (up.number, low.number)
-        if key not in self._known:
-            found: dict[Channel, Floats] = {}
-            if self.channels:
-                found = operators_between(up.rotor, low.rotor, self.channels, self._shared.representation)
-            if up.number == low.number and (own := self.rotation(up.rotor)) is not None:
-                found[ALONE] = found[ALONE] + own if ALONE in found else own
-            self._known[key] = found
-        return self._known[key]
-
-    def rotation(self, block: RotorBlock) -> Floats | None:
-        """The derivative of the Hamiltonian of the rotation over the states of a block."""
-        size = sum(part.basis.size for part in block.parts)
-        total = np.zeros((size, size))
-        for v, operators in self._own:
-            for part in block.parts:
-                if part.v == v:
-                    matrix = Scalar(tuple(operators.items())).elements(
-                        part.basis, part.basis, self._shared.representation
-                    )
-                    assert matrix is not None
-                    total[part.place, part.place] += matrix
-        for bra, ket, operator in self._operators_of_j(block.n):
-            _add_between(total, block, bra, ket, operator)
-        return block.vectors.T @ total @ block.vectors if total.any() else None
-
-    def _operators_of_j(self, n: int) -> list[tuple[int, int, JOperator]]:
-        if n not in self._by_n:
-            self._by_n[n] = list(self._made_of_j(n))
-        return self._by_n[n]
-
-    def _made_of_j(self, n: int) -> Iterator[tuple[int, int, JOperator]]:
-        representation = self._shared.representation
-        for effect in self._effects:
-            if self._name in effect.parameters(self._top):
-                operator = effect.j_operator(self._top, self._name, n, representation)
-                if operator is not None:
-                    yield 0, 0, operator
-        for coupling in self._couplings:
-            yield coupling.bra, coupling.ket, coupling.operator(n, representation)
-
-
-ALONE = Channel((), 0)
-
-
-def _add_between(total: Floats, block: RotorBlock, bra: int, ket: int, operator: JOperator) -> None:
-    for up in block.parts:
-        for low in block.parts:
-            if (up.v, low.v) == (bra, ket):
-                assert isinstance(up.basis, WangBlock)
-                assert isinstance(low.basis, WangBlock)
-                between = between_blocks(up.basis, low.basis, operator).real
-                total[up.place, low.place] += between
-                if bra != ket:
-                    total[low.place, up.place] += between.T

@@ -106,10 +106,9 @@ def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> F
         largest[stack.kind] = max(largest.get(stack.kind, 0), *stack.sizes)
     for stack in stacks:
         of_kind = energies.setdefault(stack.kind, np.zeros((highest - lowest + 1, largest[stack.kind])))
-        members = zip(stack.numbers.tolist(), stack.n.tolist(), stack.sizes, stack.energies_mhz, strict=True)
-        for number, n, size, own in members:
-            kinds[number], sizes[number] = stack.kind, size
-            of_kind[n - lowest, :size] = own
+        for number, block in zip(stack.numbers.tolist(), stack.blocks, strict=True):
+            kinds[number], sizes[number] = stack.kind, len(block.energies_mhz)
+            of_kind[block.n - lowest, : sizes[number]] = block.energies_mhz
     patterns = {f: own.tolist() for f, own in places.items()}
     n_patterns = [(rise, of) for rise, of in every[:, [0, -1]].tolist()]
     return Frame(list(places), lowest, kinds, sizes, energies, patterns, n_patterns)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -61,6 +60,9 @@ class Channel(NamedTuple):
     ns: int = 0
     n2: int = 0
     exchange: int = 0
+
+
+ALONE = Channel((), 0)
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,17 @@ def channels_of(terms: Terms, scheme: Scheme) -> Channels:
     return found
 
 
+def parameter_channels(
+    top: Top, effects: Iterable[QuantumEffect], names: Sequence[str], scheme: Scheme
+) -> list[Channels]:
+    """∂H/∂c of each named parameter by channel, but for what it multiplies of the rotation alone."""
+    terms: dict[str, Terms] = {name: [] for name in names}
+    for term in (term for effect in effects for term in effect.spin_terms(top)):
+        if term.name in terms:
+            terms[term.name].append((term.factor, term))
+    return [channels_of(terms[name], scheme) for name in names]
+
+
 def _by_exchange(channel: Channel, scheme: Scheme) -> list[tuple[Channel, float]]:
     """A channel as parts that keep or change the symmetry of two equivalent spins: ½(A + B) ± ½(A - B); of three, as in `scheme`."""
     if not scheme.equivalent:
@@ -228,93 +241,6 @@ def _of_three(channel: Channel, first: int) -> Channel:
     )
 
 
-def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
-    """Σ value ⟨r'‖X‖r⟩ between the states of two blocks.
-
-    A piece between different states acts from its ket to its bra; the other way round it is the transposed element,
-    which belongs to the other order of the two blocks.
-
-    Parameters
-    ----------
-    up, low : RotorBlock
-        The blocks of r' (rows) and r (columns).
-    pieces : sequence of Piece
-        Operators with their values in MHz.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    (n', n) array or None
-        MHz; None where nothing acts.
-    """
-    total: Floats | None = None
-    for piece in pieces:
-        for left in up.parts:
-            for right in low.parts:
-                if not acts(piece, left.v, right.v):
-                    continue
-                found = _elements(piece.rotor, left.basis, right.basis, representation)
-                if found is None or not found.any():
-                    continue
-                scaled = _powers(piece, left, right) * found
-                moved = up.vectors[left.place].T @ scaled @ low.vectors[right.place]
-                total = moved if total is None else total + moved
-    return total
-
-
-def _elements(rotor: Rotor, up: Basis, low: Basis, representation: str) -> Floats | None:
-    """The elements of an operator; those between single functions of axial tops are made once for all parameters that have them."""
-    if isinstance(up, AxialState) and isinstance(low, AxialState):
-        return _axial_elements(rotor, up, low, representation)
-    return rotor.elements(up, low, representation)
-
-
-@lru_cache(maxsize=1 << 16)
-def _axial_elements(rotor: Rotor, up: AxialState, low: AxialState, representation: str) -> Floats | None:
-    return rotor.elements(up, low, representation)
-
-
 def acts(piece: Piece, left: int, right: int) -> bool:
     """Whether a piece acts from the state `right` to the state `left`."""
     return left == right if piece.bra == EVERY_STATE else (left, right) == (piece.bra, piece.ket)
-
-
-def _powers(piece: Piece, left: RotorPart, right: RotorPart) -> Floats:
-    """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q."""
-    m, n = left.basis.j, right.basis.j
-    value = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
-    if not piece.nz2:
-        return np.asarray(value)
-    bra, ket = left.basis.k.astype(float) ** (2 * piece.nz2), right.basis.k.astype(float) ** (2 * piece.nz2)
-    return np.asarray(value * (bra[:, None] + ket) / 2)
-
-
-def in_both_orders(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
-    """`contracted` and, for pieces between different states, their Hermitian conjugates from the other order.
-
-    Parameters
-    ----------
-    up, low : RotorBlock
-        The blocks of r' (rows) and r (columns).
-    pieces : sequence of Piece
-        Operators with their values in MHz.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    (n', n) array or None
-        MHz; None where nothing acts.
-
-    Notes
-    -----
-    Coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p').
-    """
-    found = contracted(up, low, pieces, representation)
-    between = [piece for piece in pieces if piece.bra != piece.ket]
-    back = contracted(low, up, between, representation) if between else None
-    if back is None:
-        return found
-    turned = (-1.0) ** (up.n - low.n) * back.T
-    return turned if found is None else found + turned

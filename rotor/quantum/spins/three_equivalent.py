@@ -24,7 +24,7 @@ from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_of
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart, assigned
-from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart
+from rotor.quantum.spins.rotor import ALONE, Channel, RotorBlock, RotorPart
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import phase
@@ -33,7 +33,6 @@ from rotor.tops.operators import axes_of
 _ZERO = 1e-12  # of the largest element: what connects less is round-off of sums that cancel
 _ROUND_OFF = 1e-13  # of coefficients, sums of products of a few numbers of size 1
 _OF_THE_AXIS = 1e-9  # of the largest element: round-off of products of eigenvectors is below
-_ALONE = Channel((), 0)
 
 
 class Row(NamedTuple):
@@ -77,7 +76,7 @@ def in_wang_functions(plan: Plan) -> Plan:
         own = (block.vectors * block.energies_mhz) @ block.vectors.T
         _check_axis(block, own)
         found = turned.setdefault((number, number), {})
-        found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
+        found[ALONE] = own + found[ALONE] if ALONE in found else own
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
     return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, given=turned)
 
@@ -221,7 +220,7 @@ def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], fun
 
 def _coupling(plan: Plan, channel: Channel, every: Ints) -> Floats:
     """The coefficients of a channel without round-off: rotational energies times it would connect what symmetry keeps apart."""
-    if channel == _ALONE:
+    if channel == ALONE:
         return np.eye(len(every))
     found = coefficients_of(plan.shared.scheme, channel, every)
     return np.where(np.abs(found) > _ROUND_OFF, found, 0.0)
