@@ -127,7 +127,7 @@ def _by_pairs(columns: Sequence[int], every: Sequence[Sequence[Contracted]]) -> 
     for members in alike.values():
         (_, first), parameters = members[0], np.array([column for column, _ in members])
         table = np.stack([one.matrices for _, one in members], axis=3)  # (pairs, functions', functions, parameters)
-        there = table.any(axis=3)
+        there = np.asarray(table.any(axis=3))
         for place in np.flatnonzero(there.any(axis=(1, 2))).tolist():
             a, b = int(first.pairs.up[place]), int(first.pairs.low[place])
             rows, places = np.nonzero(there[place])
