@@ -7,11 +7,11 @@ import pytest
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.axial import axial_stacks, tensors_of_axial_stacks
 from rotor.quantum.spins.contraction import by_numbers, operators_of_stacks, stacks_of, tensors_of_stacks
-from rotor.quantum.spins.lines import _rotor_element
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
-from rotor.quantum.tensors import body_tensor
+from rotor.quantum.tensors import body_tensor, tensor_between
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -57,6 +57,18 @@ def both_ways(up, low, pieces: list, representation: str) -> np.ndarray | None:
     return turned if found is None else found + turned
 
 
+def plain_tensor(up, low, tensors: dict) -> np.ndarray | None:
+    """⟨r'‖T‖r⟩ between the states of two blocks, part by part."""
+    total = None
+    for left in up.parts:
+        for right in low.parts:
+            found = tensor_elements(left.basis, right.basis, tensor_between(tensors, left.v, right.v))
+            if found is not None and found.any():
+                moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
+                total = moved if total is None else total + moved
+    return total
+
+
 PIECES = {
     "quadrupole with every element": [Piece(-57.0, Cosines(_matrix()), -1, -1, 0, 0)],
     "spin-rotation, antisymmetric part too": [Piece(3.0, CosinesWithN(_matrix()), -1, -1, 0, 0)],
@@ -100,12 +112,33 @@ def test_dipoles_are_those_of_pairs(sign):
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
-            one = _rotor_element(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
+            one = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
             assert (one is None) == ((i, k) not in found)
             if one is not None:
                 count += 1
                 assert np.abs(found[i, k] - one).max() < 1e-13  # elements of up to 30, two orders of summation
     assert count > 40
+
+
+@pytest.mark.parametrize("body", [(0.3, 0.5, 1.2), np.diag([2.0, -1.0, -1.0]) + 0.3], ids=["vector", "second rank"])
+def test_tensors_of_axial_tops_are_those_of_pairs(body):
+    """|N K⟩ to N = 6, each for both signs of K, so that squares of elements with a K above 0 count twice."""
+    blocks, representation = solved_rotor(Top(Constants(A=9400.0, B=3100.0)), SEMI_RIGID, [], 0, 6, None)
+    rank = np.ndim(body)
+    tensors = {(0, 0): body_tensor(body, rank, representation)}
+    found = by_numbers(tensors_of_axial_stacks(axial_stacks(blocks), tensors))
+    count = 0
+    for i, up in enumerate(blocks):
+        for k, low in enumerate(blocks):
+            one = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= rank <= up.n + low.n else None
+            assert (one is None) == ((i, k) not in found)
+            if one is not None:
+                count += 1
+                both = 2.0 if max(up.parts[0].basis.axial_k, low.parts[0].basis.axial_k) else 1.0
+                assert found[i, k][0, 0] ** 2 == pytest.approx(
+                    both * one[0, 0] ** 2, rel=1e-12
+                )  # round-off of 3j symbols
+    assert count > 60
 
 
 def test_large_blocks_have_stacks_of_their_own():

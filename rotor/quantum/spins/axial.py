@@ -11,6 +11,7 @@ formulas of `operators`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,9 @@ from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.operators import AxialState, Cosines, CosinesWithN, Rotor, Scalar, factors_with_n, tensor_of
 from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
-from rotor.quantum.spins.stack_elements import Pairs, Section
+from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs, Section
 from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 
 Exist = Callable[[Ints], NDArray[np.bool_]]  # which of the levels with these labels there are
 
@@ -65,7 +67,7 @@ def operators_of_axial_stacks(
     for up in stacks:
         for low in stacks:
             for rise in range(reach + 1):
-                pairs, k = _pairs_of_one_k(up, low, rise)
+                pairs, k = _higher_first(up, low, *_pairs(up, low, rise, 0))
                 for found, pieces in zip(out, operators, strict=True) if len(k) else ():
                     values = _values(pieces, (up.sections[0].v, low.sections[0].v), pairs, k, representation)
                     if values.any():
@@ -73,14 +75,18 @@ def operators_of_axial_stacks(
     return out
 
 
-def _pairs_of_one_k(up: Stack, low: Stack, rise: int) -> tuple[Pairs, Ints]:
-    """Functions of two stacks of one K whose N differ by `rise`, the one of the higher number first, and their K."""
+def _pairs(up: Stack, low: Stack, rise: int, q: int) -> tuple[Pairs, Ints]:
+    """Functions of two stacks whose N differ by `rise` and K by `q`, and K of the second."""
     of_up, of_low = _axial_k(up), _axial_k(low)
-    width = 1 + max(int(of_up.max()), int(of_low.max()))
-    _, a, b = np.intersect1d(up.n * width + of_up, (low.n + rise) * width + of_low, True, True)
-    ordered = up.numbers[a] >= low.numbers[b]
-    a, b = a[ordered], b[ordered]
+    width = 1 + max(int(of_up.max()), int(of_low.max())) + abs(q)
+    _, a, b = np.intersect1d(up.n * width + of_up, (low.n + rise) * width + of_low + q, True, True)
     return Pairs(a, b, up.n[a][:, None], low.n[b][:, None]), of_low[b]
+
+
+def _higher_first(up: Stack, low: Stack, pairs: Pairs, k: Ints) -> tuple[Pairs, Ints]:
+    """The pairs in which the number of the first is not below that of the second."""
+    ordered = up.numbers[pairs.up] >= low.numbers[pairs.low]
+    return Pairs(*(column[ordered] for column in pairs)), k[ordered]
 
 
 def _axial_k(stack: Stack) -> Ints:
@@ -98,6 +104,30 @@ def _values(pieces: Sequence[Piece], states: tuple[int, int], pairs: Pairs, k: I
         if piece.bra != piece.ket and acts(piece, *states[::-1]):
             total += (-1.0) ** pairs.rise * powers * _elements(piece.rotor, m, -pairs.rise, k, representation)
     return total
+
+
+def tensors_of_axial_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
+    """`contraction.tensors_of_stacks` for stacks of |N K⟩, times √(number of components), so that squares are those of both signs of K.
+
+    A component across the axis has its absolute value.
+    """
+    rank = rank_of(tensors)
+    if rank > MOST_RANK:
+        raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
+    out = []
+    for up, low in product(stacks, stacks):
+        tensor = tensor_between(tensors, up.sections[0].v, low.sections[0].v)
+        for rise, q in product(range(-rank, rank + 1), range(-rank, rank + 1)) if tensor else ():
+            if not (part := tensor.components[rank + q]):  # type: ignore[union-attr]
+                continue
+            pairs, k = _pairs(up, low, rise, q)
+            closes = np.flatnonzero((pairs.m + pairs.n)[:, 0] >= rank)
+            if len(closes):
+                pairs, k = Pairs(*(column[closes] for column in pairs)), k[closes]
+                values = closed_coupling(pairs.n[:, 0].astype(float), rise, rank, q, k.astype(float))
+                values = (abs(part) if q else part.real) * values * np.where((k > 0) | (k + q > 0), np.sqrt(2.0), 1.0)
+                out.append(Contracted(up, low, pairs, values[:, None, None]))
+    return out
 
 
 def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[RotorBlock]) -> Floats:

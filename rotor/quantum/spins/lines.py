@@ -14,17 +14,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.axial import tensors_of_axial_stacks
 from rotor.quantum.spins.blocks import Shared, SpinBlock, product
 from rotor.quantum.spins.contraction import by_numbers, tensors_of_stacks
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
-from rotor.quantum.spins.operators import AxialState, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
-from rotor.quantum.spins.stack_elements import MOST_RANK
-from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
-from rotor.quantum.tensors import acting_on as body_acting_on
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.tensors import Tensors, rank_of
 
 _FEW = 10_000  # elements between two F; where there are more, they are made when they are needed
 ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
@@ -62,12 +58,7 @@ def acting_on(vectors: Floats, coefficients: Floats, element: Floats) -> Floats:
 
 def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
     """Whether the tensors have an element between two blocks."""
-    rank, bases = rank_of(tensors), (up.parts[0].rotor.parts[0].basis, low.parts[0].rotor.parts[0].basis)
-    if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState):  # each block has one K
-        q = bases[0].axial_k - bases[1].axial_k
-        if abs(q) > rank or not any(tensor.components[rank + q] for tensor in tensors.values()):
-            return False
-    return bool(_acting(up, low, tensors, rank))
+    return bool(_acting(up, low, tensors, rank_of(tensors)))
 
 
 Acting = list[tuple[SpinPart, SpinPart, Floats]]
@@ -77,100 +68,62 @@ Acting = list[tuple[SpinPart, SpinPart, Floats]]
 class Elements:
     """Elements of some tensors between the blocks of the rotation, and between which parts of pairs of spin blocks they act.
 
-    known: by numbers of blocks, None where they are zero. partners: of every block those with an element, where all are known.
+    partners: of every block by its number those with an element.
     """
 
-    tensors: Tensors
-    known: dict[tuple[int, int], Floats | None]
-    partners: dict[int, list[tuple[int, Floats]]] | None
+    partners: dict[int, list[tuple[int, Floats]]]
     pairs: dict[tuple[int, int], Acting] = field(default_factory=dict)
     reached: dict[int, set[int]] = field(default_factory=dict)
 
     def reached_from(self, up: SpinBlock) -> set[int]:
         """The numbers of all partners of the parts of a block."""
         if up.start not in self.reached:
-            partners = self.partners or {}
-            self.reached[up.start] = {number for own in up.by_number for number, _ in partners.get(own, ())}
+            self.reached[up.start] = {number for own in up.by_number for number, _ in self.partners.get(own, ())}
         return self.reached[up.start]
 
+    def acting(self, up: SpinBlock, low: SpinBlock) -> Acting:
+        """Pairs of parts of two blocks with their elements."""
+        sources = low.by_number
+        return [
+            (target, source, found)
+            for target in up.parts
+            for number, found in self.partners.get(target.number, ())
+            if number in sources
+            for source in sources[number]
+        ]
 
-def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
-    """All of them at once where the rotation stands in stacks; else they are made when they are needed."""
+
+def _elements(shared: Shared, tensors: Tensors) -> Elements:
+    """All of them at once."""
     key = ("elements", *sorted(tensors.items(), key=lambda one: one[0]))
-    found: Elements | None = shared.cache.get(key)
-    if found is None:
-        if shared.stacks is None or rank > MOST_RANK:
-            found = Elements(tensors, {}, None)
-        else:
-            known = by_numbers(tensors_of_stacks(shared.stacks, tensors))
-            partners: dict[int, list[tuple[int, Floats]]] = {}
-            for (i, k), element in known.items():
-                partners.setdefault(i, []).append((k, element))
-            found = Elements(tensors, dict(known), partners)
-        shared.cache[key] = found
-    return found
+    if key not in shared.cache:
+        found = (
+            tensors_of_axial_stacks(shared.axial, tensors)
+            if shared.axial
+            else tensors_of_stacks(shared.stacks or [], tensors)
+        )
+        partners: dict[int, list[tuple[int, Floats]]] = {}
+        for (i, k), element in by_numbers(found).items():
+            partners.setdefault(i, []).append((k, element))
+        shared.cache[key] = Elements(partners)
+    elements: Elements = shared.cache[key]
+    return elements
 
 
 def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> Acting:
     """Pairs of parts between which the tensors act, with the element of the rotation."""
     if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
         return []
-    elements, place = _elements(low.shared, tensors, rank), (up.start, low.start)
+    elements, place = _elements(low.shared, tensors), (up.start, low.start)
     if place not in elements.pairs:
-        if elements.partners is not None and elements.reached_from(up).isdisjoint(low.by_number):
+        if elements.reached_from(up).isdisjoint(low.by_number):
             return []
-        found = _parts_between(up, low, elements, rank)
+        found = elements.acting(up, low)
         if low.shared.scheme.equivalent:
             t = _coefficients(up, low, rank)
             found = [(target, source, x) for target, source, x in found if t[target.patterns, source.patterns].any()]
         elements.pairs[place] = found
     return elements.pairs[place]
-
-
-def _parts_between(up: SpinBlock, low: SpinBlock, elements: Elements, rank: int) -> Acting:
-    if elements.partners is not None:
-        sources, partners = low.by_number, elements.partners
-        return [
-            (target, source, found)
-            for target in up.parts
-            for number, found in partners.get(target.number, ())
-            if number in sources
-            for source in sources[number]
-        ]
-    near = ((a, b) for a in up.parts for b in low.parts if abs(a.rotor.n - b.rotor.n) <= rank)
-    every = ((target, source, _known(elements, target, source)) for target, source in near)
-    return [(target, source, found) for target, source, found in every if found is not None]
-
-
-def _known(elements: Elements, target: SpinPart, source: SpinPart) -> Floats | None:
-    key = (target.number, source.number)
-    if key not in elements.known:
-        elements.known[key] = _rotor_element(target.rotor, source.rotor, elements.tensors)
-    return elements.known[key]
-
-
-def _rotor_element(up: RotorBlock, low: RotorBlock, tensors: Tensors) -> Floats | None:
-    """⟨r'‖T‖r⟩; of axial states √(number of components) of it, so that squares are summed over both signs of K."""
-    total: Floats | None = None
-    for left in up.parts:
-        for right in low.parts:
-            acted = _acted(left, right, low.vectors[right.place], tensor_between(tensors, left.v, right.v))
-            if acted is not None and acted.any():
-                moved = up.vectors[left.place].T @ acted
-                total = moved if total is None else total + moved
-    basis = up.parts[0].basis
-    if total is not None and isinstance(basis, AxialState) and (basis.axial_k or low.parts[0].basis.k[0]):
-        return np.asarray(np.sqrt(2.0) * total)
-    return total
-
-
-def _acted(left: RotorPart, right: RotorPart, vectors: Floats, tensor: BodyTensor | None) -> Floats | None:
-    """A tensor times columns over the functions of `right`, over those of `left`; None where it does not act."""
-    up, low = left.basis, right.basis
-    if isinstance(up, WangBlock) and isinstance(low, WangBlock) and tensor is not None:
-        return None if tensor.between(up, low) is None else body_acting_on(vectors, up, low, tensor)
-    found = tensor_elements(up, low, tensor)
-    return None if found is None else np.asarray(found @ vectors)
 
 
 def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
