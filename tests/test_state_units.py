@@ -12,9 +12,13 @@ from rotor.formats.spcat.fits import fit_states
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.quantum.effects.interactions import InteractingStates
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.label_tracking import LabelledBlocks
 from rotor.quantum.linear_stacks import LinearStack, stack_numbers
+from rotor.quantum.solve import solve_levels
+from rotor.tops.top import Top
 
 THREE = """three states
   17  100   20    0    0.0  1.0E+06  1.0 1.0
@@ -194,3 +198,24 @@ def test_slopes_of_some_parameters_are_those_of_all():
     some, rows = names[4:7] + names[-3:], np.arange(0, len(levels), 3)
     slopes = level_derivatives(group.top, levels, names)[rows][:, [names.index(name) for name in some]]
     assert level_derivatives(group.top, levels, some, rows) == pytest.approx(slopes, rel=1e-12)  # order of sums
+
+
+def test_derivatives_of_a_few_levels_are_those_of_all():
+    """Levels at high J of blocks that a coupling does not reach, and one at low J of a block that it does."""
+    top = Top.from_constants("A=9000 B=3000 C=2500 MHz")
+    states = InteractingStates({"E[1]": 700.0, "A[1]": 9000.0, "B[1]": 3000.0, "C[1]": 2500.0, "F_ac[0,1]": 20.0})
+    levels = solve_levels(top, 9, effects=(*SEMI_RIGID, states))
+    every = level_derivatives(top, levels)
+    by_j = {j: [block for block in levels.blocks if block.j == j] for j in (2, 7, 8, 9)}
+    for low in by_j[2]:
+        kinds = {(part.basis.first_k % 2, part.basis.sign, part.v) for part in low.parts}
+        high = [
+            block.start
+            for j in (9, 8, 7)
+            for block in by_j[j]
+            if kinds.isdisjoint((part.basis.first_k % 2, part.basis.sign, part.v) for part in block.parts)
+        ]
+        rows = np.array([*high, low.start])
+        assert len(high) >= 3
+        assert level_derivatives(top, levels, rows=rows) == pytest.approx(every[rows], abs=1e-12)  # the same sums
+    assert max(len(block.parts) for block in by_j[2]) > 1

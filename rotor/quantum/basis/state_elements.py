@@ -7,6 +7,7 @@ X^p and the factors of its parameters. Couplings of states, and operators of J t
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,7 +27,7 @@ from rotor.tops.operators import Operators, Powers
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-_LOOKED_AT = 3  # J at which all pairs of Wang blocks are tried
+_TRIED_AT = 3  # J at which a pair of kinds of Wang blocks is tried
 Vertex = tuple[int, WangBlock]
 Summed = tuple[
     int, int, OperatorOfJ, Sequence[tuple[str, OperatorOfJ]]
@@ -172,16 +173,17 @@ def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> 
 
 
 class _Joining:
-    """What links connect. Between which kinds of Wang blocks, E±, O± of two states, is found at the highest three J, which come first."""
+    """What links connect. Whether two kinds of Wang blocks, E±, O± of two states, are connected is found at the three highest J that have
+    both; these come first."""
 
     def __init__(self, links: Sequence[_Link], representation: str) -> None:
-        self._links, self._representation, self._looked = links, representation, 0
+        self._links, self._representation = links, representation
+        self._tried = defaultdict[tuple[int, int, int, int, int], int](int)
         self._kinds: set[tuple[int, int, int, int, int]] = set()
 
     def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, WangElements]]:
         """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
         found = list[tuple[int, int, WangElements]]()
-        everywhere, self._looked = self._looked < _LOOKED_AT, self._looked + 1
         of_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
         for i, (v, block) in enumerate(vertices):
             of_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
@@ -193,7 +195,8 @@ class _Joining:
             for i, up, of_up in of_state.get(link.bra, ()):
                 for k, low, of_low in of_state.get(link.ket, ()):
                     kind = (link.unit, link.bra, of_up, link.ket, of_low)
-                    if (everywhere or kind in self._kinds) and (
+                    self._tried[kind] += 1
+                    if (self._tried[kind] <= _TRIED_AT or kind in self._kinds) and (
                         one := _linked(link, operator, (up, low), least, self._representation)
                     ):
                         self._kinds.add(kind)
