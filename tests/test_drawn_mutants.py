@@ -61,6 +61,26 @@ def test_codes_without_names_are_refused(code, what):
         _whole_code(Parameter(code, 1.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    ("fields", "what"),
+    [
+        ({"i2": 1}, "a commutator"),
+        ({"typ": 82, "ns": 1}, "a power of N·S of one K"),
+        ({"typ": 92}, "a term of a series"),
+        ({"ff": 1}, "a term of a series"),
+        ({"ns": 5, "typ": 1}, "N_z S_z together with another operator"),
+        ({"ns": 5, "i1": 1}, "N_z S_z together with another operator"),
+    ],
+)
+def test_codes_without_an_operator_are_refused_with_their_meaning(fields, what):
+    """Another operator would be computed in their place."""
+    from rotor.formats.spcat.hamiltonian.codes import Digits
+    from rotor.formats.spcat.hamiltonian.operators import operator_of
+
+    with pytest.raises(ValueError, match=f"{what}.* is read but not computed yet"):
+        operator_of(Digits(**{**dict.fromkeys(Digits._fields, 0), **fields}), "bca")
+
+
 def test_a_solver_that_does_not_converge_raises(monkeypatch):
     """info > 0 of dstevd: off-diagonal elements that did not vanish; its energies are none."""
     import scipy.linalg.lapack

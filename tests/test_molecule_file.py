@@ -188,6 +188,14 @@ def test_tables_of_levels_and_of_lines_served_are_checked(tmp_path: Path, text: 
     assert said in str(caught.value)
 
 
+def test_lines_served_are_read_with_their_error():
+    file = parse_molecule_file(
+        "[constants]\nB = 5\n[serves]\nj_max = 40\nk_max = 12\nmax_ghz = 950.5\nerror_mhz = 0.25\n"
+    )
+    served = file.serves
+    assert (served.j_max, served.k_max, served.max_ghz, served.error_mhz) == (40, 12, 950.5, 0.25)
+
+
 def test_marks_of_unverified_numbers_are_read_and_shown():
     text = "[constants]\nsource = 'a'\nB = 5\nD = { value = 1e-6, unverified = true }\n[dipole]\nsource = 'b'\nunverified = true\na = 1\n"
     file = parse_molecule_file(text)

@@ -25,6 +25,15 @@ def test_a_fit_without_a_start_finds_what_was_injected() -> None:
         assert abs(row["value"] - exact) < 4 * row["error"], row  # four standard errors: 6e-5 each
 
 
+@pytest.mark.parametrize("noise", [0.05, 20.0])
+def test_a_species_that_shows_nothing_starts_at_a_third_of_the_noise(noise: float) -> None:
+    """Whatever the noise is in K: its strongest line would be seen by no one, and the fit can still raise it."""
+    spectrum = observed_spectrum(GRID, np.full(len(GRID), -0.2 * noise), noise=noise)
+    (start,) = start_components(spectrum, [rigid()], velocity_km_s=0.0, fwhm_km_s=3.0, excitation_k=200.0)
+    thin = model([replace(start, column_per_cm2=start.column_per_cm2 * 1e-3)], GRID).brightness_k
+    assert 1e3 * np.abs(thin).max() == pytest.approx(noise / 3, rel=0.02)  # of a thin line
+
+
 def test_errors_are_those_of_repeated_injections() -> None:
     """Standard deviations over 100 spectra against the stated errors: 7 % of statistics."""
     true = Component(rigid(), 3e14, 35.0, 0.0, 3.0)
