@@ -94,6 +94,13 @@ def page(results: dict[str, Any]) -> str:
     return HEAD + "\n".join(lines) + "\n" + COVERAGE + "\n".join(rows) + "\n"
 
 
+def write(results: dict[str, Any]) -> None:
+    """Figures and page, kinds in their order."""
+    results["bounds"] = {kind: results["bounds"][kind] for kind in CASES if kind in results["bounds"]}
+    RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page(results), encoding="utf-8")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", choices=[*CASES, "coverage"])
@@ -102,6 +109,7 @@ def main() -> None:
     results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {"bounds": {}, "coverage": {}}
     for kind in [] if given.page else CASES if given.only is None else [one for one in given.only if one in CASES]:
         results["bounds"][kind] = measured(kind)
+        write(results)
         print(row(kind, results["bounds"][kind]), flush=True)
     if not given.page and (given.only is None or "coverage" in given.only):
         for name in COVERED:
@@ -112,9 +120,7 @@ def main() -> None:
                 "confidence": CONFIDENCE,
             }
             print(name, results["coverage"][name], flush=True)
-    results["bounds"] = {kind: results["bounds"][kind] for kind in CASES if kind in results["bounds"]}
-    RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(page(results), encoding="utf-8")
+    write(results)
 
 
 if __name__ == "__main__":

@@ -263,7 +263,7 @@ def fit_problem(rng: np.random.Generator):
 
 
 def fluid(seed: int) -> Case:
-    """Conserved energy of argon or nitrogen about its mean by the rows that are recorded, against every step of the same run."""
+    """Conserved energy of argon about its mean by the rows that are recorded, against every step of the same run."""
     from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
     from rotor.fluids.settings import Settings
 

@@ -4,9 +4,12 @@ Data and statistics state standard deviations whose intervals cover the truth (`
 of these `.ci/run` takes another part each day.
 """
 
+import json
 import math
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +33,21 @@ def check(kind: str, seeds) -> None:
 
 def test_a_thousand_cases():
     assert len(CASES) * EACH >= 1000
+
+
+def test_the_page_is_that_of_the_results_and_every_case_is_within_its_bound():
+    path = Path(__file__).resolve().parents[1] / "benchmarks" / "bounds_and_coverage.py"
+    spec = spec_from_file_location("bounds_and_coverage", path)
+    program = module_from_spec(spec)
+    spec.loader.exec_module(program)
+    results = json.loads(program.RESULTS.read_text(encoding="utf-8"))
+    assert program.PAGE.read_text(encoding="utf-8") == program.page(results)
+    assert results["bounds"].keys() == CASES.keys()
+    assert results["coverage"].keys() == COVERED.keys()
+    for figures in results["bounds"].values():
+        assert (figures["above"], figures["cases"]) == (0, EACH)
+        assert figures["median"] <= program.MOST_MEDIAN
+        assert figures["of_95"] <= program.MOST_95
 
 
 @pytest.mark.parametrize("kind", CASES)
