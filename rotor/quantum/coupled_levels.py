@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Ints
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.coupled import CoupledBlock, connected_parts, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.levels import Levels, weights_by_state
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
@@ -150,17 +149,9 @@ def coupled_levels(
         blocks=blocks,
         mixing=np.concatenate([block.mixing for block in blocks]),
     )
-    weighted = replace(levels, weight=_weights(top, effects, levels))
+    weighted = replace(levels, weight=weights_by_state(top, extra_states(top, effects), levels))
     _refuse_mixed_weights(weighted)
     return weighted
-
-
-def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
-    weight = weights_of_levels(levels, top.spin_weights)
-    for state in extra_states(top, effects):
-        if state.spin_weights is not None:
-            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return weight
 
 
 def _refuse_mixed_weights(levels: Levels) -> None:

@@ -23,7 +23,9 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.states import State
     from rotor.quantum.tensors import Tensors
+    from rotor.tops.top import Top
 
 FEW_LEVELS = 64  # among which one is found by looking at all
 
@@ -278,6 +280,15 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
         of_even, of_odd = (_of_rotation(levels, own) for own in (weights, weights.exchanged()))
         return np.where(quanta["i_tot"] % 2 == 0, of_even, of_odd)
     return _of_rotation(levels, weights)
+
+
+def weights_by_state(top: Top, states: Sequence[State], levels: Levels) -> Ints:
+    """Spin weights of levels by those of the top, and in states that have their own by these."""
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in states:
+        if state.spin_weights is not None:
+            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return weight
 
 
 def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:

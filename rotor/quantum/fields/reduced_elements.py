@@ -7,9 +7,9 @@ in every state, and g_I I of the spins.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,13 @@ from rotor.arrays import Floats
 from rotor.quantum.coupled import CoupledBlock, Part
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
+from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, twice_total, wang_amplitudes
 from rotor.quantum.tensors import Tensors
+
+if TYPE_CHECKING:
+    from rotor.quantum.spins.blocks import Shared
+    from rotor.quantum.spins.moments import SpinMoments
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 
@@ -38,6 +43,7 @@ class ReducedElements:
         self._known: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
         self._pairs: dict[Key, list[Pair]] = {}
         self._tensors: dict[Key, Tensors] = {}
+        self._moments: dict[Key, SpinMoments] = {}
 
     @property
     def representation(self) -> str:
@@ -91,7 +97,7 @@ class ReducedElements:
     def _made(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
         first, second = self.blocks[up], self.blocks[low]
         if isinstance(operator, Magnet):
-            moment = _moment(operator, first, second, self.representation)
+            moment = self._moment(operator, first, second)
             return moment if moment is not None and moment.any() else None
         tensors = self._tensors_of(operator)
         if isinstance(first, SolvedBlock):
@@ -100,6 +106,18 @@ class ReducedElements:
             return first.reduced(second, tensors)
         elements = amplitudes(first, second, tensors)
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
+
+    def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
+        if isinstance(up, MomentBlock):
+            raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
+        if axial_k(up) != axial_k(low) or abs(twice_total(up) - twice_total(low)) > 2:
+            return None
+        if isinstance(up, SolvedBlock | CoupledBlock):
+            return _of_rotation(magnet.g, up, low, self.representation)
+        if magnet.key not in self._moments:
+            self._moments[magnet.key] = _spin_moments(magnet, self.states, low.shared)
+        moment: Floats = self._moments[magnet.key].amplitudes(up, low)
+        return moment / np.sqrt(2.0) if axial_k(up) else moment  # that of one sign of K
 
 
 def axial_k(block: AnyBlock) -> int | None:
@@ -110,21 +128,26 @@ def axial_k(block: AnyBlock) -> int | None:
     return getattr(basis, "axial_k", None)
 
 
-def _moment(magnet: Magnet, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
+def _matrix(g: Floats) -> Any:
+    return tuple(tuple(row) for row in g.tolist())
+
+
+def _spin_moments(magnet: Magnet, states: Sequence[int], shared: Shared) -> SpinMoments:
+    """½ Σ g_ij {Φ_i, N_j} and g_I I of every state."""
+    from rotor.quantum.spins.moments import SpinMoments
+
+    scheme, g = shared.scheme, _matrix(magnet.g)
+    nuclei = [(name, value / scheme.count_of((scheme.place(name),))) for name, value in magnet.nuclei.items()]
+    moments = [Moment(1.0, (v, v), tensor=g) for v in states]
+    moments += [Moment(value, (v, v), spin=name) for v in states for name, value in nuclei]
+    return SpinMoments(tuple(moments), scheme, shared.representation)
+
+
+def _of_rotation(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
+    """Elements of ½ Σ g_ij {Φ_i, N_j} between solved blocks of the rotation."""
     from rotor.quantum.spins.operators import CosinesWithN
 
-    if isinstance(up, MomentBlock):
-        raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
-    if axial_k(up) != axial_k(low):
-        return None
-    rotor = CosinesWithN(tuple(tuple(row) for row in magnet.g.tolist()))  # type: ignore[arg-type]
-    if isinstance(up, SolvedBlock | CoupledBlock):
-        return _of_rotation(rotor, up, low, representation)
-    return _with_spins(magnet, rotor, up, low, representation)
-
-
-def _of_rotation(rotor: Any, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
-    """Elements of the rotation between solved blocks of it."""
+    rotor = CosinesWithN(_matrix(g))
     total: Floats | None = None
     for left in _parts(up):
         for right in _parts(low):
@@ -137,40 +160,3 @@ def _of_rotation(rotor: Any, up: AnyBlock, low: AnyBlock, representation: str) -
 
 def _parts(block: AnyBlock) -> tuple[Any, ...]:
     return (Part(0, block.basis, 0),) if isinstance(block, SolvedBlock) else block.parts
-
-
-def _with_spins(magnet: Magnet, rotor: Any, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
-    from rotor.quantum.spins.blocks import product
-
-    if abs(up.twice_f - low.twice_f) > 2:
-        return None
-    scheme = low.shared.scheme
-    out = np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
-    acting = [(None, 1.0), *((scheme.place(name), value) for name, value in magnet.nuclei.items())]
-    for place, value in acting:
-        t = _coefficients(up, low, place)
-        for target in up.parts:
-            for source in low.parts:
-                if place is None:
-                    element = _of_rotation(rotor, target.rotor, source.rotor, representation)
-                else:
-                    element = np.eye(len(source.rotor.energies_mhz)) if target.number == source.number else None
-                if element is not None:
-                    factors = value * t[target.patterns, source.patterns]
-                    out[target.place] += product(factors, element) @ low.vectors[source.place]
-    return np.asarray(up.vectors.T @ out)
-
-
-def _coefficients(up: AnyBlock, low: AnyBlock, place: int | None) -> Floats:
-    """Of the rotation (None) or a spin between the patterns of two F."""
-    from rotor.quantum.spins.coupling import moment_coefficients, patterns
-
-    cache, scheme, key = low.shared.cache, low.shared.scheme, ("moment", place, up.twice_f, low.twice_f)
-    if key not in cache:
-        bra, ket = patterns(scheme.twice, up.twice_f), patterns(scheme.twice, low.twice_f)
-        found = moment_coefficients(scheme.twice, 1 if place is None else 0, place, bra, ket)
-        if scheme.equivalent:
-            found = scheme.recoupling(up.twice_f)[1].T @ found @ scheme.recoupling(low.twice_f)[1]
-        cache[key] = found
-    coefficients: Floats = cache[key]
-    return coefficients

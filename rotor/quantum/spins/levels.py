@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Ints, hold_freed_memory
+from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.levels import Levels, weights_by_state
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.axial_levels import solve_axial
 from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
@@ -184,12 +184,6 @@ def _table(
         blocks=blocks,
         mixing=np.concatenate([block.mixing for block in blocks]),
     )
-    return replace(levels, weight=_weights(top, effects, levels))
-
-
-def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
-    weight = weights_of_levels(levels, top.spin_weights)
-    for state in (state for effect in effects for state in effect.states(top)):
-        if state.spin_weights is not None:
-            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return weight
+    return replace(
+        levels, weight=weights_by_state(top, [state for effect in effects for state in effect.states(top)], levels)
+    )
