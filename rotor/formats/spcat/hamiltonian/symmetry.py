@@ -143,7 +143,7 @@ def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]
     return found if len(found) < len(own) * len(other) else None
 
 
-def _by_species(state: StateOptions, turned: bool) -> dict[str, list[int]]:
+def _by_species(state: StateOptions, turned: bool) -> dict[str, tuple[int, ...]]:
     swapped = replace(state, plus=state.minus, minus=state.plus) if turned else state
     return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in _SPECIES}
 
