@@ -9,6 +9,7 @@ from rotor.units import MHZ_PER_K
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
 
 MIXED = 3  # the type of a family of lines of several types
 
@@ -128,79 +129,132 @@ def strongest_lines(
 
 
 @njit(cache=True, nogil=True, fastmath=True)
+def _hits(
+    jj: Floats, energies: Floats, k: int, w: float, mean: float, half: float,
+    near: Bytes, low: float, high: float, per_mhz: float, reach: float,
+) -> tuple[int, int]:  # fmt: skip
+    """How many lines of a top lie near peaks and how many do not, counted until they cannot win; κ is at k + w."""
+    hits, misses = 0, 0
+    for q in range(len(jj)):
+        f = jj[q] * mean + half * (energies[k, q] + w * (energies[k + 1, q] - energies[k, q]))
+        if f < low or f >= high:
+            continue
+        if near[int((f - low) * per_mhz)] < reach:
+            hits += 1
+        else:
+            misses += 1
+            if misses >= 3 and misses > hits + 1:
+                break
+    return hits, misses
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _crossing(
+    first: Floats, second: Floats, a: float, b: float, frequency: float, k: int, last: int
+) -> tuple[int, float]:
+    """Place k + w between k and last where a first + b second is a frequency; w < 0 where it is not."""
+    before = a * first[k] + b * second[k]
+    for n in range(k, last):
+        after = a * first[n + 1] + b * second[n + 1]
+        if (before <= frequency) == (after >= frequency) and before != after:
+            return n, (frequency - before) / (after - before)
+        before = after
+    return k, -1.0
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _inside(a: float, b: float, c: float, bounds: Floats, margin: float, planar: float) -> bool:
+    """Whether A, B, C lie within bounds with a margin, and 1/C is below 1/A + 1/B over `planar`."""
+    return bool(
+        a < bounds[1] * (1 + margin) and a > bounds[0] * (1 - margin) and b < bounds[3] * (1 + margin)
+        and b > bounds[2] * (1 - margin) and c < bounds[5] * (1 + margin) and c > bounds[4] * (1 - margin)
+        and c * (a + b) > planar * a * b
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _linear(difference: Floats, jj: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Of two frequencies as the first two lines of a family, at each κ: factors of ½(A+C), one over the determinant, of the third line."""
+    determinant = jj[0] * difference[1] - jj[1] * difference[0]
+    inverse = np.where(np.abs(determinant) < 1e-6, 0.0, 1 / np.where(determinant == 0.0, 1.0, determinant))
+    mean_a, mean_b = difference[1] * inverse, -difference[0] * inverse
+    third_a, third_b = (
+        jj[2] * mean_a - difference[2] * jj[1] * inverse,
+        jj[2] * mean_b + difference[2] * jj[0] * inverse,
+    )
+    return mean_a, mean_b, inverse, third_a, third_b
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _root(
+    linear: tuple[Floats, Floats, Floats, Floats, Floats], kappa: Floats, sa: float, sb: float, above: float, third: float,
+    first: int, last: int,
+) -> tuple[int, float, float, float, float]:  # fmt: skip
+    """Point of κ and place behind it where the third line has a frequency, ½(A+C), ½(A-C) and κ there; a place below 0 is none."""
+    mean_a, mean_b, inverse, third_a, third_b = linear
+    i, w = _crossing(third_a, third_b, sa, sb, third, first, last)
+    mean = sa * (mean_a[i] + w * (mean_a[i + 1] - mean_a[i])) + sb * (mean_b[i] + w * (mean_b[i + 1] - mean_b[i]))
+    half = above * (inverse[i] + w * (inverse[i + 1] - inverse[i]))
+    return i, w, mean, half, kappa[i] + w * (kappa[i + 1] - kappa[i])
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def sweep(
     difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
-    near: NDArray[np.float32], low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
-    bounds: Floats, need: int, out: Floats,
-) -> tuple[int, int]:  # fmt: skip
-    """Roots of a family: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
+    near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
+    bounds: Floats, need: int, stride: int, out: Floats,
+) -> int:  # fmt: skip
+    """Roots of a family: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed; returns how many.
 
-    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (n, κ), companion_jj (n,) alike
-    near : distance from each bin's centre to the nearest peak; a hit is nearer than the larger of `tolerance` and `softness` B.
-    bounds (6,) : of A, B, C. out (m, 5) : hits, misses, A, B, C
+    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (κ, n), companion_jj (n,) alike
+    near : distance from each bin's centre to the nearest peak in fifths of `bin_width`, at most 255; a hit is nearer than the larger of
+    `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : points of κ between two looks for a crossing.
+    out (m, 5) : hits, misses, A, B, C
     """
-    n, points, found, roots = len(seeds), len(kappa), 0, 0
-    determinant = jj[0] * difference[1] - jj[1] * difference[0]
-    total = len(companion_jj)
-    rises, falls = bool((determinant > 0).all()), bool((determinant < 0).all())
+    n, points, found, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
+    linear = _linear(difference, jj)
+    mean_a, mean_b, inverse, third_a, third_b = linear
+    rises, falls = bool((inverse > 0).all()), bool((inverse < 0).all())
     for a in range(n):
+        sa = seeds[a]
         for b in range(n):
             if a == b or abs(log_seeds[a] - log_seeds[b]) > ratio:
                 continue
-            above = jj[0] * seeds[b] - jj[1] * seeds[a]
+            sb = seeds[b]
+            above = jj[0] * sb - jj[1] * sa
             if (rises and above <= 0) or (falls and above >= 0):  # ½(A-C) below 0 at every κ
                 continue
-            before, before_sum, before_half = -1.0, 0.0, 0.0
-            for k in range(points):
-                if abs(determinant[k]) < 1e-6:
+            before, p, at = -1.0, 0, 0
+            for step in range((points + stride - 2) // stride + 1):
+                k = min(step * stride, points - 1)
+                half, mean = above * inverse[k], sa * mean_a[k] + sb * mean_b[k]
+                # bounds are wider between points than at roots
+                if half <= 0.0 or not _inside(mean + half, mean + kappa[k] * half, mean - half, bounds, 0.03, 0.95):
                     before = -1.0
                     continue
-                mean = (seeds[a] * difference[1, k] - seeds[b] * difference[0, k]) / determinant[k]
-                half = above / determinant[k]
-                top_a, top_b, top_c = mean + half, mean + kappa[k] * half, mean - half
-                if (
-                    half <= 0.0 or top_a > bounds[1] or top_a < bounds[0] or top_b < bounds[2] or top_b > bounds[3]
-                    or top_c < bounds[4] or top_c > bounds[5] or top_c * (top_a + top_b) < 0.985 * top_a * top_b
-                ):  # fmt: skip
-                    before = -1.0
+                third = sa * third_a[k] + sb * third_b[k]
+                if before < 0.0:
+                    before, at, p = max(third, 0.0), k, np.searchsorted(seeds, max(third, 0.0))
                     continue
-                third = jj[2] * mean + difference[2, k] * half
-                if before > 0.0:
-                    first, last = min(before, third), max(before, third)
-                    if last > low and first < high:
-                        p = np.searchsorted(seeds, first)
-                        while p < n and seeds[p] <= last:
-                            if (
-                                p != a
-                                and p != b
-                                and abs(log_seeds[p] - log_seeds[a]) < ratio
-                                and abs(log_seeds[p] - log_seeds[b]) < ratio
-                            ):
-                                w = (seeds[p] - before) / (third - before) if third != before else 0.0
-                                s, d = before_sum + w * (mean - before_sum), before_half + w * (half - before_half)
-                                hits, misses = 0, 0
-                                roots += 1
-                                at = kappa[k - 1] + w * (kappa[k] - kappa[k - 1])
-                                reach = max(tolerance, softness * (s + at * d))
-                                for q in range(total):
-                                    f = companion_jj[q] * s + d * (
-                                        companions[q, k - 1] + w * (companions[q, k] - companions[q, k - 1])
-                                    )
-                                    if f < low or f >= high:
-                                        continue
-                                    if near[int((f - low) / bin_width)] < reach:
-                                        hits += 1
-                                    else:
-                                        misses += 1
-                                        if misses >= 3 and misses > hits + 1:
-                                            break
-                                if hits >= need and hits >= misses and found < len(out):
-                                    out[found, 0], out[found, 1] = hits, misses
-                                    out[found, 2], out[found, 3], out[found, 4] = s + d, s + at * d, s - d
-                                    found += 1
-                            p += 1
-                before, before_sum, before_half = third, mean, half
-    return found, roots
+                rising = third > before
+                while (rising and p < n and seeds[p] <= third) or (not rising and p > 0 and seeds[p - 1] >= third):
+                    line = p if rising else p - 1
+                    p = p + 1 if rising else p - 1
+                    unlike = max(abs(log_seeds[line] - log_seeds[a]), abs(log_seeds[line] - log_seeds[b])) > ratio
+                    if unlike or line in (a, b):
+                        continue
+                    i, w, s, d, x = _root(linear, kappa, sa, sb, above, seeds[line], at, k)
+                    top_b = s + x * d
+                    if w < 0.0 or not _inside(s + d, top_b, s - d, bounds, 0.0, 0.985):
+                        continue
+                    reach = min(max(tolerance, softness * top_b) * fifths, 255.0)
+                    hits, misses = _hits(companion_jj, companions, i, w, s, d, near, low, high, per_mhz, reach)
+                    if hits >= need and hits >= misses and found < len(out):
+                        out[found, 0], out[found, 1] = hits, misses
+                        out[found, 2], out[found, 3], out[found, 4] = s + d, top_b, s - d
+                        found += 1
+                before, at = third, k
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -275,6 +329,22 @@ def best_scales(
 
 
 @njit(cache=True, nogil=True)
+def _highest(height: Floats, most: int) -> Ints:
+    """Places of the highest values by falling height, of equal ones the first before the others."""
+    out, count = np.empty(most, np.int64), 0
+    for n in range(len(height)):
+        if count == most and height[n] <= height[out[most - 1]]:
+            continue
+        at = count if count < most else most - 1
+        while at > 0 and height[out[at - 1]] < height[n]:
+            out[at] = out[at - 1]
+            at -= 1
+        out[at] = n
+        count = min(count + 1, most)
+    return out[:count]
+
+
+@njit(cache=True, nogil=True)
 def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
     """The first lines of an order, without those nearer than `apart` to one before."""
     out = np.empty(min(most, len(order)), np.int64)
@@ -313,9 +383,10 @@ def quick_ratios(
         of_type = np.arange(found) if mixed else np.flatnonzero(kind[row[:found]] == kinds[t])
         if len(of_type) == 0:
             continue
+        strength_at, below = np.log(s_nu[of_type]), energy[lower[row[of_type]]] / MHZ_PER_K
         for temperature in temperatures:
-            expected = np.log(s_nu[of_type]) - energy[lower[row[of_type]]] / (MHZ_PER_K * temperature)
-            strongest = _apart(np.argsort(-expected), f[of_type], most, apart)
+            expected = strength_at - below / temperature
+            strongest = _apart(_highest(expected, 2 * most), f[of_type], most, apart)
             chosen = of_type[strongest]
             ratios, _ = best_scales(
                 f[chosen], expected[strongest], kind[row[chosen]], np.full(len(chosen), max(sigma_mhz, softness * tops[t, 1])),

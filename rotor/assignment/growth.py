@@ -212,11 +212,14 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
     return temperature
 
 
+def _variances(slopes: Floats, covariance: Floats) -> Floats:
+    """gᵀCg of each row g."""
+    return np.asarray(np.maximum(((slopes @ covariance) * slopes).sum(axis=1), 0.0))
+
+
 def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
     """Standard errors of predicted lines: of the constants and of a measurement."""
-    return np.asarray(
-        np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes, optimize=True), 0.0) + sigma0**2)
-    )
+    return np.asarray(np.sqrt(_variances(slopes, covariance) + sigma0**2))
 
 
 def _ratios(
@@ -250,7 +253,7 @@ def _matched(
     merged = merged_lines(field, constants, temperature_k, np.where(ratios > LEAST_RATIO, scales, -np.inf))
     if not len(merged.centre):
         return None
-    variance = np.maximum(np.einsum("ij,jk,ik->i", merged.slope, covariance, merged.slope, optimize=True), 0.0)
+    variance = _variances(merged.slope, covariance)
     centre, variance = _predicted_by_others(field, before, merged.main, merged.centre, variance)
     chosen = _nearest(field, centre, merged.height, np.sqrt(variance + sigma0**2), most_chance)
     peak = _without_doubles(chosen, merged.height)[merged.blend]

@@ -70,7 +70,7 @@ class PeakList(Table):
         """ln of the intensities."""
         return np.log(self.intensity)
 
-    @property
+    @cached_property
     def log_threshold(self) -> float:
         """ln of the intensity below which peaks are missing: that of the weakest, without stray ones."""
         return float(np.quantile(self.log_intensity, 0.02))

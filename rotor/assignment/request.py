@@ -224,7 +224,7 @@ class _Search:
         if not self.species and self.request.species == 1 and len(peaks) > 2000:
             return False
         centres, members = with_centres(peaks)
-        rivals = self._rivals(centres, NEXT_STAGES)
+        rivals = self._rivals(centres, NEXT_STAGES) if len(centres) > len(peaks) else []
         if rivals:
             self._add(centres, rows[members], rivals)
         return bool(rivals)

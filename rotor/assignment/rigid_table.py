@@ -11,7 +11,7 @@ neglects stays below 1e-5 (A-C) (`tests/test_assignment_table.py`); refined cons
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,12 @@ class RigidTable:
     kind: Ints
     strength: NDArray[np.float32]
 
-    @property
+    @cached_property
+    def reduced(self) -> Floats:
+        """E_κ (POINTS, levels)."""
+        return np.ascontiguousarray(self.levels[:, :, 0])
+
+    @cached_property
     def kappa(self) -> Floats:
         """Ray's κ of the grid (POINTS,)."""
         return np.asarray(-np.cos(self.theta))

@@ -28,6 +28,7 @@ ROUGH_MHZ = 0.25  # standard error of rigid lines when roots are ranked
 SOFTNESS = 2e-4  # standard error of a rigid line over B, where this is larger: shifts by distortion go with E² B/ω², E of some kT
 SPREAD = 0.6  # of ln intensity about the model: response of the instrument, saturation
 DETECTED = 0.95  # probability that a line above the threshold is in the list
+STRIDE = 4  # points of κ between two looks for a crossing
 SAME = 3e-4  # relative difference of constants of roots that are the same
 
 
@@ -57,20 +58,26 @@ class Field:
         return j * (j + 1)
 
     @cached_property
+    def points(self) -> slice:
+        """Part of the grid of κ that the bounds leave."""
+        return self.bounds.points(self.table.kappa)
+
+    @cached_property
     def order(self) -> Ints:
         """Peaks by falling intensity."""
         return np.argsort(-self.peaks.intensity, kind="stable")
 
     @cached_property
-    def near(self) -> NDArray[np.float32]:
-        """Distance (MHz) from the centres of bins of the band to the nearest of the strongest peaks."""
+    def near(self) -> NDArray[np.uint8]:
+        """Distance from the centres of bins of the band to the nearest of the strongest peaks, in fifths of a bin, at most 255."""
         low, high = self.peaks.band_mhz
         most = max(30, int(CHANCE * (high - low) / (2 * NEAR_MHZ)))
         strongest = np.sort(self.peaks.frequency_mhz[self.order[:most]])
         centres = low + BIN_MHZ * (np.arange(int((high - low) / BIN_MHZ) + 2) + 0.5)
         right = np.clip(np.searchsorted(strongest, centres), 0, len(strongest) - 1)
         left = np.maximum(right - 1, 0)
-        return np.minimum(np.abs(centres - strongest[left]), np.abs(centres - strongest[right])).astype(np.float32)
+        apart = np.minimum(np.abs(centres - strongest[left]), np.abs(centres - strongest[right]))
+        return np.minimum(5 * apart / BIN_MHZ, 255).astype(np.uint8)
 
     def seeds(self, count: int) -> Ints:
         """The strongest peaks, rising in frequency."""
@@ -84,17 +91,22 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     lines = family.lines[np.argsort(-np.abs(_change_of_jj(field, family.lines)), kind="stable")]
     upper, lower = table.upper[lines], table.lower[lines]
     further, below = table.upper[family.companions], table.lower[family.companions]
-    points = field.bounds.points(table.kappa)
-    energies = table.levels[points, :, 0]
+    points = field.points
+    energies = table.reduced[points]
     out = np.empty((4000, 5))
     low, high = field.peaks.band_mhz
-    found, _ = _kernels.sweep(
+    found = _kernels.sweep(
         np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa[points],
-        np.ascontiguousarray((energies[:, further] - energies[:, below]).T), field.jj[further] - field.jj[below],
+        energies[:, further] - energies[:, below], field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
-        field.bounds.array, need, out,
+        field.bounds.array, need, STRIDE, out,
     )  # fmt: skip
     return out[:found]
+
+
+def alike(constants: Floats, others: Floats, share: float) -> bool:
+    """Whether all constants differ by less than a share of them."""
+    return all(abs(x - y) < share * y for x, y in zip(constants.tolist(), others.tolist(), strict=True))
 
 
 def _change_of_jj(field: Field, lines: Ints) -> Floats:
@@ -112,7 +124,7 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
     for i in np.argsort(-ratios).tolist():
         if ratios[i] < least:
             break
-        if all(np.abs(np.log(tops[i] / other.constants)).max() > SAME for other in out):
+        if not any(alike(tops[i], other.constants, SAME) for other in out):
             out.append(Candidate(tops[i], family, float(ratios[i]), float(temperatures[i])))
     return out
 

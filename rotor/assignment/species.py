@@ -15,12 +15,14 @@ from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown
 from rotor.assignment.rigid_table import RigidTable
-from rotor.assignment.search import Candidate, Field, quick_ratios, ranked, roots_of
+from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, roots_of
 
 CLEAR = 300.0  # evidence at which a search ends at once
 FAINT = 10.0  # ln likelihood ratio below which a root is not grown
 CHUNK = 12  # families between two looks at the candidates
 PER_FAMILY, PER_CHUNK = 4, 5
+PATIENCE, OPEN_PATIENCE = 10, 40  # chunks without a better species after which a search ends; where constants are open
+BEYOND_ALIASES = 600.0  # evidence above which a species is not compared with tops whose lines it would be a part of
 NEAR, GROWN_NEAR = (
     3e-4,
     2e-3,
@@ -70,9 +72,9 @@ def next_species(
 ) -> list[Grown]:
     """The species with the most evidence among the peaks, and rivals with other constants, the best first.
 
-    The search ends when a species is clear, when all stages are done, or when the time is over.
+    The search ends when a species is clear, when no better one came for a while, when all stages are done, or when the time is over.
     """
-    grown, tried = list[Grown](), list[tuple[Floats, float]]()
+    grown, tried, best, highest, chunks, last = list[Grown](), list[tuple[Floats, float]](), None, 0.0, 0, 0
     need = 3 if len(seen.peaks) <= SCARCE else 4
     if len(seen.peaks) <= SCARCE:
         stages = (Stage(SCARCE, 0, len(families)),)
@@ -88,10 +90,17 @@ def next_species(
             for family in chosen[at : at + CHUNK]:
                 candidates += ranked(seen, family, roots_of(seen, family, seeds, need), FAINT)[:PER_FAMILY]
             grown += _grown(seen, candidates, tried, PER_CHUNK)
-            if max((one.evidence for one in grown if one.determined), default=0.0) > clear:
+            chunks += 1
+            best = max(grown, key=lambda one: one.evidence, default=None)
+            if best is not None and best.evidence > highest:
+                highest, last = best.evidence, chunks
+            if best is None or highest < clear / 8:
+                continue
+            if best.determined and highest > clear:
                 return _finished(seen, grown, candidates)
-        best = max(grown, key=lambda one: one.evidence, default=None)
-        if best is not None and best.determined and best.evidence > clear / 8:
+            if chunks - last >= max(PATIENCE if best.determined else OPEN_PATIENCE, last):
+                return _finished(seen, grown, [])
+        if best is not None and best.determined and highest > clear / 8:
             break
     return _finished(seen, grown, [])
 
@@ -102,11 +111,11 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
     if not best or best[0].evidence < 0:
         return best
     first = best[0]
-    near = [one for one in candidates if np.abs(np.log(one.constants / first.constants[:3])).max() < AROUND]
+    near = [one for one in candidates if alike(one.constants, first.constants[:3], AROUND)]
     again = [
         regrown(seen, first),
         *_grown(seen, near, [], 2),
-        *_grown(seen, aliases(seen, first), [], 2 * MOST_ALIASES),
+        *_grown(seen, aliases(seen, first) if first.evidence < BEYOND_ALIASES else [], [], 2 * MOST_ALIASES),
     ]
     return _best(best + again)
 
@@ -134,7 +143,7 @@ def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, f
     for candidate in sorted(candidates, key=lambda one: -one.ratio):
         if len(out) >= most:
             break
-        if any(np.abs(np.log(candidate.constants / other)).max() < near for other, near in tried):
+        if any(alike(candidate.constants, other, near) for other, near in tried):
             continue
         tried.append((candidate.constants, NEAR))
         species = grow(seen, candidate)
@@ -149,7 +158,7 @@ def _best(grown: Sequence[Grown]) -> list[Grown]:
     """Each species once, by falling evidence."""
     out = list[Grown]()
     for one in sorted(grown, key=lambda one: -one.evidence):
-        if all(np.abs(np.log(one.constants[:3] / other.constants[:3])).max() > 1e-4 for other in out):
+        if not any(alike(one.constants[:3], other.constants[:3], 1e-4) for other in out):
             out.append(one)
     return out
 
@@ -210,7 +219,7 @@ def shifts(seen: Field, grown: Grown) -> list[Candidate]:
     slow = grown.rows[change[grown.rows] == 0][:2]
     out = list[Candidate]()
     for n in np.argsort(-ratios)[: 5 * MOST_ALIASES].tolist():
-        if ratios[n] > FAINT and all(np.abs(np.log(tops[n] / one.constants)).max() > NEAR for one in out):
+        if ratios[n] > FAINT and not any(alike(tops[n], one.constants, NEAR) for one in out):
             family = Family(_kernels.MIXED, np.concatenate([which[n : n + 1], slow]), slow[:0], 0.0)
             out.append(Candidate(tops[n], family, float(ratios[n]), float(temperatures[n])))
     return out[:MOST_ALIASES]
