@@ -335,3 +335,44 @@ def test_all_lists_of_shared() -> None:
         mains = [one for one in truth["species"] if "isotopologue_of" not in one]  # type: ignore[attr-defined]
         right += any(is_right(found, n, mains[0]) for n in range(len(found.species)))
     assert right >= 0.9 * total
+
+
+def test_conformers_of_a_smiles_as_guesses() -> None:
+    """Two conformers whose constants are some per cent off those of the force field, each found near its own guess."""
+    from rotor.assignment.guesses import guess_values
+
+    values = np.array(guess_values("SMILES:CCOC(=O)C=C")).reshape(-1, 3)
+    assert len(values) >= 2
+    off = np.array([[1.02, 0.985, 0.99], [0.98, 1.015, 1.01]])
+    truths = [dict(SECOND, **dict(zip("ABC", row, strict=True))) for row in values[:2] * off]
+    lines = [lines_of(truth, (1.0, 0.7, 0.0), height) for truth, height in zip(truths, (100.0, 40.0), strict=True)]
+    rng = np.random.default_rng(21)
+    f, i = (
+        np.concatenate([*(pair[k] for pair in lines), part])
+        for k, part in ((0, rng.uniform(*BAND, 40)), (1, np.full(40, 3.0)))
+    )
+    strong = i > 2.0
+    peaks = peak_list(f[strong] + 0.004 * rng.normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND)
+    request = AssignRequest(peaks, guess_mhz=tuple(values.ravel().tolist()), species=2, seconds=120)
+    assert [len(one.guess_mhz or ()) for one in request.each_guess] == [3] * len(values)
+    found = answer_assign(request)
+    assert len(found.species) == 2
+    assert is_right(found, 0, truths[0])
+    assert is_right(found, 1, truths[1])
+
+
+@pytest.mark.parametrize(
+    ("guess", "message"),
+    [
+        ("SMILES:C1CC", "cannot be read"),
+        ("SMILES:C=C=C=O", "no better than 20%"),
+        ("SMILES:CC#N", "only asymmetric tops"),
+        ("2458,490", "expected three numbers"),
+        ("abc", "abc"),
+    ],
+)
+def test_wrong_guesses_are_refused(guess: str, message: str) -> None:
+    from rotor.assignment.guesses import guess_values
+
+    with pytest.raises(ValueError, match=message):
+        guess_values(guess)

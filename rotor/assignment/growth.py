@@ -25,6 +25,9 @@ FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # later on, rising from roun
 SMALLEST_MHZ = 0.003  # standard error of a peak, at least
 BLENDED_MHZ = 0.08  # predicted lines nearer than this are one peak
 TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
+LEAST_SHARE = (
+    0.1  # of a line in a peak from which it is assigned: the place of a weaker one is not measured by the peak
+)
 MOST_LINES = 400
 OPEN = 1e-3  # relative standard error from which a constant is not known
 FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
@@ -257,7 +260,7 @@ def _matched(
     centre, variance = _predicted_by_others(field, before, merged.main, merged.centre, variance)
     chosen = _nearest(field, centre, merged.height, np.sqrt(variance + sigma0**2), most_chance)
     peak = _without_doubles(chosen, merged.height)[merged.blend]
-    mask = (peak >= 0) & (merged.share > 0.02)
+    mask = (peak >= 0) & (merged.share > LEAST_SHARE)
     return _Matched(merged.row[mask], peak[mask], merged.share[mask], ratios, scales)
 
 

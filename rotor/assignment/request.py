@@ -15,6 +15,7 @@ from rotor.assignment.doublets import with_centres
 from rotor.assignment.evidence import probability, probability_of_isotopologue, word
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown, grown_anew
+from rotor.assignment.guesses import guess_values
 from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologue
 from rotor.assignment.peaks import PeakList, spurs
 from rotor.assignment.refinement import excess_scatter, refine
@@ -34,7 +35,7 @@ from rotor.assignment.species import (
 )
 from rotor.molecules.molecule import Molecule
 from rotor.requests.field import check_fields, declared
-from rotor.requests.readers import Flag, Numbers, Quantity, Whole
+from rotor.requests.readers import Custom, Flag, Numbers, Quantity, Whole
 
 LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # of A, B, C, where nothing is known
 COLDEST_K, HOTTEST_K = 0.7, 12.0
@@ -52,7 +53,7 @@ class AssignRequest:
     """Constants to find in a spectrum; every field is checked when the request is made.
 
     peaks : of the spectrum. species : how many are looked for; a stronger one that is met on the way is added. temperature_k : of the
-    gas; None: not known. guess_mhz : A, B, C known to 3 %. low_mhz, high_mhz : bounds of A, B, C. isotopologues : whether those of
+    gas; None: not known. guess_mhz : A, B, C known to 3 %, or several such triples. low_mhz, high_mhz : bounds of A, B, C. isotopologues : whether those of
     `molecule` are looked for. molecule : geometry of the first species. seconds : after which the search ends with what it has.
     seed : of the sample of tops from which families of lines are chosen.
     """
@@ -70,8 +71,8 @@ class AssignRequest:
     )
     guess_mhz: tuple[float, ...] | None = declared(
         None,
-        Numbers("MHz", (3,), "2458,490,409"),
-        "A, B, C known to 3 % (MHz)",
+        Custom(guess_values, list, "A,B,C", list[float] | str),
+        "A, B, C known to 3 % (MHz), or SMILES:... with constants of its conformers",
         "observables.guess",
         common=True,
         example=[2458.0, 490.0, 409.0],
@@ -102,17 +103,27 @@ class AssignRequest:
             raise ValueError(
                 f"low_mhz, high_mhz: {self._range.low}, {self._range.high}: expected 0 < low < high for A, B and C"
             )
-        if self.guess_mhz is not None and not (self.guess_mhz[0] > self.guess_mhz[1] > self.guess_mhz[2] > 0):
-            raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
+        for a, b, c in self._guesses:
+            if not a > b > c > 0:
+                raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
         if self.isotopologues and self.molecule is None:
             raise ValueError("isotopologues: a geometry of the first species is needed; give it as the molecule")
 
     @property
+    def each_guess(self) -> list[AssignRequest]:
+        """The request for each guess alone; itself without any or with one."""
+        return [replace(self, guess_mhz=guess) for guess in self._guesses] if len(self._guesses) > 1 else [self]
+
+    @property
+    def _guesses(self) -> list[tuple[float, ...]]:
+        return [tuple(self.guess_mhz[n : n + 3]) for n in range(0, len(self.guess_mhz), 3)] if self.guess_mhz else []
+
+    @property
     def bounds(self) -> Bounds:
-        """Of A, B, C, those of the guess where there is one."""
+        """Of A, B, C, those of the first guess where there is one."""
         if self.guess_mhz is None:
             return self._range
-        centre = np.array(self.guess_mhz)
+        centre = np.array(self.guess_mhz[:3])
         return Bounds(centre * (1 - GUESS_ERROR), centre * (1 + GUESS_ERROR))
 
     @property
@@ -141,7 +152,7 @@ class AssignRequest:
         return np.array(TRIED_K if self.temperature_k is None else [self.temperature_k])
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def families_for(
     bounds: tuple[float, ...], band_mhz: tuple[float, float], range_k: tuple[float, float], seed: int, samples: int
 ) -> list[Family]:
@@ -194,7 +205,8 @@ class _Search:
     def __post_init__(self) -> None:
         self.left = ~self.of_clock
         self.table = rigid_table(JMAX)
-        self.families = families_of(self.request)
+        for one in self.request.each_guess:
+            families_of(one)
         compiled(self.table)
         self.clock = Clock(self.request.seconds)
 
@@ -244,10 +256,11 @@ class _Search:
         return sorted((again for again in anew if again.evidence > 0), key=lambda again: -again.evidence)[:1]
 
     def _rivals(self, peaks: PeakList, stages: Sequence[Stage]) -> list[Grown]:
-        seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
-        rivals = [
-            grown for grown in next_species(seen, self.families, stages, self.clock) if self.request.allows(grown)
-        ]
+        rivals = list[Grown]()
+        for one in self.request.each_guess:
+            seen = Field(peaks, self.table, one.root_bounds, one.temperatures)
+            rivals += [grown for grown in next_species(seen, families_of(one), stages, self.clock) if one.allows(grown)]
+        rivals.sort(key=lambda grown: -grown.evidence)
         return rivals if rivals and word(probability(rivals[0])) != "not found" else []
 
     def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> None:

@@ -1,0 +1,44 @@
+"""Guesses of A, B, C: numbers, or the conformers of a SMILES by a force field."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotor.requests.readers import Numbers
+
+PREFIX = "SMILES:"
+WORST = 0.03  # median relative error of the constants of a geometry up to which it is a guess
+
+
+def guess_values(given: Any) -> tuple[float, ...]:
+    """A, B, C (MHz) of a guess, of several behind each other: numbers, or `SMILES:...` with the constants of its conformers."""
+    if isinstance(given, str) and given.startswith(PREFIX):
+        return constants_of_smiles(given.removeprefix(PREFIX))
+    values = Numbers("MHz", (), "2458,490,409").read(given)
+    if len(values) % 3:
+        raise ValueError(f"{given!r}: expected three numbers for each guess, such as 2458,490,409, or SMILES:...")
+    return values
+
+
+def constants_of_smiles(text: str) -> tuple[float, ...]:
+    """A, B, C (MHz) of the conformers of a SMILES within 10 kJ/mol of the lowest, one behind the other.
+
+    Raises ValueError where the force field is known to fail by more than 3 %, and for a molecule that is no asymmetric top.
+    """
+    from rotor.molecules.readers.smiles import NEAR_KJ_PER_MOL, conformers
+    from rotor.tops.top import Top
+
+    values = list[float]()
+    for one in conformers(text):
+        if one.energy_kj_per_mol > NEAR_KJ_PER_MOL:
+            continue
+        if one.molecule.uncertainty is None or one.molecule.uncertainty > WORST:
+            raise ValueError(
+                f"{PREFIX}{text}: the force field knows the geometry of this molecule to no better than {one.molecule.uncertainty or 1:.0%}, "
+                "and a guess is to be right within 3 %; give A, B, C as numbers"
+            )
+        top = Top.from_molecule(one.molecule)
+        if top.kind != "asymmetric":
+            raise ValueError(f"{PREFIX}{text}: its top is {top.kind}; only asymmetric tops can be looked for")
+        values += [float(top.constants[name]) for name in "ABC"]
+    return tuple(values)
