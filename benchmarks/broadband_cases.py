@@ -156,10 +156,10 @@ def make_case(seed: int, signal_to_noise: float | None = None) -> Case:
     if snr > 450:
         for place, one in enumerate(mains):
             species += isotopologues(one, place, rng)
-    return _peaks(seed, band, temperature, snr, floor, species, len(mains), rng)
+    return case_with(seed, band, temperature, snr, floor, species, len(mains), rng)
 
 
-def _peaks(
+def case_with(
     seed: int, band: tuple[float, float], temperature: float, snr: float, floor: float, species: list[Species], mains: int,
     rng: np.random.Generator,
 ) -> Case:  # fmt: skip

@@ -34,8 +34,8 @@ def constants_of_smiles(text: str) -> tuple[float, ...]:
             continue
         if one.molecule.uncertainty is None or one.molecule.uncertainty > WORST:
             raise ValueError(
-                f"{PREFIX}{text}: the force field knows the geometry of this molecule to no better than {one.molecule.uncertainty or 1:.0%}, "
-                "and a guess is to be right within 3 %; give A, B, C as numbers"
+                f"{PREFIX}{text}: the force field knows the geometry of this molecule to no better than "
+                f"{one.molecule.uncertainty or 1:.0%}, and a guess is to be right within 3 %; give A, B, C as numbers"
             )
         top = Top.from_molecule(one.molecule)
         if top.kind != "asymmetric":

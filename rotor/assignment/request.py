@@ -53,9 +53,9 @@ class AssignRequest:
     """Constants to find in a spectrum; every field is checked when the request is made.
 
     peaks : of the spectrum. species : how many are looked for; a stronger one that is met on the way is added. temperature_k : of the
-    gas; None: not known. guess_mhz : A, B, C known to 3 %, or several such triples. low_mhz, high_mhz : bounds of A, B, C. isotopologues : whether those of
-    `molecule` are looked for. molecule : geometry of the first species. seconds : after which the search ends with what it has.
-    seed : of the sample of tops from which families of lines are chosen.
+    gas; None: not known. guess_mhz : A, B, C known to 3 %, or several such triples. low_mhz, high_mhz : bounds of A, B, C.
+    isotopologues : whether those of `molecule` are looked for. molecule : geometry of the first species. seconds : after which the
+    search ends with what it has. seed : of the sample of tops from which families of lines are chosen.
     """
 
     peaks: PeakList
