@@ -15,11 +15,12 @@ from rotor.reports.sources import source_facts
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.fill import Given, read_fields, read_instance
-from rotor.requests.readers import Custom, Flag, Quantity, Whole
+from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
 from rotor.verbs.molecule import range_without_unit, with_some_dipole
+from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
 
@@ -36,7 +37,8 @@ Examples:
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20
-  rotor spectrum case.int --cat case.cat"""
+  rotor spectrum case.int --cat case.cat
+  rotor spectrum --constants "A=2237 B=1368.5 C=884.2" --dipole-abc 1,1,1 --temperature 2 --over peaks.csv --plot over.png"""
 
 
 def _hitran_numbers(given: Any) -> tuple[int, int]:
@@ -65,6 +67,10 @@ class SpectrumShown(Shown):
         option="--full-basis",
         panel=OBSERVABLES,
     )
+    over: str | None = declared(
+        None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (.csv, .npy, FITS): --plot draws both",
+        option="--over", panel=OBSERVABLES,
+    )  # fmt: skip
     top_lines: int = declared(20, Whole(0), "How many of the strongest lines are shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
     hitran_id: tuple[int, int] | None = declared(
@@ -130,6 +136,12 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
         raise ValueError("--hitran: its intensities are those at 296 K; leave --temperature out, or give 296")
     if "egy" in outputs and not isinstance(request, int_files.PredictedRequest):
         raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
+    if "loomis_wood" in outputs and shown.over is None:
+        raise ValueError("--loomis-wood: its rows are pieces of a spectrum; give one with --over")
+    if shown.over is not None:
+        from rotor.formats.peak_files import read_peaks
+
+        read_peaks(shown.over)  # a mistake in it shows before anything is computed
     shaped = request.profile not in (None, "sticks") or request.fwhm_mhz is not None
     if "profile_csv" in outputs and not (shaped or request.layer):
         raise ValueError(
@@ -146,7 +158,8 @@ def content(answer: SpectrumAnswer, shown: SpectrumShown) -> Mapping[str, Any]:
     """Rows of the strongest lines, and patterns at a resolution."""
     resolution = shown.resolution
     patterns = None if resolution is None else pattern_records(answer.lines, resolution, shown.top_lines)
-    return {"strongest": answer.strongest(shown.top_lines), "patterns": patterns}
+    known = {"strongest": answer.strongest(shown.top_lines), "patterns": patterns}
+    return known if shown.over is None else known | {"over": Comparison(answer.lines, shown.over).facts()}
 
 
 def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
@@ -183,6 +196,9 @@ def write_profile(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """The picture as a file."""
+    if report.shown.over is not None:
+        draw_over(answer, path, report)
+        return
     from rotor.plots.spectrum import plot_spectrum
 
     thing = answer.lines if answer.request.shape == "sticks" else answer.spectrum
@@ -239,6 +255,7 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
         *hyperfine_lines(record["hyperfine"]),
         ("lines", _count_text(answer, record["line_count"])),
         *_layer_facts(record),
+        *(over_facts(record["over"]) if "over" in record else []),
     ]
 
 
@@ -302,6 +319,13 @@ VERB = Verb(
         Output("parquet", (".parquet",), "Write all lines as Parquet", write_table, "lines.parquet"),
         Output("profile_csv", (".csv",), "Write the profile on its grid as CSV", write_profile, "profile.csv"),
         Output("plot", PICTURES, "Draw the spectrum (.png, .pdf, .svg)", draw, "lines.png"),
+        Output(
+            "loomis_wood",
+            PICTURES,
+            "With --over: draw the peaks about each line, series by series (.png, .pdf, .svg)",
+            draw_loomis_wood,
+            scene=False,
+        ),
     ),
     subject=MoleculeOrFile(
         ("polarizability", "anisotropy"), lambda top, reading, given: with_some_dipole(top, reading)

@@ -1,0 +1,119 @@
+"""Pictures of known constants over a spectrum: sticks mirrored below its peaks, and Loomis-Wood rows."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.assignment.peaks import PeakList
+from rotor.plots.picture import BLUE, GREY, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.quanta import line_text
+from rotor.spectra.lines import Lines
+
+MOST_ROWS = 60
+WINDOW_MHZ = 5.0  # on either side of a line
+LEAST_SHOWN = 1e-3  # of the strongest line in the band
+
+
+def plot_over(
+    lines: Lines,
+    heights: Floats,
+    peaks: PeakList,
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw peaks with the sticks of lines mirrored below them; heights (lines,) in the units of the peaks."""
+    checked_suffix(path)
+    title = view.title or f"{peaks.source or 'spectrum'} and {name_of_top(lines.top)}"
+    save(over_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
+
+
+def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
+    """A matplotlib figure: peaks above, lines below the axis."""
+    with styled():
+        figure = new_figure((9.0, 4.5))
+        axes = figure.add_subplot()
+        shown = heights > LEAST_SHOWN * heights.max(initial=0.0)
+        axes.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
+        axes.vlines(
+            lines.frequency_mhz[shown],
+            -heights[shown],
+            0,
+            color=BLUE,
+            lw=0.7,
+            label="lines",
+        )
+        axes.axhline(0, color="black", lw=0.5)
+        axes.set_xlabel("frequency (MHz)")
+        axes.set_ylabel("intensity")
+        axes.set_title(title)
+        axes.legend(fontsize=7, loc="upper left")
+        axes.set_xlim(*peaks.band_mhz)
+        show_part(axes, view)
+        return figure
+
+
+def series_order(lines: Lines, rows: Ints) -> Ints:
+    """Rows in the order of series: lines of like change of quantum numbers and like Ka (or K) behind each other, by rising J."""
+    quanta = {
+        name: (values[lines.upper[rows]], values[lines.lower[rows]]) for name, values in lines.levels.quanta.items()
+    }
+    j = quanta["j"]
+    keys: list[Any] = [j[0]]
+    for name in ("kc", "ka", "k"):
+        if name in quanta:
+            upper, lower = quanta[name]
+            keys += [j[1] - lower - quanta["ka"][1], upper - lower] if name == "kc" else [lower, upper - lower]
+    return rows[np.lexsort([*keys, j[0] - j[1]])]
+
+
+def plot_loomis_wood(
+    lines: Lines,
+    heights: Floats,
+    peaks: PeakList,
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw the Loomis-Wood rows of the strongest lines."""
+    checked_suffix(path)
+    title = view.title or f"{peaks.source or 'spectrum'} about lines of {name_of_top(lines.top)}"
+    save(loomis_wood_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
+
+
+def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
+    """A matplotlib figure: one row for each of the strongest lines, with the peaks near it by their distance, series by series.
+
+    Peaks of a species whose constants are right stand below each other at 0; those of wrong constants wander from row to row.
+    """
+    with styled():
+        rows = np.argsort(-heights, kind="stable")[:MOST_ROWS]
+        rows = series_order(lines, rows[heights[rows] > 0])
+        figure = new_figure((6.0, 1.2 + 0.13 * len(rows)))
+        axes = figure.add_subplot()
+        scale = np.log(peaks.intensity / peaks.intensity.min() + 1.0)
+        size = 0.15 + 0.75 * scale / scale.max()
+        for place, row in enumerate(rows.tolist()):
+            off = peaks.frequency_mhz - lines.frequency_mhz[row]
+            near = np.abs(off) < WINDOW_MHZ
+            axes.vlines(off[near], place - size[near] / 2, place + size[near] / 2, color=BLUE, lw=1.2)
+        axes.axvline(0, color="black", lw=0.4)
+        axes.set_yticks(
+            range(len(rows)),
+            [line_text(lines.levels.quanta, lines.upper[row], lines.lower[row]) for row in rows.tolist()],
+            fontsize=5,
+        )
+        axes.set_ylim(len(rows) - 0.3, -0.7)
+        axes.set_xlim(-WINDOW_MHZ, WINDOW_MHZ)
+        axes.set_xlabel("peak - line (MHz)")
+        axes.set_title(title)
+        show_part(axes, view)
+        return figure

@@ -1,0 +1,107 @@
+"""`rotor spectrum --over FILE`: lines of known constants over a measured spectrum, and what its intensities tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.assignment.intensities import Intensities
+    from rotor.assignment.peaks import PeakList
+    from rotor.spectra.lines import Lines
+    from rotor.verbs.verb import Report
+
+MADE = "over"
+
+
+class Comparison:
+    """The lines inside the band of a spectrum, its peaks, and the fit of their intensities; `why` says why there is none."""
+
+    def __init__(self, lines: Lines, path: str) -> None:
+        from rotor.assignment.intensities import fit_intensities
+        from rotor.formats.peak_files import read_peaks
+
+        self.peaks: PeakList = read_peaks(path)
+        low, high = self.peaks.band_mhz
+        self.lines = lines.where((lines.frequency_mhz >= low) & (lines.frequency_mhz <= high))
+        if not len(self.lines):
+            raise ValueError(f"--over {path}: no line lies in its band, {low:g} to {high:g} MHz")
+        self.fit: Intensities | None = None
+        self.why = ""
+        try:
+            self.fit = fit_intensities(self.lines, self.peaks)
+        except ValueError as error:
+            self.why = str(error)
+
+    @property
+    def heights(self) -> Any:
+        """Heights of the lines in the units of the peaks: those fitted, else the strongest as high as the highest peak."""
+        if self.fit is not None:
+            return self.fit.heights(self.lines)
+        intensity = self.lines.intensity_nm2_mhz
+        return intensity / intensity.max() * self.peaks.intensity.max()
+
+    def facts(self) -> dict[str, Any]:
+        """For the JSON."""
+        low, high = self.peaks.band_mhz
+        out: dict[str, Any] = {"peaks": len(self.peaks), "band_mhz": [low, high], "lines": len(self.lines)}
+        if self.fit is None:
+            return out | {"fit": None, "reason": self.why}
+        known = math.isfinite(self.fit.temperature_k)
+        return out | {
+            "fit": {
+                "lines": len(self.fit.line),
+                "temperature_k": self.fit.temperature_k if known else None,
+                "temperature_error_k": self.fit.temperature_error_k if known else None,
+                "dipole_ratio": self.fit.dipole_ratio.tolist(),
+                "scatter": self.fit.scatter,
+            }
+        }
+
+
+def over_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Rows of the report."""
+    band = " to ".join(f"{end:g}" for end in record["band_mhz"])
+    rows = [("over", f"{record['peaks']} peaks from {band} MHz; {record['lines']} lines in this band")]
+    fit = record["fit"]
+    if fit is None:
+        return [*rows, ("intensities", record["reason"])]
+    a, b, c = fit["dipole_ratio"]
+    temperature = (
+        "they tell no temperature"
+        if fit["temperature_k"] is None
+        else f"{fit['temperature_k']:.2f} ± {fit['temperature_error_k']:.2f} K"
+    )
+    text = f"{temperature}; |μa| : |μb| : |μc| = {a:.2f} : {b:.2f} : {c:.2f}, of {fit['lines']} lines with a peak"
+    return [*rows, ("intensities", f"{text}, scatter {100 * fit['scatter']:.0f} %")]
+
+
+def compared(answer: Any, report: Report) -> Comparison:
+    """The comparison, made once for all files of a report."""
+    if MADE not in report.made:
+        report.made[MADE] = Comparison(answer.lines, report.shown.over)
+    made: Comparison = report.made[MADE]
+    return made
+
+
+def drawing(name: str) -> Callable[[Any, Path, Report], None]:
+    """The writer of a picture of `rotor.plots.over`."""
+
+    def draw(answer: Any, path: Path, report: Report) -> None:
+        from rotor.plots import over
+        from rotor.plots.view import View
+
+        comparison = compared(answer, report)
+        view = View(
+            report.view.get("title"), report.view.get("range_mhz"), report.view.get("vertical"), report.view.get("log")
+        )
+        getattr(over, name)(
+            comparison.lines, comparison.heights, comparison.peaks, path, view=view, provenance=report.command
+        )
+
+    return draw
+
+
+draw_over, draw_loomis_wood = drawing("plot_over"), drawing("plot_loomis_wood")
