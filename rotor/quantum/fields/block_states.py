@@ -76,8 +76,10 @@ def solve_block(
     """`block_states` with the matrices of the block at hand."""
     order = basis_order(block, jmax)
     count = count_of(request, block, order)
-    places = enough_states(problem, order, count, fields, request.tolerance_mhz)
-    energies, vectors, error = solve_fields(problem.terms(places), fields, count, request.tolerance_mhz)
+    places, states = _enough(problem, order, count, fields, request.tolerance_mhz)
+    if states is None or len(fields) > 1:
+        states = solve_fields(problem.terms(places), fields, count, request.tolerance_mhz)
+    energies, vectors, error = states
     return bounded_states(block, problem, order, places, energies, vectors, error, fields)
 
 
@@ -111,16 +113,23 @@ def enough_states(problem: BlockProblem, order: Ints, count: int, fields: Floats
     (m,) array
         Places in the block, rising.
     """
+    return _enough(problem, order, count, fields, tolerance_mhz)[0]
+
+
+def _enough(
+    problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float
+) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
+    """Places of the states that suffice, and the lowest states in them at the strongest field where they were solved."""
     size = max(FIRST_BASIS, 2 * count)
     every = np.sort(order)
     if len(order) <= max(size, 2 * DENSE):
-        return every
+        return every, None
     strongest = fields[np.argmax(np.abs(fields))][None]
     whole = problem.over(every)
     while size < len(order):
         basis = np.searchsorted(every, np.sort(order[:size]))
-        energies, vectors, _ = solve_fields(whole.terms(basis), strongest, count)
-        if left_out_mhz(whole, basis, energies, vectors, strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
-            return every[basis]
+        states = solve_fields(whole.terms(basis), strongest, count)
+        if left_out_mhz(whole, basis, *states[:2], strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
+            return every[basis], states
         size = int(1.4 * size) + 1
-    return every
+    return every, None

@@ -232,10 +232,22 @@ def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
     highest = lowest + STEP_J
     while True:
         _check_highest(highest)
-        enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
-        if max(enough, default=lowest) <= highest:
-            return max(enough, default=lowest)
+        enough = _smallest_between(request, lowest, highest, executor)
+        if enough <= highest:
+            return enough
         lowest, highest = highest, highest + max(STEP_J, highest // 4)
+
+
+def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: Executor | None) -> int:
+    """The lowest J max between two that is enough for all blocks, each begun where the one before ended; `highest` + 1 where none is."""
+    if executor is not None:
+        enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
+        return max(enough, default=lowest)
+    for block in blocks_of_map(request, highest):
+        lowest = _smallest_of_block(request, lowest, highest, block)
+        if lowest > highest:
+            break
+    return lowest
 
 
 def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: FieldBlock) -> int:
@@ -252,8 +264,11 @@ def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: Fi
         raise ValueError(
             f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
         )
+    if serves(lowest):
+        return lowest
     if not serves(highest):
         return highest + 1
+    lowest += 1
     while lowest < highest:
         middle = (lowest + highest) // 2
         lowest, highest = (lowest, middle) if serves(middle) else (middle + 1, highest)

@@ -8,6 +8,7 @@ solved in full.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ MANY_FIELDS = 40  # from which on chains are solved from a few of them
 FIRST_ANCHORS = 5  # fields solved in full at first, of many
 SPANNED = 101  # fields at which a basis for many is tested while it is made
 BUFFER = 4  # further states in the basis of a map
+PART_OF_TOLERANCE = 0.1  # that the basis of a map may take
 DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
 
 
@@ -146,11 +148,10 @@ def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float
     error : (f, count) array
         |residual|²/gap, MHz.
     """
-    basis = spanning(terms, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
-    if basis is None:
+    found = _spanned(terms, fields, count, tolerance_mhz)
+    if found is None or found[1][2].max() > tolerance_mhz:  # dependent directions were left out
         return _each(terms, fields, count)
-    energies, vectors, error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)
-    return (energies, vectors, error) if error.max() <= tolerance_mhz else _each(terms, fields, count)
+    return found[1]
 
 
 def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
@@ -165,7 +166,7 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
     terms : tuple of (n, n) arrays
         H_0, H_1, ... in MHz per power of the unit of the field.
     fields : (f,) array
-        Values of the field.
+        Values of the field, rising.
     count : int
         How many states.
     tolerance_mhz : float
@@ -176,19 +177,32 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
     (n, r) array or None
         Orthonormal columns; None where it would be as large as half of the matrix.
     """
+    found = _spanned(terms, fields, count, tolerance_mhz)
+    return None if found is None else found[0]
+
+
+def _spanned(
+    terms: Terms, fields: Floats, count: int, tolerance_mhz: float
+) -> tuple[Matrix, tuple[Floats, Matrix, Floats]] | None:
+    """The basis, and the states in it at all fields; errors are looked at half-way between fields solved in full before all of them."""
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
-    found = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
+    full = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
     while True:
-        basis = _orthonormal(np.concatenate(found, axis=1))
+        basis = _orthonormal(np.concatenate(full, axis=1))
         if basis.shape[1] > len(terms[0]) // 2:
             return None
-        error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)[2].max(axis=1)
-        error[anchors] = 0.0
-        worst = int(np.argmax(error))
-        if error[worst] <= 0.1 * tolerance_mhz:
-            return basis
+        moved, ordered = tuple(one @ basis for one in terms), sorted(anchors)
+        middles = [(i + k) // 2 for i, k in pairwise(ordered) if k > i + 1]
+        for places in map(np.array, (middles, range(len(fields))) if middles else (range(len(fields)),)):
+            states = _in_basis(basis, moved, fields[places], count)
+            error = np.where(np.isin(places, anchors), 0.0, states[2].max(axis=1))
+            if error.max(initial=0.0) > PART_OF_TOLERANCE * tolerance_mhz:
+                break
+        else:
+            return basis, states
+        worst = int(places[np.argmax(error)])
         anchors.append(worst)
-        found.append(_lowest(at_fields(terms, fields[worst : worst + 1])[0], count + BUFFER)[1])
+        full.append(_lowest(at_fields(terms, fields[worst : worst + 1])[0], count + BUFFER)[1])
 
 
 def _orthonormal(vectors: Matrix) -> Matrix:
