@@ -56,12 +56,22 @@ class CoupledBlock:
 
 
 def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """The connected parts of the graph, each in rising order."""
-    group = list(range(count))
+    """The connected parts of the graph, by their lowest members, each in rising order."""
+    above = list(range(count))
+
+    def root(i: int) -> int:
+        while above[i] != i:
+            above[i] = above[above[i]]
+            i = above[i]
+        return i
+
     for i, k in edges:
-        low, high = sorted((group[i], group[k]))
-        group = [low if g == high else g for g in group]
-    return [[i for i in range(count) if group[i] == g] for g in dict.fromkeys(group)]
+        low, high = sorted((root(i), root(k)))
+        above[high] = low
+    members: dict[int, list[int]] = {}
+    for i in range(count):
+        members.setdefault(root(i), []).append(i)
+    return list(members.values())
 
 
 def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:

@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
-Operators = dict[tuple[int, int], dict[Channel, Floats]]
+Operators = dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]
+"""Matrices between two blocks of the rotation, each with the channels that share it."""
 InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 
@@ -118,8 +119,14 @@ class Plan:
 
     @cached_property
     def operators(self) -> Operators:
-        """Operators of every channel by pairs of blocks (i ≥ k)."""
-        return _by_pairs(self.contracted or []) if self.given is None else self.given
+        """Operators by pairs of blocks (i ≥ k)."""
+        if self.given is not None:
+            return self.given
+        out: Operators = {}
+        for found, channels in self.contracted or ():
+            for pair, operator in by_numbers(found).items():
+                out.setdefault(pair, []).append((operator, channels))
+        return out
 
     @cached_property
     def families_at(self) -> dict[tuple[int, int], dict[int, list[tuple[int, int]]]]:
@@ -129,11 +136,6 @@ class Plan:
             for at, (i, own) in enumerate(family):
                 found.setdefault((self.blocks[i].n, own), {}).setdefault(number, []).append((at, i))
         return found
-
-    @cached_property
-    def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
-        """Each matrix between two blocks once, with the channels that share it."""
-        return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
         """The same rotation with some of the operators, all by default, and what that is called."""
@@ -190,15 +192,6 @@ def plan_of(
     contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks, axial), blocks, families, contracted)
-
-
-def _by_pairs(contracted: InStacks) -> Operators:
-    """Operators in stacks by pairs of blocks."""
-    out: Operators = {}
-    for found, channels in contracted:
-        for pair, operator in by_numbers(found).items():
-            out.setdefault(pair, {}).update(dict.fromkeys(channels, operator))
-    return out
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:
@@ -271,7 +264,7 @@ def prepare(plan: Plan, every_f: Iterable[int]) -> None:
 
 def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
     """c(p', p) of all channels by F."""
-    acting = {channel for operators in plan.operators.values() for channel in operators}
+    acting = {channel for found in plan.operators.values() for _, channels in found for channel in channels}
     found = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
     return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
 
@@ -325,14 +318,14 @@ def _solved(
 
 def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
     """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
-    size, grouped = parts[-1].place.stop, plan.grouped
+    size = parts[-1].place.stop
     matrix = np.zeros((size, size))
     matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
     single = all(part.repeats == 1 for part in parts)
     of_single = {channel: table.tolist() for channel, table in known.items()} if single else {}
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
-            for operator, of_it in grouped.get((up.number, low.number), ()):
+            for operator, of_it in plan.operators.get((up.number, low.number), ()):
                 if single:
                     one = [of_single[channel][up.patterns.start][low.patterns.start] for channel in of_it]
                     element = operator * sum(one)
@@ -345,20 +338,13 @@ def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats
     return matrix
 
 
-def _by_operator(operators: dict[Channel, Floats]) -> list[tuple[Floats, list[Channel]]]:
-    """Each matrix once, with the channels that share it."""
-    found: dict[int, tuple[Floats, list[Channel]]] = {}
-    for channel, operator in operators.items():
-        found.setdefault(id(operator), (operator, []))[1].append(channel)
-    return list(found.values())
-
-
 def _state_by_state(plan: Plan, part: SpinPart, known: dict[Channel, Floats]) -> tuple[Floats, Floats]:
     """Energies, rising, and vectors where every rotational state has only its own patterns: one small matrix each, all at once."""
     states, repeats = len(part.rotor.energies_mhz), part.repeats
     matrices = np.zeros((states, repeats, repeats))
-    for channel, operator in plan.operators.get((part.number, part.number), {}).items():
-        matrices += np.diag(operator)[:, None, None] * known[channel][part.patterns, part.patterns]
+    for operator, channels in plan.operators.get((part.number, part.number), ()):
+        for channel in channels:
+            matrices += np.diag(operator)[:, None, None] * known[channel][part.patterns, part.patterns]
     shifts, own = np.linalg.eigh(matrices)
     energies = (part.rotor.energies_mhz[:, None] + shifts).ravel()
     vectors = np.zeros((repeats, states, states, repeats))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from rotor.quantum.coupled import connected_parts
 from rotor.quantum.spins.contraction import Contracted, acting_numbers
 from rotor.quantum.spins.rotor import Channel
 
@@ -41,19 +42,5 @@ def families_of(count: int, links: Iterable[Link], classes: int) -> list[list[tu
     list of list of (int, int)
         Every block and class once, by the lowest member of each family.
     """
-    above = list(range(count * classes))
-
-    def root(i: int) -> int:
-        while above[i] != i:
-            above[i] = above[above[i]]
-            i = above[i]
-        return i
-
-    for i, k, changed in links:
-        for own in range(classes):
-            low, high = sorted((root(i * classes + own), root(k * classes + (own ^ changed))))
-            above[high] = low
-    members: dict[int, list[tuple[int, int]]] = {}
-    for i in range(count * classes):
-        members.setdefault(root(i), []).append(divmod(i, classes))
-    return list(members.values())
+    edges = ((i * classes + own, k * classes + (own ^ changed)) for i, k, changed in links for own in range(classes))
+    return [[divmod(member, classes) for member in part] for part in connected_parts(count * classes, edges)]

@@ -68,15 +68,15 @@ def in_wang_functions(plan: Plan) -> Plan:
     Raises ValueError for a rotation without a threefold axis.
     """
     blocks = []
+    vectors = [block.vectors for block in plan.blocks]
     turned = {
-        pair: {c: plan.blocks[pair[0]].vectors @ x @ plan.blocks[pair[1]].vectors.T for c, x in found.items()}
-        for pair, found in plan.operators.items()
+        (i, k): [(vectors[i] @ x @ vectors[k].T, channels) for x, channels in found]
+        for (i, k), found in plan.operators.items()
     }
     for number, block in enumerate(plan.blocks):
         own = (block.vectors * block.energies_mhz) @ block.vectors.T
         _check_axis(block, own)
-        found = turned.setdefault((number, number), {})
-        found[ALONE] = own + found[ALONE] if ALONE in found else own
+        turned.setdefault((number, number), []).append((own, [ALONE]))
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
     return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, given=turned)
 
@@ -197,20 +197,20 @@ def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: i
 def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:
     """The Hamiltonian over the functions: Σ_channels c(p', p) X(r', r), each product of two sums."""
     total = np.zeros((len(functions.sub_block), len(functions.sub_block)))
-    by_channel: dict[Channel, list[tuple[int, int]]] = {}
+    by_channel: dict[Channel, list[tuple[int, int, Floats]]] = {}
     for i, up in enumerate(parts):
         for k, low in enumerate(parts):
-            for channel in plan.operators.get((up.number, low.number), {}):
-                by_channel.setdefault(channel, []).append((i, k))
+            for element, channels in plan.operators.get((up.number, low.number), ()):
+                for channel in channels:
+                    by_channel.setdefault(channel, []).append((i, k, element))
     starts = np.cumsum([0, *(len(part.rotor.energies_mhz) for part in parts)])
-    for channel, pairs in by_channel.items():
+    for channel, elements in by_channel.items():
         rotor = np.zeros((len(rows), len(rows)))
-        for i, k in pairs:
-            element = plan.operators[parts[i].number, parts[k].number][channel]
-            rotor[starts[i] : starts[i + 1], starts[k] : starts[k + 1]] = element
+        for i, k, element in elements:
+            rotor[starts[i] : starts[i + 1], starts[k] : starts[k + 1]] += element
             if i != k:  # c(p', p) = (-1)^(N'-N) c(p, p'), and the product is symmetric
                 turned = (-1.0) ** (parts[i].rotor.n - parts[k].rotor.n) * element.T
-                rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] = turned
+                rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] += turned
         coupling = _coupling(plan, channel, every)
         for r, p, c in zip(functions.wang, functions.pattern, functions.factor, strict=True):
             for s, q, d in zip(functions.wang, functions.pattern, functions.factor, strict=True):
