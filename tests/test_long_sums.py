@@ -1,5 +1,6 @@
 """Sums over levels of absurd constants: one of A, B, C orders of magnitude from the others, cut files, mistyped units."""
 
+import json
 from importlib import import_module
 
 import numpy as np
@@ -80,3 +81,28 @@ def test_an_onset_that_no_sum_reaches_is_said_and_not_an_error(monkeypatch):
     assert answer.facts()["classical_above_k"] is None
     with pytest.raises(ValueError, match="beyond the reach"):
         rotor.thermodynamics.classical_above_k(of(CUT_SHORT))
+
+
+MIXED = ("--constants", "A=9400 B=3100 C=2500 MHz", "--state-constants")
+TWO_STATES = "E[1]=60000 A[1]=9480 B[1]=3090 C[1]=2497 G_c[0,1]=450 MHz"
+
+
+def test_sums_at_temperatures_that_nobody_typed_are_left_out_where_they_are_long(call, monkeypatch):
+    """Of states that mix, at the temperatures of catalogues; a sum that --temperature asks for is made."""
+    monkeypatch.setattr(sums_module, "QUICK_PRODUCTS", 1e7)
+
+    def table(*words):
+        return json.loads(call("info", *MIXED, TWO_STATES, *words, "--json", "-")[1])["partition_function"]
+
+    rows = table()
+    summed = {row["temperature_k"]: row["q"] for row in rows if row["q"] is not None}
+    assert max(summed) == 18.75
+    left_out = [row["source"] for row in rows if row["q"] is None]
+    assert set(left_out) == {"a long sum over levels of states that mix; --temperature asks for it"}
+    assert len(left_out) == len(rows) - 2
+    assert table("--temperature", "18.75,37.5")[0]["q"] == pytest.approx(summed[18.75], rel=1e-9)
+    assert table("--temperature", "37.5")[0]["q"] is not None
+    plain = rotor.Top.from_constants(
+        {"A": 9400.0, "B": 3100.0, "C": 2500.0, "E[1]": 6e4, "A[1]": 9480.0, "B[1]": 3090.0, "C[1]": 2497.0}
+    )
+    assert sums_module.is_quick(plain, 1000.0)  # states that nothing joins

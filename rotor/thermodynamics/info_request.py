@@ -100,7 +100,7 @@ def answer_info(request: InfoRequest, progress: Callable[..., Any] | None = None
     """Sizes of effects at the J most populated at 300 K, Q(T), and conformers where they are asked for."""
     top = request.top
     sizes = limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
-    rows = partition_table(top, request.temperatures_k, progress)
+    rows = partition_table(top, request.temperatures_k, progress, quick=request.temperatures_k == TEMPERATURES_K)
     return InfoAnswer(request, tuple(rows), tuple(_conformers(request)), sizes)
 
 

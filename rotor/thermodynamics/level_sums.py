@@ -46,6 +46,7 @@ MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both ta
 MOST_J_DISTORTED = {
     "asymmetric": 800
 }  # with distortion, whose levels are all solved, and up to two simpler forms of them
+QUICK_PRODUCTS = 1e9  # n³ of diagonalizations, each some 5e-9 s
 HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
 AT_WORST = 0.1  # estimated relative error above which a sum is refused
@@ -177,6 +178,20 @@ def lowest_level_k(
 ) -> list[float]:
     """E/k of the lowest level that exists by each set of spin weights, from the Hamiltonian's zero, in K."""
     return [energy for energy, _ in _Ladder(top, tuple(weights), tuple(effects)).ground]
+
+
+def is_quick(top: Top, temperature_k: float, relative_error: float = 1e-6) -> bool:
+    """Whether the sum at a temperature takes some seconds at most: blocks of S states that mix, (2J + 1)/4 levels of each, are cubic work.
+
+    >>> from rotor.tops.top import Top
+    >>> mixed = {"A": 9400.0, "B": 3100.0, "C": 2500.0, "E[1]": 6e4, "A[1]": 9480.0, "B[1]": 3090.0, "C[1]": 2497.0, "G_c[0,1]": 450.0}
+    >>> [is_quick(Top.from_constants(mixed), kelvin) for kelvin in (75.0, 300.0)]
+    [True, False]
+    """
+    if top.states is None or not top.states.couplings:
+        return True
+    last = float(_last_j(top, np.array([temperature_k]), relative_error)[0])
+    return (top.states.count * last) ** 3 * last / 8 <= QUICK_PRODUCTS  # of 4 blocks: the sum over J of 4 (S J/2)³
 
 
 def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:

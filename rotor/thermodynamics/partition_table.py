@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.thermodynamics.classical_limit import ClassicalLimit, classical_limit, classical_partition_function
-from rotor.thermodynamics.level_sums import AT_WORST, Progress, refusal
+from rotor.thermodynamics.level_sums import AT_WORST, Progress, is_quick, refusal
 from rotor.thermodynamics.partition import PartitionFunction, partition_function, partition_functions
 from rotor.thermodynamics.spin_factor import spin_functions
 
@@ -42,14 +42,21 @@ def partition_facts(
 
 
 def partition_table(
-    top: Top, temperatures_k: Sequence[float], progress: Progress | None = None
+    top: Top, temperatures_k: Sequence[float], progress: Progress | None = None, quick: bool = False
 ) -> list[dict[str, Any]]:
     """Q summed and classical at each temperature; where there is no sum, `q` is None and `source` says why.
+
+    quick: sums over levels of states that mix are left out where they take longer than some seconds.
 
     >>> from rotor.tops.top import Top
     >>> [round(row["q"], 2) for row in partition_table(Top.from_constants("B=57635.968 MHz"), [10.0, 300.0])]
     [3.97, 108.79]
     """
+    if quick:
+        rows = {t: _long_row(top, t) for t in temperatures_k if not is_quick(top, t)}
+        rest = [t for t in temperatures_k if t not in rows]
+        rows |= dict(zip(rest, partition_table(top, rest, progress), strict=True)) if rest else {}
+        return [rows[t] for t in temperatures_k]
     try:
         found = partition_functions(top, temperatures_k, refuse=False, progress=progress)
         limit = classical_limit(top)
@@ -71,6 +78,11 @@ def _row_alone(top: Top, temperature_k: float) -> dict[str, Any]:
     except ValueError as error:
         known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
         return _without_sum(known, str(error))
+
+
+def _long_row(top: Top, temperature_k: float) -> dict[str, Any]:
+    known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
+    return _without_sum(known, "a long sum over levels of states that mix; --temperature asks for it")
 
 
 def _without_sum(facts: dict[str, Any], reason: str) -> dict[str, Any]:
