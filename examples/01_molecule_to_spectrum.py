@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.formats.spcat.compare import agreement, compare
+from rotor.api import agreement, compare
 
 # %matplotlib inline
 

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.tops.isotopes.isotopologues import isotopologue, isotopologues
+from rotor.api import isotopologue, isotopologues
 
 # %matplotlib inline
 

@@ -13,8 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.formats.spcat.text.egy import read_egy
-from rotor.units import MHZ_PER_CM
+from rotor.api import MHZ_PER_CM, read_egy
 
 # %matplotlib inline
 

@@ -12,13 +12,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.classical.euler import invariants
-from rotor.classical.free.polhodes import level
-from rotor.classical.free.stability import fixed_axes, growth_rate, separatrix_ratio
-from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
-from rotor.geometry.inertia import rectangle
-from rotor.plots.polhodes import polhode_figure
-from rotor.units import ASE_TIME_PS, EV_PER_K, HBAR_CLASSICAL
+from rotor.api import (
+    ASE_TIME_PS,
+    EV_PER_K,
+    HBAR_CLASSICAL,
+    fixed_axes,
+    growth_rate,
+    invariants,
+    level,
+    mean_thermal_momentum,
+    off_intermediate_axis,
+    polhode_figure,
+    rectangle,
+    separatrix_ratio,
+)
 
 # %matplotlib inline
 

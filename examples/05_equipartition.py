@@ -12,11 +12,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.classical.gas.ensembles import thermal_ensemble
-from rotor.plots.gas import equipartition_figure
-from rotor.statistics.degrees_of_freedom import count_degrees
-from rotor.statistics.equipartition import equipartition, kinetic_degrees
-from rotor.units import ASE_TIME_PS, EV_PER_K
+from rotor.api import (
+    ASE_TIME_PS,
+    EV_PER_K,
+    count_degrees,
+    equipartition,
+    equipartition_figure,
+    kinetic_degrees,
+    thermal_ensemble,
+)
 
 # %matplotlib inline
 

@@ -15,13 +15,25 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.classical.gas.correlations import linear_curves, plateau, short_time
-from rotor.classical.gas.ensembles import free_gas_correlations
-from rotor.plots.gas import band_figure
-from rotor.plots.heat_capacity import Panel, heat_capacity_figure
-from rotor.spectra.classical_band import classical_band, compare_bands, dipole_band_area, lines_area, rigid
-from rotor.thermodynamics import GAS_CONSTANT, thermodynamic_functions
-from rotor.units import ASE_TIME_PS, EV_PER_K, MHZ_PER_CM
+from rotor.api import (
+    ASE_TIME_PS,
+    EV_PER_K,
+    GAS_CONSTANT,
+    MHZ_PER_CM,
+    Panel,
+    band_figure,
+    classical_band,
+    compare_bands,
+    dipole_band_area,
+    free_gas_correlations,
+    heat_capacity_figure,
+    linear_curves,
+    lines_area,
+    plateau,
+    rigid,
+    short_time,
+    thermodynamic_functions,
+)
 
 # %matplotlib inline
 

@@ -10,17 +10,22 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.fitting.assignment import assignments
-from rotor.fitting.choose import choose_constants, suggest_lines
-from rotor.fitting.fit import FitOptions, fit_lines
-from rotor.fitting.parameters import parameters
-from rotor.fitting.publication import publication_table
-from rotor.fitting.report import report_text
-from rotor.fitting.resampling import bootstrap
-from rotor.formats.assigned_lines import read_assigned_lines
-from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit
-from rotor.plots.fit import fit_figure
-from rotor.tops.constants import Constants
+from rotor import Constants
+from rotor.api import (
+    FitOptions,
+    assignments,
+    bootstrap,
+    choose_constants,
+    fit_figure,
+    fit_lines,
+    fitted_file,
+    parameters,
+    publication_table,
+    read_assigned_lines,
+    read_fit,
+    report_text,
+    suggest_lines,
+)
 
 # %matplotlib inline
 

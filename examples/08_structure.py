@@ -8,14 +8,16 @@
 from pathlib import Path
 
 import rotor
-from rotor.formats.family_file import read_family
-from rotor.molecules.molecule import Molecule
-from rotor.plots.structure import structure_figure
-from rotor.structures.coordinates import named, symmetric_displacements
-from rotor.structures.family import family
-from rotor.structures.least_squares import fit_structure
-from rotor.structures.substitution import substitution_structure
-from rotor.tops.top import Top
+from rotor import Molecule, Top
+from rotor.api import (
+    family,
+    fit_structure,
+    named,
+    read_family,
+    structure_figure,
+    substitution_structure,
+    symmetric_displacements,
+)
 
 # %matplotlib inline
 

@@ -12,15 +12,19 @@ import numpy as np
 from scipy.special import obl_cv
 
 import rotor
-from rotor.plots.stark import stark_figure
-from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
-from rotor.quantum.effects.zeeman import zeeman_map
-from rotor.quantum.fields.deflection import deflection_table
-from rotor.spectra.fields.lines import field_lines
-from rotor.spectra.fields.stark_coefficients import line_coefficients
-from rotor.thermodynamics.field_mixture import field_mixture
-from rotor.tops.top import Top
-from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
+from rotor import Top
+from rotor.api import (
+    MHZ_ANGSTROM3_W_PER_CM2,
+    MHZ_PER_CM,
+    MHZ_PER_DEBYE_KV_PER_CM,
+    deflection_table,
+    field_lines,
+    field_mixture,
+    line_coefficients,
+    stark_figure,
+    stark_map,
+    zeeman_map,
+)
 
 # %matplotlib inline
 

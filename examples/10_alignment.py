@@ -12,13 +12,20 @@ import numpy as np
 import qutip
 
 import rotor
-from rotor.alignment.acting import revival_period_ps
-from rotor.alignment.align import align
-from rotor.alignment.classical import classical_trace
-from rotor.alignment.pulse import DipolePulse, GaussianPulse, Kick, elliptical
-from rotor.alignment.qutip_objects import block_objects, linear_objects, solve_windows
-from rotor.plots.alignment import alignment_figure
-from rotor.tops.top import Top
+from rotor import Top
+from rotor.api import (
+    DipolePulse,
+    GaussianPulse,
+    Kick,
+    align,
+    alignment_figure,
+    block_objects,
+    classical_trace,
+    elliptical,
+    linear_objects,
+    revival_period_ps,
+    solve_windows,
+)
 
 # %matplotlib inline
 

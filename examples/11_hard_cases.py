@@ -15,12 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.classical.free.stability import growth_rate
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.splitting import RotationSplitting
-from rotor.formats.spcat.text.egy import read_egy
-from rotor.geometry import rotations
-from rotor.units import MHZ_PER_CM
+from rotor.api import MHZ_PER_CM, RotationSplitting, growth_rate, integrate, read_egy, rotations
 
 # %matplotlib inline
 

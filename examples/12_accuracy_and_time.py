@@ -12,12 +12,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.classical.gas.ensembles import thermal_ensemble
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.moser_veselov import MoserVeselov
-from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
-from rotor.geometry.rotations import distance
-from rotor.units import EV_PER_K
+from rotor.api import (
+    EV_PER_K,
+    MoserVeselov,
+    RotationSplitting,
+    SymmetricTopSplitting,
+    distance,
+    integrate,
+    thermal_ensemble,
+)
 
 # %matplotlib inline
 

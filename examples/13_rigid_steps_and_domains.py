@@ -8,10 +8,23 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rotor.geometry.base_pair_steps import mean_rotation, persistence_steps, step_parameters, step_pose
-from rotor.geometry.rigid_motions import adjoint, bracket, compose, power, screw_of, twist_exp, twist_log
-from rotor.geometry.rigid_parts import rigid_parts
-from rotor.geometry.rotations import exp, rotate, to_matrix
+from rotor.api import (
+    adjoint,
+    bracket,
+    compose,
+    exp,
+    mean_rotation,
+    persistence_steps,
+    power,
+    rigid_parts,
+    rotate,
+    screw_of,
+    step_parameters,
+    step_pose,
+    to_matrix,
+    twist_exp,
+    twist_log,
+)
 
 # %matplotlib inline
 

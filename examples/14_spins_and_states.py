@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.quantum.hyperfine_method import used_method
+from rotor.api import used_method
 
 # %matplotlib inline
 

@@ -12,15 +12,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.fitting.assignment import assignments
-from rotor.fitting.fit import fit_lines
-from rotor.fitting.parameters import parameters
-from rotor.fitting.search import FitOptions
-from rotor.fitting.top_constants import TopConstants
-from rotor.plots.torsion import torsion_figure
-from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
-from rotor.quantum.internal_rotation.levels import turning_tops
-from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.api import (
+    FitOptions,
+    InternalRotationConstants,
+    TopConstants,
+    assignments,
+    fit_lines,
+    parameters,
+    torsion_figure,
+    turning_tops,
+    with_internal_rotation,
+)
 
 # %matplotlib inline
 

@@ -12,16 +12,24 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rotor.formats.catalogue.cat_species import read_cat_species
-from rotor.formats.spectra.axis import ReadChoices
-from rotor.formats.spectra.read import read_spectrum
-from rotor.observed.channels import fit_rejecting
-from rotor.observed.diagram import plot_rotational_diagram, rotational_diagram
-from rotor.observed.fit import FitChoices, contributions, fit_source
-from rotor.observed.identify import IdentifyChoices, identify
-from rotor.observed.model import Component, Sight, model
-from rotor.observed.spectrum import observed_spectrum
-from rotor.observed.start import start_components
+from rotor.api import (
+    Component,
+    FitChoices,
+    IdentifyChoices,
+    ReadChoices,
+    Sight,
+    contributions,
+    fit_rejecting,
+    fit_source,
+    identify,
+    model,
+    observed_spectrum,
+    plot_rotational_diagram,
+    read_cat_species,
+    read_spectrum,
+    rotational_diagram,
+    start_components,
+)
 
 # %matplotlib inline
 
@@ -99,9 +107,12 @@ assert (np.abs(pulls.std(axis=0) - 1) < 0.4).all()  # 40 draws: 0.11
 # artificial rotor, without noise:
 
 # %%
-from rotor import units  # noqa: E402
-from rotor.observed.partition import PartitionTable  # noqa: E402
-from rotor.observed.species import species_lines, strength_from_einstein  # noqa: E402
+from rotor.api import (  # noqa: E402
+    PartitionTable,
+    species_lines,
+    strength_from_einstein,
+    units,
+)
 
 j = np.arange(12)
 b_k = 10e3 / units.MHZ_PER_K

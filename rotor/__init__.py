@@ -104,10 +104,10 @@ def _moved(name: str) -> Any:
     """A name that has left for `rotor.api`, with a warning; AttributeError for others."""
     from rotor import api
 
-    if name not in api.MODULES:
+    if name not in api.MOVED:
         from rotor.checks import did_you_mean
 
-        raise AttributeError(f"module 'rotor' has no attribute {name!r}{did_you_mean(name, [*__all__, *api.MODULES])}")
+        raise AttributeError(f"module 'rotor' has no attribute {name!r}{did_you_mean(name, [*__all__, *api.MOVED])}")
     import warnings
 
     warnings.warn(

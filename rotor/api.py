@@ -6,17 +6,26 @@
 Functions of a top take whatever `rotor.read` takes instead. Names are loaded when they are first used.
 """
 
+import ast
 from collections.abc import Callable
 from functools import cache, wraps
 from importlib import import_module
 from inspect import signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import did_you_mean
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these lines
+    from rotor import units as units
+    from rotor.alignment.acting import revival_period_ps as revival_period_ps
     from rotor.alignment.align import AlignmentTrace as AlignmentTrace
     from rotor.alignment.align import align as align
+    from rotor.alignment.classical import classical_trace as classical_trace
+    from rotor.alignment.pulse import DipolePulse as DipolePulse
+    from rotor.alignment.pulse import GaussianPulse as GaussianPulse
+    from rotor.alignment.pulse import Kick as Kick
+    from rotor.alignment.pulse import elliptical as elliptical
     from rotor.alignment.qutip_objects import LinearObjects as LinearObjects
     from rotor.alignment.qutip_objects import block_objects as block_objects
     from rotor.alignment.qutip_objects import linear_objects as linear_objects
@@ -25,44 +34,160 @@ if TYPE_CHECKING:
     from rotor.alignment.request import answer_align as answer_align
     from rotor.assignment.request import AssignRequest as AssignRequest
     from rotor.assignment.request import answer_assign as answer_assign
+    from rotor.classical.effects.changing_inertia import ChangingInertia as ChangingInertia
+    from rotor.classical.effects.drag import LinearDrag as LinearDrag
+    from rotor.classical.effects.gravity import GravityAboutPivot as GravityAboutPivot
+    from rotor.classical.effects.gyrostat import SpinningRotor as SpinningRotor
+    from rotor.classical.effects.ideal_fluid import FluidImpulse as FluidImpulse
+    from rotor.classical.effects.ideal_fluid import added_masses as added_masses
+    from rotor.classical.effects.ideal_fluid import added_moments as added_moments
+    from rotor.classical.effects.ideal_fluid import shape_integrals as shape_integrals
+    from rotor.classical.effects.rolling import RollingEllipsoid as RollingEllipsoid
+    from rotor.classical.effects.torques import ConstantTorque as ConstantTorque
+    from rotor.classical.euler import angular_velocity as angular_velocity
+    from rotor.classical.euler import gyroscopic_rate as gyroscopic_rate
+    from rotor.classical.euler import invariants as invariants
+    from rotor.classical.euler import momentum_rate as momentum_rate
     from rotor.classical.free.free_motion import free_motion as free_motion
+    from rotor.classical.free.polhodes import level as level
+    from rotor.classical.free.stability import fixed_axes as fixed_axes
+    from rotor.classical.free.stability import growth_rate as growth_rate
+    from rotor.classical.free.stability import precession_rates as precession_rates
+    from rotor.classical.free.stability import separatrix_ratio as separatrix_ratio
+    from rotor.classical.gas.correlations import linear_curves as linear_curves
+    from rotor.classical.gas.correlations import plateau as plateau
+    from rotor.classical.gas.correlations import short_time as short_time
+    from rotor.classical.gas.ensembles import free_gas_correlations as free_gas_correlations
+    from rotor.classical.gas.ensembles import thermal_ensemble as thermal_ensemble
+    from rotor.classical.gas.thermal_momentum import mean_thermal_momentum as mean_thermal_momentum
+    from rotor.classical.gas.thermal_momentum import off_intermediate_axis as off_intermediate_axis
     from rotor.classical.integrators.driven_batch import propagate_driven as propagate_driven
+    from rotor.classical.integrators.exact_drift import ExactDrift as ExactDrift
+    from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta as LieRungeKutta
+    from rotor.classical.integrators.method import integrate as integrate
     from rotor.classical.integrators.moser_veselov import MoserVeselov as MoserVeselov
+    from rotor.classical.integrators.splitting import RotationSplitting as RotationSplitting
+    from rotor.classical.integrators.splitting import SymmetricTopSplitting as SymmetricTopSplitting
     from rotor.classical.lyapunov import body_flow as body_flow
     from rotor.classical.lyapunov import lyapunov_exponents as lyapunov_exponents
     from rotor.classical.lyapunov import orbit as orbit
     from rotor.classical.lyapunov import poincare_section as poincare_section
+    from rotor.classical.system import momentum_of as momentum_of
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
     from rotor.classical.tumble import answer_tumble as answer_tumble
+    from rotor.fitting.assignment import assignments as assignments
+    from rotor.fitting.choose import choose_constants as choose_constants
+    from rotor.fitting.choose import suggest_lines as suggest_lines
+    from rotor.fitting.fit import fit_lines as fit_lines
+    from rotor.fitting.parameters import parameters as parameters
+    from rotor.fitting.publication import publication_table as publication_table
+    from rotor.fitting.report import report_text as report_text
+    from rotor.fitting.resampling import bootstrap as bootstrap
+    from rotor.fitting.search import FitOptions as FitOptions
+    from rotor.fitting.top_constants import TopConstants as TopConstants
+    from rotor.fluids.forces.potential import RigidPotential as RigidPotential
+    from rotor.fluids.motion.dynamics import RigidDynamics as RigidDynamics
+    from rotor.fluids.motion.thermostats import NoseHoover as NoseHoover
     from rotor.fluids.request import FluidRequest as FluidRequest
     from rotor.fluids.request import NewBox as NewBox
     from rotor.fluids.request import answer_fluid as answer_fluid
+    from rotor.formats.assigned_lines import read_assigned_lines as read_assigned_lines
+    from rotor.formats.catalogue.cat_species import read_cat_species as read_cat_species
+    from rotor.formats.family_file import read_family as read_family
+    from rotor.formats.spcat.compare import agreement as agreement
+    from rotor.formats.spcat.compare import compare as compare
+    from rotor.formats.spcat.fits.fit_input import fitted_file as fitted_file
+    from rotor.formats.spcat.fits.fit_input import read_fit as read_fit
+    from rotor.formats.spcat.text.egy import read_egy as read_egy
+    from rotor.formats.spectra.axis import ReadChoices as ReadChoices
+    from rotor.formats.spectra.read import read_spectrum as read_spectrum
     from rotor.formats.streamed_lines import stream_lines as stream_lines
+    from rotor.geometry import rotations as rotations
     from rotor.geometry.base_pair_steps import mean_rotation as mean_rotation
     from rotor.geometry.base_pair_steps import persistence_steps as persistence_steps
     from rotor.geometry.base_pair_steps import step_parameters as step_parameters
     from rotor.geometry.base_pair_steps import step_pose as step_pose
+    from rotor.geometry.inertia import rectangle as rectangle
+    from rotor.geometry.rigid_motions import adjoint as adjoint
+    from rotor.geometry.rigid_motions import bracket as bracket
+    from rotor.geometry.rigid_motions import compose as compose
+    from rotor.geometry.rigid_motions import power as power
     from rotor.geometry.rigid_motions import screw_of as screw_of
     from rotor.geometry.rigid_motions import twist_exp as twist_exp
     from rotor.geometry.rigid_motions import twist_log as twist_log
+    from rotor.geometry.rigid_parts import rigid_parts as rigid_parts
+    from rotor.geometry.rotations import conjugate as conjugate
+    from rotor.geometry.rotations import distance as distance
+    from rotor.geometry.rotations import exp as exp
+    from rotor.geometry.rotations import from_matrix as from_matrix
+    from rotor.geometry.rotations import multiply as multiply
+    from rotor.geometry.rotations import rotate as rotate
+    from rotor.geometry.rotations import to_matrix as to_matrix
     from rotor.molecules.optimise import refine as refine
+    from rotor.observed.channels import fit_rejecting as fit_rejecting
+    from rotor.observed.diagram import plot_rotational_diagram as plot_rotational_diagram
+    from rotor.observed.diagram import rotational_diagram as rotational_diagram
+    from rotor.observed.fit import FitChoices as FitChoices
+    from rotor.observed.fit import contributions as contributions
+    from rotor.observed.fit import fit_source as fit_source
+    from rotor.observed.identify import IdentifyChoices as IdentifyChoices
+    from rotor.observed.identify import identify as identify
+    from rotor.observed.model import Component as Component
+    from rotor.observed.model import Sight as Sight
+    from rotor.observed.model import model as model
+    from rotor.observed.partition import PartitionTable as PartitionTable
+    from rotor.observed.species import species_lines as species_lines
+    from rotor.observed.species import strength_from_einstein as strength_from_einstein
+    from rotor.observed.spectrum import observed_spectrum as observed_spectrum
+    from rotor.observed.start import start_components as start_components
+    from rotor.plots.alignment import alignment_figure as alignment_figure
+    from rotor.plots.fit import fit_figure as fit_figure
+    from rotor.plots.gas import band_figure as band_figure
+    from rotor.plots.gas import equipartition_figure as equipartition_figure
+    from rotor.plots.heat_capacity import Panel as Panel
+    from rotor.plots.heat_capacity import heat_capacity_figure as heat_capacity_figure
+    from rotor.plots.polhodes import polhode_figure as polhode_figure
+    from rotor.plots.stark import stark_figure as stark_figure
+    from rotor.plots.structure import structure_figure as structure_figure
+    from rotor.plots.torsion import torsion_figure as torsion_figure
+    from rotor.quantum.basis.labelled import Basis as Basis
+    from rotor.quantum.basis.labelled import rotation_labels as rotation_labels
+    from rotor.quantum.blocks import linear_blocks as linear_blocks
+    from rotor.quantum.effects.hyperfine import quadrupole_of_tensor as quadrupole_of_tensor
     from rotor.quantum.effects.of_top import effects_of as effects_of
+    from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2 as MHZ_ANGSTROM3_W_PER_CM2
     from rotor.quantum.effects.stark import stark_map as stark_map
+    from rotor.quantum.effects.watson import SEMI_RIGID as SEMI_RIGID
     from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
+    from rotor.quantum.fields.deflection import deflection_table as deflection_table
     from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
     from rotor.quantum.fields.stark_request import answer_stark as answer_stark
     from rotor.quantum.fields.zeeman_request import ZeemanRequest as ZeemanRequest
     from rotor.quantum.fields.zeeman_request import answer_zeeman as answer_zeeman
+    from rotor.quantum.hyperfine_method import used_method as used_method
+    from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation as with_internal_rotation
+    from rotor.quantum.internal_rotation.levels import turning_tops as turning_tops
+    from rotor.quantum.operators.rotation import j_x as j_x
+    from rotor.quantum.operators.rotation import j_y as j_y
+    from rotor.quantum.operators.rotation import j_z as j_z
     from rotor.quantum.reductions import to_reduction as to_reduction
     from rotor.quantum.reductions import to_representation as to_representation
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.quantum.spins import Spin as Spin
+    from rotor.scenes.scene import SpectrumScene as SpectrumScene
+    from rotor.scenes.sections import SpectrumConditions as SpectrumConditions
     from rotor.spectra.classical_band import band_from_correlation as band_from_correlation
     from rotor.spectra.classical_band import classical_band as classical_band
     from rotor.spectra.classical_band import compare_bands as compare_bands
+    from rotor.spectra.classical_band import dipole_band_area as dipole_band_area
+    from rotor.spectra.classical_band import lines_area as lines_area
+    from rotor.spectra.classical_band import rigid as rigid
     from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
     from rotor.spectra.emission_request import answer_emission as answer_emission
+    from rotor.spectra.fields.lines import field_lines as field_lines
+    from rotor.spectra.fields.stark_coefficients import line_coefficients as line_coefficients
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
     from rotor.spectra.raman import raman_lines as raman_lines
@@ -71,86 +196,43 @@ if TYPE_CHECKING:
     from rotor.spectra.request import GasLayer as GasLayer
     from rotor.spectra.request import SpectrumRequest as SpectrumRequest
     from rotor.spectra.request import answer_spectrum as answer_spectrum
+    from rotor.statistics.degrees_of_freedom import count_degrees as count_degrees
+    from rotor.statistics.equipartition import equipartition as equipartition
+    from rotor.statistics.equipartition import kinetic_degrees as kinetic_degrees
+    from rotor.structures.coordinates import named as named
+    from rotor.structures.coordinates import symmetric_displacements as symmetric_displacements
     from rotor.structures.family import family as family
+    from rotor.structures.least_squares import fit_structure as fit_structure
+    from rotor.structures.substitution import substitution_structure as substitution_structure
+    from rotor.thermodynamics import GAS_CONSTANT as GAS_CONSTANT
     from rotor.thermodynamics import VibrationalStates as VibrationalStates
     from rotor.thermodynamics import partition_function as partition_function
     from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
     from rotor.thermodynamics.classical_gas import GasRequest as GasRequest
     from rotor.thermodynamics.classical_gas import answer_gas as answer_gas
+    from rotor.thermodynamics.field_mixture import field_mixture as field_mixture
     from rotor.thermodynamics.request import ThermoRequest as ThermoRequest
     from rotor.thermodynamics.request import answer_thermo as answer_thermo
     from rotor.thermodynamics.thermal_tumble import thermal_tumble as thermal_tumble
+    from rotor.tops.internal_rotation import InternalRotationConstants as InternalRotationConstants
+    from rotor.tops.isotopes.isotopologues import isotopologue as isotopologue
+    from rotor.tops.isotopes.isotopologues import isotopologues as isotopologues
+    from rotor.units import ASE_TIME_PS as ASE_TIME_PS
+    from rotor.units import EV_PER_K as EV_PER_K
+    from rotor.units import HBAR_CLASSICAL as HBAR_CLASSICAL
+    from rotor.units import MHZ_PER_CM as MHZ_PER_CM
+    from rotor.units import MHZ_PER_DEBYE_KV_PER_CM as MHZ_PER_DEBYE_KV_PER_CM
 
-MODULES = {
-    "AlignRequest": "rotor.alignment.request",
-    "AssignRequest": "rotor.assignment.request",
-    "AlignmentTrace": "rotor.alignment.align",
-    "FluidRequest": "rotor.fluids.request",
-    "GasLayer": "rotor.spectra.request",
-    "GasRequest": "rotor.thermodynamics.classical_gas",
-    "LevelsRequest": "rotor.quantum.request",
-    "NewBox": "rotor.fluids.request",
-    "RamanLines": "rotor.spectra.raman",
-    "RamanRequest": "rotor.spectra.raman_request",
-    "EmissionRequest": "rotor.spectra.emission_request",
-    "SpectrumRequest": "rotor.spectra.request",
-    "StarkRequest": "rotor.quantum.fields.stark_request",
-    "ThermoRequest": "rotor.thermodynamics.request",
-    "TumbleRequest": "rotor.classical.tumble",
-    "VibrationalStates": "rotor.thermodynamics",
-    "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
-    "align": "rotor.alignment.align",
-    "answer_align": "rotor.alignment.request",
-    "answer_assign": "rotor.assignment.request",
-    "answer_fluid": "rotor.fluids.request",
-    "answer_gas": "rotor.thermodynamics.classical_gas",
-    "answer_levels": "rotor.quantum.request",
-    "answer_raman": "rotor.spectra.raman_request",
-    "answer_emission": "rotor.spectra.emission_request",
-    "answer_spectrum": "rotor.spectra.request",
-    "answer_stark": "rotor.quantum.fields.stark_request",
-    "answer_thermo": "rotor.thermodynamics.request",
-    "answer_tumble": "rotor.classical.tumble",
-    "answer_zeeman": "rotor.quantum.fields.zeeman_request",
-    "effects_of": "rotor.quantum.effects.of_top",
-    "free_motion": "rotor.classical.free.free_motion",
-    "line_list": "rotor.spectra.lines",
-    "partition_function": "rotor.thermodynamics",
-    "raman_lines": "rotor.spectra.raman",
-    "refine": "rotor.molecules.optimise",
-    "solve_levels": "rotor.quantum.solve",
-    "stark_map": "rotor.quantum.effects.stark",
-    "stream_lines": "rotor.formats.streamed_lines",
-    "thermal_tumble": "rotor.thermodynamics.thermal_tumble",
-    "thermodynamic_functions": "rotor.thermodynamics",
-    "zeeman_map": "rotor.quantum.effects.zeeman",
-}
-
-FURTHER = {
-    "LinearObjects": "rotor.alignment.qutip_objects",
-    "MoserVeselov": "rotor.classical.integrators.moser_veselov",
-    "band_from_correlation": "rotor.spectra.classical_band",
-    "block_objects": "rotor.alignment.qutip_objects",
-    "body_flow": "rotor.classical.lyapunov",
-    "classical_band": "rotor.spectra.classical_band",
-    "compare_bands": "rotor.spectra.classical_band",
-    "family": "rotor.structures.family",
-    "linear_objects": "rotor.alignment.qutip_objects",
-    "lyapunov_exponents": "rotor.classical.lyapunov",
-    "mean_rotation": "rotor.geometry.base_pair_steps",
-    "orbit": "rotor.classical.lyapunov",
-    "persistence_steps": "rotor.geometry.base_pair_steps",
-    "poincare_section": "rotor.classical.lyapunov",
-    "propagate_driven": "rotor.classical.integrators.driven_batch",
-    "screw_of": "rotor.geometry.rigid_motions",
-    "solve_windows": "rotor.alignment.qutip_objects",
-    "step_parameters": "rotor.geometry.base_pair_steps",
-    "step_pose": "rotor.geometry.base_pair_steps",
-    "to_reduction": "rotor.quantum.reductions",
-    "to_representation": "rotor.quantum.reductions",
-    "twist_exp": "rotor.geometry.rigid_motions",
-    "twist_log": "rotor.geometry.rigid_motions",
-}  # that never stood in `rotor` itself
+MOVED = frozenset(
+    {
+        "AlignRequest", "AlignmentTrace", "AssignRequest", "EmissionRequest", "FluidRequest", "GasLayer", "GasRequest",
+        "LevelsRequest", "NewBox", "RamanLines", "RamanRequest", "SpectrumRequest", "StarkRequest", "ThermoRequest",
+        "TumbleRequest", "VibrationalStates", "ZeemanRequest", "align", "answer_align", "answer_assign", "answer_emission",
+        "answer_fluid", "answer_gas", "answer_levels", "answer_raman", "answer_spectrum", "answer_stark", "answer_thermo",
+        "answer_tumble", "answer_zeeman", "effects_of", "free_motion", "line_list", "partition_function", "raman_lines", "refine",
+        "solve_levels", "stark_map", "stream_lines", "thermal_tumble", "thermodynamic_functions", "zeeman_map",
+    }
+)  # fmt: skip  # names that stood in `rotor` itself
 
 OF_TOPS = frozenset(
     {
@@ -159,14 +241,28 @@ OF_TOPS = frozenset(
     }
 )  # fmt: skip  # functions whose first argument is a top
 
-__all__ = sorted([*MODULES, *FURTHER])
+
+@cache
+def modules() -> dict[str, str]:
+    """The module of every name, from the imports at the head of this file."""
+    head = next(one for one in ast.parse(Path(__file__).read_text(encoding="utf-8")).body if isinstance(one, ast.If))
+    return {name.name: str(one.module) for one in head.body if isinstance(one, ast.ImportFrom) for name in one.names}
+
+
+def __dir__() -> list[str]:
+    return sorted(modules())
 
 
 def __getattr__(name: str) -> Any:
-    if name in MODULES or name in FURTHER:
-        found = getattr(import_module({**MODULES, **FURTHER}[name]), name)
-        return _taking_words(found) if name in OF_TOPS else found
-    raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{did_you_mean(name, __all__)}")
+    if name == "__all__":
+        return __dir__()
+    if name.startswith("_"):
+        raise AttributeError(f"module 'rotor.api' has no attribute {name!r}")
+    if name not in modules():
+        raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{did_you_mean(name, modules())}")
+    where = import_module(modules()[name])
+    found = getattr(where, name) if hasattr(where, name) else import_module(f"{where.__name__}.{name}")
+    return _taking_words(found) if name in OF_TOPS else found
 
 
 @cache
@@ -197,7 +293,3 @@ def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], optio
         names = [name for name in taken.parameters if name not in ("top", *options)]
         which = did_you_mean(unknown, names) if unknown else ""
         raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None
-
-
-def __dir__() -> list[str]:
-    return list(__all__)

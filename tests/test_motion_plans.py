@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotor.classical import motion_steps, tolerance_search
 from rotor.classical.driven import answer_driven
 from rotor.geometry.rotations import distance
-from rotor.scenes import accuracy_motion, motion_steps
 from rotor.scenes.kind import kind_of
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
@@ -42,7 +42,7 @@ def found_error(result) -> float:
 @pytest.mark.parametrize("long", [False, True])
 def test_the_run_takes_the_tolerance_of_its_plan(long, monkeypatch):
     """Found by whole motions, or by the first part of a motion that counts as long here."""
-    monkeypatch.setattr(accuracy_motion, "LONG_STEPS", 10 if long else 10**6)
+    monkeypatch.setattr(tolerance_search, "LONG_STEPS", 10 if long else 10**6)
     plan, result = plan_of(REGULAR), run_scene(REGULAR)
     assert dict(plan.parts)["accuracy"] == result.reached.how
     assert f"tolerance {result.request.tolerance:g} of a step" in dict(plan.parts)["method"]
@@ -53,8 +53,8 @@ def test_the_run_takes_the_tolerance_of_its_plan(long, monkeypatch):
 
 def test_a_first_part_that_says_too_little_is_corrected_by_the_run(monkeypatch):
     """As if errors did not grow at all: the tolerance of the plan misses, the run says so and takes a finer one."""
-    monkeypatch.setattr(accuracy_motion, "LONG_STEPS", 10)
-    monkeypatch.setattr(accuracy_motion, "_growth", lambda middle, end: 1e-2)
+    monkeypatch.setattr(tolerance_search, "LONG_STEPS", 10)
+    monkeypatch.setattr(tolerance_search, "_growth", lambda middle, end: 1e-2)
     result = run_scene(REGULAR)
     assert "finer than the plan's" in result.reached.how
     assert found_error(result) <= result.reached.error <= 1e-7

@@ -9,12 +9,19 @@
 # %%
 import numpy as np
 
-from rotor.classical.effects.ideal_fluid import FluidImpulse, added_masses, added_moments, shape_integrals
-from rotor.classical.free.free_motion import free_motion
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.splitting import SymmetricTopSplitting
-from rotor.geometry.rotations import conjugate, distance, rotate
+from rotor.api import (
+    FluidImpulse,
+    LieRungeKutta,
+    SymmetricTopSplitting,
+    added_masses,
+    added_moments,
+    conjugate,
+    distance,
+    free_motion,
+    integrate,
+    rotate,
+    shape_integrals,
+)
 
 semiaxes = np.array([3.0, 2.0, 1.2])
 assert np.isclose(shape_integrals(semiaxes).sum(), 2.0, rtol=1e-14)

@@ -8,9 +8,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from rotor.classical.euler import angular_velocity
-from rotor.classical.free.free_motion import free_motion
-from rotor.geometry.rotations import rotate
+from rotor.api import angular_velocity, free_motion, rotate
 
 length, mass, blow = 0.9, 1.5, np.array([0.0, 3.0, 0.0])  # m, kg, N s
 moments = mass * length**2 / 12.0 * np.array([1e-6, 1.0, 1.0])

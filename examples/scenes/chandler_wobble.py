@@ -7,9 +7,7 @@
 # %%
 import numpy as np
 
-from rotor.classical.free.stability import precession_rates
-from rotor.classical.integrators.exact_drift import ExactDrift
-from rotor.classical.integrators.method import integrate
+from rotor.api import ExactDrift, integrate, precession_rates
 
 ellipticity = 0.0032845479
 moments = np.array([1.0, 1.0, 1.0 + ellipticity])

@@ -7,9 +7,7 @@
 # %%
 import numpy as np
 
-from rotor.classical.effects.gyrostat import SpinningRotor
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
-from rotor.classical.integrators.method import integrate
+from rotor.api import LieRungeKutta, SpinningRotor, integrate
 
 moments, rotor, rate = np.array([1.0, 1.2, 1.5]), 0.7, 0.3
 brackets = [(moments[2] - moments[k]) * rate + rotor for k in (0, 1)]

@@ -7,10 +7,7 @@
 import numpy as np
 from scipy.special import ellipk
 
-from rotor.classical.effects.gravity import GravityAboutPivot
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
-from rotor.classical.integrators.method import integrate
-from rotor.geometry.rotations import exp
+from rotor.api import GravityAboutPivot, LieRungeKutta, exp, integrate
 
 length, mass, gravity = 1.0, 2.0, 9.80665
 moments = mass * length**2 / 3.0 * np.array([1.0, 1.0, 1e-6])

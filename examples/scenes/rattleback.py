@@ -13,12 +13,17 @@ import sys
 
 import numpy as np
 
-from rotor.classical.effects.drag import LinearDrag
-from rotor.classical.effects.rolling import RollingEllipsoid
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
-from rotor.classical.integrators.method import integrate
-from rotor.classical.system import momentum_of
-from rotor.geometry.rotations import conjugate, from_matrix, multiply, rotate
+from rotor.api import (
+    LieRungeKutta,
+    LinearDrag,
+    RollingEllipsoid,
+    conjugate,
+    from_matrix,
+    integrate,
+    momentum_of,
+    multiply,
+    rotate,
+)
 
 inertia = np.array([[2.0, -0.2, 0.0], [-0.2, 16.0, 0.0], [0.0, 0.0, 17.0]])  # along the ellipsoid's axes
 moments, columns = np.linalg.eigh(inertia)

@@ -12,9 +12,7 @@
 import numpy as np
 from scipy.special import fresnel
 
-from rotor.classical.effects.torques import ConstantTorque
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
-from rotor.classical.integrators.method import integrate
+from rotor.api import ConstantTorque, LieRungeKutta, integrate
 
 moments = np.array([100.0, 100.0, 180.0])  # kg m²
 torque = np.array([0.05, 0.0, 2.0])  # N m

@@ -6,10 +6,7 @@
 # %%
 import numpy as np
 
-from rotor.classical.effects.changing_inertia import ChangingInertia
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.splitting import SymmetricTopSplitting
-from rotor.geometry.rotations import rotate
+from rotor.api import ChangingInertia, SymmetricTopSplitting, integrate, rotate
 
 pull = ChangingInertia(lambda t: [12.0, 12.0, 4.0 + (1.6 - 4.0) * np.clip(t, 0.0, 1.0)])
 skater = integrate(SymmetricTopSplitting(0.01, 4), [12.0, 12.0, 4.0], [0.0, 0.0, 8.0], [0.0, 0.5, 1.5], effects=[pull])

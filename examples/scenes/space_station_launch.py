@@ -8,9 +8,7 @@
 # %%
 import numpy as np
 
-from rotor.classical.euler import gyroscopic_rate
-from rotor.classical.free.free_motion import free_motion
-from rotor.geometry.rotations import conjugate, rotate
+from rotor.api import conjugate, free_motion, gyroscopic_rate, rotate
 
 radius, drop, g = 100.0, 2.0, 9.80665
 spin = np.array([0.0, 0.0, np.sqrt(g / radius)])

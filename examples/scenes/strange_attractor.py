@@ -13,8 +13,7 @@ import sys
 
 import numpy as np
 
-from rotor.classical.effects.drag import LinearDrag
-from rotor.classical.lyapunov import body_flow, lyapunov_exponents, orbit
+from rotor.api import LinearDrag, body_flow, lyapunov_exponents, orbit
 
 moments = np.array([1.0, 3.0, 2.0])
 scale = np.sqrt([1 / 75, 1 / 50, 1 / 150])  # x_i = scale_i ω_i

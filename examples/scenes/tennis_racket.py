@@ -10,9 +10,7 @@ import sys
 
 import numpy as np
 
-from rotor.classical.free.free_motion import free_motion
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.splitting import SymmetricTopSplitting
+from rotor.api import SymmetricTopSplitting, free_motion, integrate
 
 moments = np.array([0.3, 0.35, 0.4])
 momentum = moments * [0.1, 15.0, 0.1]

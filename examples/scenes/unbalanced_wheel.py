@@ -8,11 +8,7 @@
 # %%
 import numpy as np
 
-from rotor.classical.effects.torques import ConstantTorque
-from rotor.classical.euler import momentum_rate
-from rotor.classical.integrators.method import integrate
-from rotor.classical.integrators.splitting import SymmetricTopSplitting
-from rotor.geometry.rotations import rotate
+from rotor.api import ConstantTorque, SymmetricTopSplitting, integrate, momentum_rate, rotate
 
 moments, tilt, speed = np.array([0.6, 0.6, 1.0]), np.radians(1.0), 100.0
 omega = speed * np.array([np.sin(tilt), 0.0, np.cos(tilt)])
