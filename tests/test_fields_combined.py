@@ -132,3 +132,55 @@ def test_a_nucleus_beside_internal_rotation_leaves_the_sum_of_strengths(frame):
 def test_what_is_not_computed_in_a_magnetic_field_says_so():
     with pytest.raises(ValueError, match="internal rotation in a magnetic field"):
         rotor.api.zeeman_map(turning(), [1.0], 0.1, j_highest=1)
+
+
+def test_a_tensor_of_one_file_on_a_spin_reaches_stark_maps():
+    """The toy tensor with the numbers of a quadrupole coupling has its map."""
+    from toy_spin_tensor import SpinTensor
+
+    top = Top.from_constants("A=10000 B=6000 C=4000 MHz", dipole_abc_debye=tuple(DIPOLE))
+    toy = SpinTensor(g_mhz=1.0, t_abc=tuple(map(tuple, CHI.tolist())), twice_s=2)
+    known = (*SEMI_RIGID, quadrupole_of_tensor(Spin("N", 2), CHI))
+    settings = {"j_highest": 1, "jmax": 4, "tolerance_mhz": 1.0, "most_at_edge": 1.0}
+    ours, expected, none = (
+        stark_map(top, [0.0, 1.0], effects=effects, **settings)
+        for effects in ((*SEMI_RIGID, toy), known, (*SEMI_RIGID, replace(toy, g_mhz=0.0)))
+    )
+    assert ours.energy_mhz == pytest.approx(expected.energy_mhz, abs=1e-8)  # rounding of 3e4 MHz
+    assert np.abs(ours.energy_mhz - none.energy_mhz).max() > 0.1
+
+
+def test_an_operator_of_one_file_is_fitted():
+    """c of c (J·n)⁴ with A, B, C from lines that it made."""
+    from rotor.fitting.assignment import assignments
+    from rotor.fitting.fit import fit_lines
+    from rotor.fitting.parameters import Parameters
+    from rotor.fitting.top_levels import TopLevels
+    from rotor.quantum.labelled_states import labelled_states
+
+    top = Top.from_constants("A=10000 B=6000 C=4000 MHz", dipole_abc_debye=tuple(DIPOLE))
+    effects = (*SEMI_RIGID, AxisPower(c_mhz=2.0, axis_abc=(0.6, 0.48, 0.64)))
+    lines = line_list(top, jmax=4, min_lgint=-np.inf, effects=effects)
+    strong = lines.where(lines.frequency_mhz > 1000.0)
+    names = ("A", "B", "C", "c_axis")
+    labels = [strong.levels.quanta_of(rows) for rows in (strong.upper, strong.lower)]
+    measured = assignments(("j", "ka", "kc"), *labels, strong.frequency_mhz, 0.001)
+
+    def model(wanted):
+        j, ka, kc = wanted.T
+        start = np.array([10001.0, 6000.5, 3999.5, 1.5])
+        blocks = labelled_states(top, effects, names, np.column_stack([j, 0 * j, ka, kc]), start)
+        return TopLevels(names, len(wanted), ((np.arange(len(wanted)), blocks),))
+
+    start = np.array([10001.0, 6000.5, 3999.5, 1.5])
+    free = Parameters(names, start, np.full(4, np.inf), names, np.zeros(4), np.eye(4))
+    fit = fit_lines(measured, None, free, model=model)
+    assert fit.converged
+    assert fit.values == pytest.approx([10000.0, 6000.0, 4000.0, 2.0], abs=1e-5)  # lines without noise
+
+
+def test_intensities_of_two_states_without_field_are_the_catalogue():
+    lines = field_lines(TWO, [0.0], j_highest=1, light="isotropic", temperature_k=20.0, jmax=3, tolerance_mhz=1.0)
+    free = line_list(TWO, jmax=1, temperature_k=20.0, min_lgint=-np.inf)
+    far = lines.where(lines.frequency_mhz > 1e-4)  # MHz: not M and M + 1 of one level
+    assert far.intensity_nm2_mhz.sum() == pytest.approx(free.intensity_nm2_mhz.sum(), rel=1e-6)  # Q to 1e-6

@@ -20,6 +20,7 @@ from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -45,7 +46,9 @@ class Problem:
 
     def space(self, jmax: int) -> FieldSpace:
         """The states up to J max and their blocks."""
-        return field_space(self.top, jmax, [one for of_window in self.contractions for one in of_window])
+        return field_space(
+            one_state(self.top, "alignment"), jmax, [one for of_window in self.contractions for one in of_window]
+        )
 
     def m_values(self, space: FieldSpace) -> Sequence[int]:
         """|M| of the blocks to be carried; 0 stands for all where M is mixed."""

@@ -26,6 +26,7 @@ from rotor.quantum.fields.direction_cosines import cosine_bands
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.quantum.symmetric_top_elements import coupling
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -117,7 +118,9 @@ def block_objects(
         if not any(_same(known, channel) for known in channels):
             channels.append(channel)
     contractions = [Contraction(acted_on(top, one.acts_on), one.space) for one in channels]
-    space = field_space(top, guessed_jmax(top, pulses, 0, 1e-10) if jmax is None else jmax, contractions)
+    space = field_space(
+        one_state(top, "alignment"), guessed_jmax(top, pulses, 0, 1e-10) if jmax is None else jmax, contractions
+    )
     blocks = space.blocks(m)
     if not 0 <= block < len(blocks):
         raise ValueError(f"block {block} of |M| = {m}: there are {len(blocks)}, numbered from 0")

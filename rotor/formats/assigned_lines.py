@@ -274,6 +274,12 @@ def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
             )
 
 
+def _shown(labels: Sequence[str]) -> list[str]:
+    """Columns of labels as a file has them: the field of a line stands once."""
+    field = [next(iter(_FIELD))] if "field_upper" in labels else []
+    return [name for name in labels if not name.startswith("field_")] + field
+
+
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
@@ -287,7 +293,7 @@ def _refuse_columns(
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
         raise ValueError(
-            f"{path}: {what}; columns are {', '.join(labels)}, a frequency ({' or '.join(_FREQUENCY)}), an error "
+            f"{path}: {what}; columns are {', '.join(_shown(labels))}, a frequency ({' or '.join(_FREQUENCY)}), an error "
             f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, excluded, comment"
         )
     twice = next((name for name in columns if columns.count(name) > 1), None)
