@@ -18,7 +18,7 @@ from rotor.quantum.bond_torsion import BondTorsion, FourierSeries, no_terms
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 from rotor.thermodynamics.functions import GAS_CONSTANT
 from rotor.thermodynamics.hindered_rotor import METHODS, hindered_rotor_functions
-from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+from rotor.thermodynamics.torsion_request import TorsionRequest, _harmonics, answer_torsion
 from rotor.tops.top import Top
 
 F, V3 = 160e3, 3e7  # MHz: a methyl group with 1000 cm⁻¹
@@ -255,6 +255,25 @@ def test_both_gauche_wells_of_butane_are_alike():
     wells = sorted(well.energy_mhz for well in answer.torsion.wells())
     assert len(wells) == 3
     assert wells[1] == pytest.approx(wells[2], rel=1e-9)  # of a series without odd terms
+
+
+def test_a_peptide_bond_turns_instead_of_bending(monkeypatch):
+    """N-methylacetamide: 20 kcal/mol, and every angle of the turn; with one dihedral angle fixed alone nitrogen bends and snaps over."""
+    rotation = bond_rotation(read_molecule("SMILES:CNC(C)=O"), "2-3")
+    scan = relaxed_scan(rotation, points=12)
+    assert 6500 < scan.energies_cm.max() < 7700
+    assert np.diff(scan.angles).max() == pytest.approx(math.radians(30), abs=1e-3)
+    monkeypatch.setattr(type(rotation), "opposite_atoms", lambda self: None)
+    bent = relaxed_scan(rotation, points=12)
+    assert np.diff(bent.angles).max() > math.radians(45)
+    assert bond_rotation(read_molecule("C2H6"), "1-2").opposite_atoms() is None
+
+
+def test_a_series_has_no_more_terms_than_the_widest_gap_resolves():
+    even = np.arange(12) * math.pi / 6
+    assert _harmonics(even, 1) == 4
+    assert _harmonics(even / 3, 3) == 4
+    assert _harmonics(np.delete(even, [5, 6, 7]), 1) == 1  # a gap of 120 degrees
 
 
 def test_a_scan_of_an_ase_calculator_object_is_that_of_its_name():

@@ -32,6 +32,7 @@ SYMMETRIC_ANGSTROM = (
     0.25  # how far atoms of a group may be off an n-fold axis along the bond: hydrogens of a methyl group are by 0.05
 )
 MOST_FOLD = 6
+PLANAR = 0.4  # determinant of three unit vectors: 0 in a plane, 0.77 of a tetrahedron; amides that bend a little count as planar
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +169,24 @@ class BondRotation:
             off = [i for i in atoms.tolist() if _off_axis(x, i, self.first, self.last) > ON_AXIS_ANGSTROM]
             ends.append(min(off, key=lambda i: (float(np.linalg.norm(x[i] - x[end])), i)))
         return ends[0], self.first, self.last, ends[1]
+
+    def opposite_atoms(self) -> tuple[int, int, int, int] | None:
+        """Four atoms of the other substituents, where both atoms of the bond have two in one plane with it (a peptide bond); else None.
+
+        With one dihedral angle fixed alone such a group would bend out of its plane instead of turning.
+        """
+        x = self.molecule.positions_angstrom
+        nearest = self.dihedral_atoms()
+        bonds, others = bonded_atoms(self.molecule), []
+        for end, beyond, taken in ((self.first, self.last, nearest[0]), (self.last, self.first, nearest[3])):
+            beside = [i for i in bonds[end].tolist() if i != beyond]
+            if len(beside) != 2 or taken not in beside:
+                return None
+            arms = [x[i] - x[end] for i in (*beside, beyond)]
+            if abs(np.linalg.det([arm / np.linalg.norm(arm) for arm in arms])) > PLANAR:
+                return None
+            others.append(next(i for i in beside if i != taken))
+        return others[0], self.first, self.last, others[1]
 
 
 def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:

@@ -52,6 +52,8 @@ def relaxed_scan(
 ) -> BondScan:
     """Energies over one period of the rotation, all else relaxed at each angle (BFGS with the dihedral angle fixed).
 
+    Between planar groups (a peptide bond) the dihedral angles of both sides are fixed: with one alone they bend instead of turning.
+
     Parameters
     ----------
     rotation : BondRotation
@@ -96,15 +98,16 @@ def relaxed_scan(
 
 
 def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, degrees: float) -> tuple[Floats, float]:
-    """Positions and energy (eV) at the minimum of all coordinates but the dihedral angle."""
+    """Positions and energy (eV) at the minimum of all coordinates but the dihedral angle, or two of a bond between planar groups."""
     from ase import constraints
     from ase.optimize import BFGS
 
     library: Any = constraints  # ASE has no types
     atoms = ase_atoms(rotation.molecule)
     atoms.set_positions(positions)
-    quartet = list(rotation.dihedral_atoms())
-    atoms.set_constraint(library.FixInternals(dihedrals_deg=[[atoms.get_dihedral(*quartet), quartet]], epsilon=1e-9))
+    quartets = [list(one) for one in (rotation.dihedral_atoms(), rotation.opposite_atoms()) if one is not None]
+    fixed = [[atoms.get_dihedral(*quartet), quartet] for quartet in quartets]
+    atoms.set_constraint(library.FixInternals(dihedrals_deg=fixed, epsilon=1e-9))
     atoms.calc = engine
     try:
         search: Any = BFGS(atoms, logfile=None)

@@ -311,7 +311,7 @@ def _made(
     except ValueError as error:
         raise ValueError(f"potential: {error}") from None
     period = rotation.symmetry_number(isotopes=False)
-    harmonics = max(1, len(scan.angles) // 3)
+    harmonics = _harmonics(scan.angles, period)
     potential = FourierSeries.fitted(
         scan.angles, scan.energies_cm * units.MHZ_PER_CM, period, harmonics, rotation.mirror_angle(False)
     )
@@ -324,6 +324,13 @@ def _made(
         scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
     )
     return potential, kinetic, scan.source, scan, float(misfit)
+
+
+def _harmonics(angles: Floats, period: int) -> int:
+    """Terms of a series through angles of one period: a third of the points, and no more than the widest gap resolves."""
+    rising = np.sort(angles)
+    gaps = np.diff(rising, append=rising[0] + 2 * math.pi / period)
+    return max(1, min(len(angles) // 3, int(math.pi / (period * float(gaps.max())))))
 
 
 def _named_terms(given: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
