@@ -13,7 +13,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 SUBJECTS = (
     "molecule_to_spectrum", "isotopologues", "levels", "free_rotation", "equipartition", "classical", "fit", "structure",
-    "stark", "alignment", "hard_cases", "accuracy", "rigid_steps", "spins_and_states", "internal_rotation", "locked_rotation", "view", "assign",
+    "stark", "alignment", "hard_cases", "accuracy", "rigid_steps", "spins_and_states", "view", "assign",
+    "internal_rotation", "locked_rotation",
 )  # fmt: skip
 
 
