@@ -99,6 +99,12 @@ def quartic_prior(field: Field, constants: Floats) -> tuple[Floats, Floats]:
     return field.parent[3:], 0.2 * np.abs(field.parent[3:]) + 0.01 * quartic_sizes(constants)
 
 
+def prior_weight(field: Field, constants: Floats, sizes: Floats) -> Floats:
+    """1/σ² of all constants (8, 8) before any line is assigned: A, B, C to 5 % where nothing else is known."""
+    spread = 0.05 * constants[:3] if field.spread is None else field.spread
+    return np.diag(1 / np.concatenate([spread, sizes]) ** 2)
+
+
 def predict(field: Field, constants: Floats, temperature_k: float, most: int = MOST_LINES) -> Predicted:
     """The strongest lines of each type in the band."""
     table = field.table
@@ -130,7 +136,7 @@ def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
     """The species that a candidate leads to; None where its constants run out of order."""
     centre, sizes = quartic_prior(field, start.constants)
     constants = np.concatenate([start.constants, centre])
-    prior = np.diag(1 / np.concatenate([0.05 * constants[:3], sizes]) ** 2)
+    prior = prior_weight(field, constants, sizes)
     slopes = slopes_of(field, start.family.lines, constants)
     covariance = np.asarray(np.linalg.inv(slopes.T @ slopes / FIRST_MHZ**2 + prior), dtype=np.float64)
     return _grown(field, constants, covariance, prior, FIRST_MHZ, start, rounds)
@@ -149,7 +155,7 @@ def grown_anew(field: Field, species: Grown) -> list[Grown]:
     if species.start is None:
         return []
     _, sizes = quartic_prior(field, species.constants)
-    prior = np.diag(1 / np.concatenate([0.05 * species.constants[:3], sizes]) ** 2)
+    prior = prior_weight(field, species.constants, sizes)
     sigma0 = max(3 * species.rms_mhz, SMALLEST_MHZ)
     begin = species.start._replace(temperature_k=species.temperature_k)
     grown = []

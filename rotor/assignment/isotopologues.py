@@ -7,6 +7,7 @@ each gives shifts of A, B, C, which all visible lines then judge. Dipole, temper
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -18,7 +19,7 @@ from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import Grown, Merged, grow, merged_lines
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
-from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
+from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field, alike
 from rotor.molecules.molecule import Molecule
 from rotor.tops.isotopes.isotopologues import isotopologues
 from rotor.tops.top import Top
@@ -26,10 +27,13 @@ from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
 SHIFT_ERROR = 0.03  # of the shift of a constant: of a geometry whose bond lengths are right to 1 %
 MOMENT_ERROR = 0.05  # u Å², of the change of a moment of inertia: 2 Δm r δr for 1 u at 1.5 Å, known to 0.016 Å
+TYPICAL = 0.5  # deviation of constants in these errors, which are wide: 0.35 in benchmarks/isotopologue_cases.py
 LEAST_ABUNDANCE = 1e-3
 LOG_HEIGHT = 1.2  # of peaks about the expected height that are tried
 ROUGH_MHZ = 0.05  # standard error of lines of the parent's distortion
-MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 9, 84, 2000, 4
+MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 9, 84, 2000, 6
+LEAST_OF_SHIFT = 3.0  # ln of the likelihood ratio of a shift that is grown
+SAME_SPECIES = 3e-5  # relative difference of constants of one species
 ENOUGH = 8.0  # evidence above which an isotopologue is reported; its constants are nearly known
 
 
@@ -67,34 +71,74 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
     return out
 
 
-def find_isotopologue(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable) -> Grown | None:
-    """The isotopologue among peaks, None where it does not stand above chance."""
+def find_isotopologues(
+    peaks: PeakList, parent: Grown, expected: list[Expected], table: RigidTable, over: Callable[[], bool]
+) -> list[tuple[Expected, Grown]]:
+    """Isotopologues among peaks, the one with the most evidence first.
+
+    Windows of several isotopologues overlap, so that each may lead to the lines of another. Every species that is met is given to one
+    isotopologue, such that the sum of squared deviations of A, B, C from those expected, in their errors, is least.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    species = list[Grown]()
+    for one in expected:
+        if over():
+            break
+        for grown in candidates(peaks, parent, one, table):
+            same = [
+                n for n, other in enumerate(species) if alike(grown.constants[:3], other.constants[:3], SAME_SPECIES)
+            ]
+            if not same:
+                species.append(grown)
+            elif grown.evidence > species[same[0]].evidence:
+                species[same[0]] = grown
+    if not species:
+        return []
+    score = np.array([[_score(one, each, parent) for each in species] for one in expected])
+    pairs = [(expected[row], species[n], score[row, n]) for row, n in zip(*linear_sum_assignment(-score), strict=True)]
+    return [(one, grown) for one, grown, value in sorted(pairs, key=lambda pair: -pair[1].evidence) if value > ENOUGH]
+
+
+def _score(one: Expected, grown: Grown, parent: Grown) -> float:
+    """Evidence less half the squared deviation from the expected constants; 0 for a species that cannot be this isotopologue."""
+    off = (grown.constants[:3] - one.constants) / one.errors
+    if np.abs(off).max() > 4 or not _like(grown, parent.scales + np.log(one.abundance)):
+        return 0.0
+    return float(grown.evidence - 0.5 * np.sum((off / TYPICAL) ** 2))
+
+
+def candidates(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable) -> list[Grown]:
+    """Species near the expected constants of an isotopologue that stand above chance."""
     bounds = Bounds(one.constants - 3 * one.errors, one.constants + 3 * one.errors)
-    seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants)
+    seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants, one.errors)
     scales = parent.scales + np.log(one.abundance)
     start = np.concatenate([one.constants, parent.constants[3:]])
     lines = merged_lines(seen, start, parent.temperature_k, scales)
     visible = np.argsort(-lines.height, kind="stable")[:MOST_LINES]
     visible = visible[lines.height[visible] > peaks.log_threshold - 0.5]
     if len(visible) < 4:
-        return None
+        return []
     shifts = [
-        shift
+        (shift, three)
         for three in _triples(lines.slope[:, :3] * one.errors, visible)
         for shift in _shifts(peaks, lines, three, one)
     ]
-    if not shifts:
-        return None
-    ratios = np.array([_ratio(peaks, lines, visible, shift) for shift in shifts])
-    grown = []
-    for best in np.argsort(-ratios)[:GROWN].tolist():
-        family = Family(int(table.kind[lines.main[visible[0]]]), lines.main[visible[:3]], lines.main[:0], 0.0)
-        candidate = Candidate(one.constants + shifts[best], family, float(ratios[best]), parent.temperature_k)
-        species = grow(seen, candidate)
-        if species is not None and _like(species, scales) and _within(species, bounds):
-            grown.append(species)
-    best_one = max(grown, key=lambda g: g.evidence, default=None)
-    return best_one if best_one is not None and best_one.evidence > ENOUGH else None
+    ratios = np.array([_ratio(peaks, lines, visible, shift) for shift, _ in shifts])
+    found, tried = list[Grown](), list[Floats]()
+    for best in np.argsort(-ratios).tolist():
+        shift, three = shifts[best]
+        constants = one.constants + shift
+        if len(tried) >= GROWN or ratios[best] < LEAST_OF_SHIFT:
+            break
+        if any(alike(constants, other, SAME_SPECIES) for other in tried):
+            continue
+        tried.append(constants)
+        family = Family(int(table.kind[lines.main[visible[0]]]), lines.main[three], lines.main[:0], 0.0)
+        species = grow(seen, Candidate(constants, family, float(ratios[best]), parent.temperature_k))
+        if species is not None and species.evidence > ENOUGH and _like(species, scales) and _within(species, bounds):
+            found.append(species)
+    return found
 
 
 def _triples(slopes: Floats, visible: Ints) -> list[Ints]:

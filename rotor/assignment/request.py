@@ -16,7 +16,7 @@ from rotor.assignment.evidence import probability, probability_of_isotopologue, 
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown, grown_anew
 from rotor.assignment.guesses import guess_values
-from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologue
+from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologues
 from rotor.assignment.peaks import PeakList, spurs
 from rotor.assignment.refinement import excess_scatter, refine
 from rotor.assignment.rigid_table import JMAX, rigid_table
@@ -45,6 +45,8 @@ SAMPLES_OF_GUESS = 120
 ROOT_MARGINS = (0.15, 0.03, 0.03)  # of A, B, C of roots beyond the error of a guess
 STRONG, MANY = 20, 6  # so many of the strongest peaks without a species: a stronger one may be there
 HIGH, FEW_HIGH = 0.4, 3  # and so many peaks higher than this share of the strongest species
+ROUNDS_OF_ISOTOPOLOGUES = 2
+LEAST_LEFT = 0.6  # of the peaks of an isotopologue that no other one before has taken
 MOST_EXTRA = 3  # species beyond those of the request
 
 
@@ -295,15 +297,20 @@ class _Search:
         if not self.species or self.request.molecule is None:
             return
         parent = max(self.species, key=lambda one: one.strength)
-        for one in expected_isotopologues(parent.refined.values, self.request.molecule):
-            if self.clock.over() or self.left.sum() < 5:
-                break
+        constants = replace(parent.grown, constants=parent.refined.values)
+        waiting = expected_isotopologues(parent.refined.values, self.request.molecule)
+        for _ in range(ROUNDS_OF_ISOTOPOLOGUES):
             rows = np.flatnonzero(self.left)
+            if self.clock.over() or len(rows) < 5:
+                break
             peaks = self.request.peaks.where(self.left)
-            constants = replace(parent.grown, constants=parent.refined.values)
-            grown = find_isotopologue(peaks, constants, one, self.table)
-            if grown is not None:
-                self._add(peaks, np.column_stack([rows, rows]), [grown], one.label)
+            pairs = find_isotopologues(peaks, constants, waiting, self.table, self.clock.over)
+            for one, grown in pairs:
+                if self.left[rows[grown.peak]].mean() > LEAST_LEFT:
+                    self._add(peaks, np.column_stack([rows, rows]), [grown], one.label)
+                    waiting.remove(one)
+            if not pairs:
+                break
 
     def answer(self) -> AssignAnswer:
         """Species by falling strength, isotopologues behind them."""

@@ -43,13 +43,17 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """What a search sees: peaks, the table, bounds of constants, temperatures to try; constants (8,) of a parent with like distortion."""
+    """What a search sees: peaks, the table, bounds of constants, temperatures to try.
+
+    parent : constants (8,) of a species with like distortion. spread : a-priori standard errors of A, B, C (3,), where they are known.
+    """
 
     peaks: PeakList
     table: RigidTable
     bounds: Bounds
     temperatures: Floats
     parent: Floats | None = None
+    spread: Floats | None = None
 
     @cached_property
     def jj(self) -> Floats:
