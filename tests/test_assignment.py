@@ -204,6 +204,16 @@ def test_redrawn_frequencies_hold_no_species(seed: int) -> None:
     assert answer_assign(AssignRequest(redrawn(spectrum(), seed), seconds=120)).word == "not found"
 
 
+def test_seconds_end_a_search() -> None:
+    """A search among foreign peaks takes seconds; ended by its time it says so, and holds what it has."""
+    rng = np.random.default_rng(31)
+    peaks = peak_list(np.sort(rng.uniform(*BAND, 300)), rng.random(300) ** (-1 / 0.8), 0.005, band_mhz=BAND)
+    short = answer_assign(AssignRequest(peaks, seconds=0.01))
+    assert short.ended
+    assert short.word == "not found"
+    assert short.facts()["ended_by_time"]
+
+
 def test_two_peaks_hold_no_species() -> None:
     found = answer_assign(AssignRequest(peak_list([7000.0, 9000.0], [1.0, 2.0])))
     assert found.word == "not found"

@@ -114,3 +114,13 @@ def test_noise_alone_has_no_peaks() -> None:
     noise = np.random.default_rng(7).normal(size=1_000_000)
     with pytest.raises(ValueError, match="0 peaks above 6 times the noise"):
         peaks_of_spectrum(6000 + 0.01 * np.arange(1_000_000), noise)
+
+
+@pytest.mark.parametrize(
+    ("factor", "sign", "message"),
+    [(1e-3, 1.0, "if they are in GHz, multiply by 1000"), (1.0, -1.0, "0 peaks above 6 times the noise")],
+)
+def test_a_grid_in_ghz_and_an_inverted_one(factor: float, sign: float, message: str) -> None:
+    grid, x = gridded()
+    with pytest.raises(ValueError, match=message):
+        peaks_of_spectrum(factor * grid, sign * x)

@@ -1,0 +1,135 @@
+"""Figures of docs/assign.md from the rows of `bench_assign.py`.
+
+    python benchmarks/assign_figures.py
+
+Reads benchmarks/results/assign.json (own cases) and assign_13c.json; writes docs/pictures/assign_success.png, assign_reliability.png and
+assign_13c.png. Bars are Wilson's intervals of 95 %.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_assign import has, reliability, share
+
+from rotor.plots.picture import BLUE, GREY, ORANGE, new_figure, save, styled
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS, PICTURES = ROOT / "benchmarks" / "results", ROOT / "docs" / "pictures"
+Row = dict[str, Any]
+Groups = list[tuple[str, Callable[[Row], bool]]]
+
+
+def between(name: str, edges: list[float], form: str = "{:g}") -> Groups:
+    """Groups of rows by a number between edges."""
+
+    def group(low: float, high: float) -> Callable[[Row], bool]:
+        return lambda row: low <= row[name] < high
+
+    return [
+        (f"{form.format(low)}\nto {form.format(high)}", group(low, high)) for low, high in itertools.pairwise(edges)
+    ]
+
+
+def of_type(letter: str) -> Callable[[Row], bool]:
+    """Whether the greatest dipole component of the strongest species is this."""
+    return lambda row: bool(row["type"] == letter)
+
+
+PANELS: dict[str, Groups] = {
+    "signal-to-noise ratio": between("signal_to_noise", [100, 300, 1000, 3001]),
+    "share of foreign peaks": between("foreign", [0.0, 0.1, 0.2, 0.35]),
+    "κ": between("kappa", [-1.0, -0.9, -0.5, 0.0, 1.0]),
+    "strongest type": [(letter, of_type(letter)) for letter in "abc"],
+}
+
+
+def with_bars(axes: Any, places: Any, shares: list[dict[str, Any]], colour: str) -> None:
+    """Shares in per cent with their intervals."""
+    y = np.array([100 * one["share"] for one in shares])
+    low, high = (np.array([100 * one[end] for one in shares]) for end in ("low", "high"))
+    axes.errorbar(
+        places, y, yerr=[np.maximum(y - low, 0), np.maximum(high - y, 0)], fmt="o", ms=4, capsize=3, color=colour
+    )
+
+
+def success(rows: list[Row]) -> Any:
+    """Share of lists whose strongest species is found, by what the list is like."""
+    with styled():
+        figure = new_figure((9.0, 2.8))
+        for axes, (title, groups) in zip(figure.subplots(1, len(PANELS), sharey=True), PANELS.items(), strict=True):
+            chosen = [[row for row in rows if inside(row)] for _, inside in groups]
+            with_bars(
+                axes, range(len(groups)), [share(sum(has(row, 0) for row in part), len(part)) for part in chosen], BLUE
+            )
+            names = [f"{name}\n({len(part)})" for (name, _), part in zip(groups, chosen, strict=True)]
+            axes.set_xticks(range(len(groups)), names, fontsize=7)
+            axes.set_xlabel(title)
+            axes.set_xlim(-0.5, len(groups) - 0.5)
+            axes.axhline(90, color=GREY, lw=0.6, ls=":")
+        figure.axes[0].set_ylabel("strongest species found (%)")
+        figure.axes[0].set_ylim(0, 103)
+        return figure
+
+
+def diagram(rows: list[Row]) -> Any:
+    """Share of right answers against the probability that they state."""
+    with styled():
+        figure = new_figure((4.0, 3.4))
+        axes = figure.add_subplot()
+        groups = [one for one in reliability(rows) if one["of"]]
+        with_bars(axes, [100 * one["stated"] for one in groups], groups, BLUE)
+        for one in groups:
+            axes.annotate(f" {one['of']}", (100 * one["stated"], 100 * one["share"]), fontsize=7, va="top", ha="left")
+        axes.plot([0, 100], [0, 100], color=GREY, lw=0.6, ls=":")
+        axes.set(xlabel="stated probability (%)", ylabel="right (%)", xlim=(45, 101), ylim=(0, 103))
+        return figure
+
+
+def isotopologues(result: dict[str, Any]) -> Any:
+    """Found 13C species of each molecule."""
+    with styled():
+        rows = result["rows"]
+        figure = new_figure((7.0, 3.2))
+        axes = figure.add_subplot()
+        x = np.arange(len(rows))
+        axes.bar(x, [len(row["species"]) for row in rows], color=GREY, alpha=0.35, label="13C species")
+        enough = [sum(one["lines"] >= result["summary"]["enough_lines"] for one in row["species"]) for row in rows]
+        axes.bar(
+            x,
+            enough,
+            color=GREY,
+            alpha=0.6,
+            label=f"with {result['summary']['enough_lines']} lines or more above the threshold",
+        )
+        axes.bar(
+            x,
+            [sum(one["right"] for one in row["species"]) for row in rows],
+            width=0.5,
+            color=BLUE,
+            label="found, right",
+        )
+        axes.bar(x, [-row["wrong"] for row in rows], width=0.5, color=ORANGE, label="wrong")
+        axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right", fontsize=7)
+        axes.axhline(0, color="black", lw=0.5)
+        axes.set_ylabel("species")
+        axes.legend(fontsize=7)
+        return figure
+
+
+def main() -> None:
+    """Draw all figures."""
+    rows = json.loads((RESULTS / "assign.json").read_text())["rows"]
+    save(success(rows), PICTURES / "assign_success.png", "rotor assign: success", {})
+    save(diagram(rows), PICTURES / "assign_reliability.png", "rotor assign: reliability", {})
+    substituted = json.loads((RESULTS / "assign_13c.json").read_text())
+    save(isotopologues(substituted), PICTURES / "assign_13c.png", "rotor assign: 13C species", {})
+
+
+if __name__ == "__main__":
+    main()
