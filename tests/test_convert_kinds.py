@@ -210,6 +210,17 @@ def test_nothing_is_written_where_levels_are_not_reached(tmp_path, monkeypatch):
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_an_int_file_of_a_molecule_cuts_off_weak_lines_alone(tmp_path):
+    """STR0 and STR1 are 12 decades below 1 nm² MHz: of CO at 300 K every line to J = 20 stays."""
+    assert run(["convert", "CO", str(tmp_path / "co.int")]) == 0
+    assert run(["convert", "CO", str(tmp_path / "co.var")]) == 0
+    request = read_int(tmp_path / "co.int").request
+    assert (request.str0, request.str1) == (-12.0, -12.0)
+    frequency = predict_file(tmp_path / "co.int").catalogue.frequency_mhz
+    assert len(frequency) >= 20
+    assert frequency[:2] == pytest.approx([115271.2, 230538.0], abs=1.0)
+
+
 def test_the_file_of_a_kind_is_read(tmp_path):
     """The kinds of this page are many, so that no pattern above passes on an empty list."""
     assert len(KINDS) > 50

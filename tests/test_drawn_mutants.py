@@ -331,6 +331,20 @@ def test_a_box_that_fails_is_stopped_with_the_step(box, monkeypatch):
         equilibration.equilibrate(None, Settings())
 
 
+# Equality
+
+
+def test_an_array_is_the_same_as_an_array_alone():
+    """A list, a number or an array of another shape differs, in either order."""
+    from rotor.arrays import same
+
+    array = np.array([1.0, np.nan])
+    assert same(array, array.copy())
+    for other in ([1.0, np.nan], 1.0, None, array[None, :], array[:1]):
+        assert not same(array, other)
+        assert not same(other, array)
+
+
 # Costs
 
 

@@ -439,6 +439,19 @@ def test_derivatives_of_moments_are_those_of_differences(method):
         assert jacobian[:, i] == pytest.approx(difference, abs=1e-7)  # third derivatives and round-off at this step
 
 
+def test_an_atom_that_would_leave_the_molecule_ends_a_fit():
+    """More than 1 Å from the start is another molecule; 0.5 Å is a step."""
+    from rotor.structures.least_squares import _Problem
+
+    water = rotor.read("H2O").molecule
+    problem = _Problem.of(rigid_family(water, ["", "O=18O"]), "r0", (), (), "equal", ())
+    direction = np.eye(problem.count)[0]
+    largest = np.abs(problem.positions(direction * 1e-3) - water.positions_angstrom).max() / 1e-3
+    assert np.isfinite(problem.positions(direction * 0.9 / largest)).all()
+    with pytest.raises(ValueError, match="more than 1 Å from the start geometry"):
+        problem.positions(direction * 1.1 / largest)
+
+
 CHAIN = Molecule(
     ("O", "C", "C", "C", "H", "H"),
     [[2.26, -0.62, 0], [1.19, -0.07, 0], [-0.03, -0.86, 0], [-1.04, -1.51, 0], [-1.93, -2.085, 0], [1.125, 1.04, 0]],
