@@ -1,11 +1,14 @@
 """A random sample of mutants of the package, each run on the tests that reach it.
 
-    python benchmarks/mutation.py ../mutants --mutants 300 --seed 24      # goes on where it was stopped
-    python benchmarks/mutation.py ../mutants --survivors                  # what is left, and the share killed
+    python benchmarks/mutation.py ../mutants --mutants 300 --seed 24             # goes on where it was stopped
+    python benchmarks/mutation.py ../mutants --later tests/test_x.py             # survivors on tests written since
+    python benchmarks/mutation.py ../mutants --survivors --equivalent 34 43      # what is left, and the share killed
 
-The folder gets a copy of the checkout (beside it, so that ../shared is found). Each mutant is written into the copy, and tests run, the
-likeliest to see it first (`Selection`), until a test is red. It survives if no test is red within its budget of processor time;
-`--budget 200` later goes on with the survivors where they stopped. State: mutants.jsonl and results.jsonl in the folder, a line each.
+The folder gets a copy of the checkout (beside it, so that ../shared is found). All tests are collected once, and each mutant runs in a
+fork of that session (mutation_session.py): tests that are known to reach the change first, then the likeliest by the words that they
+share with it (mutation_ranking.py), until one is red that is green without the change. It survives if none is red within its budget of
+processor time; a larger budget goes on with the survivors where they stopped. Changes of compiled kernels and of statements of modules
+run in processes of their own. State: mutants.jsonl, results.jsonl and reach.jsonl in the folder, a line each.
 
 mutmut 3 changes the package as a whole, one trampoline a function, and leaves decorated functions alone, the compiled kernels among
 them; cosmic-ray has one test command for all mutants. Neither draws a sample or picks tests by coverage in 700 modules, hence this file.
@@ -25,20 +28,18 @@ import signal
 import socket
 import sys
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from mutants import Mutant, sample
-from mutation_ranking import WORD, Selection
-from mutation_session import NextTest, Session, Unpatchable
+from mutation_ranking import UNREACHED_MOST, WORD, Reach, Selection, append, rows
+from mutation_session import Session, Unpatchable
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("rotor", "tests", "docs", "data", "examples", "benchmarks", ".ci", ".github")
-REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
-UNREACHED_MOST = 20  # test functions in a row that do not reach it, before the rest is left out
 FIRST, NEXT, MOST = 6, 24, 300  # test functions of a run, and of a mutant
 QUIET = (
     "-q",
@@ -57,17 +58,6 @@ LIBRARIES = (
     "numpy", "scipy.linalg", "scipy.optimize", "scipy.stats", "scipy.interpolate", "numba", "matplotlib.pyplot", "pytest", "hypothesis",
     "typer", "ase.io", "ase.build", "rdkit.Chem.AllChem", "qutip", "mpmath", "pandas",
 )  # fmt: skip
-
-
-def rows(path: Path) -> list[dict[str, Any]]:
-    """Lines of JSON; none where there is no file."""
-    return [json.loads(line) for line in path.read_text("utf-8").splitlines()] if path.exists() else []
-
-
-def append(path: Path, row: dict[str, Any]) -> None:
-    """One more line of JSON."""
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row, ensure_ascii=False) + "\n")
 
 
 def prepared(folder: Path, checkout: Path, count: int, seed: int) -> list[Mutant]:
@@ -137,105 +127,55 @@ class Fresh:
 # Mutants run
 
 
-def run(folder: Path, mutants: list[Mutant], minutes: float, budget: float, later: list[str], only: list[int]) -> None:
-    """Run the mutants that have no result of this budget yet; with test files of `later`, survivors on these alone.
+def run(folder: Path, mutants: list[Mutant], given: argparse.Namespace) -> None:
+    """Run the mutants that have no result of a budget yet, the small budget first; with test files of `later`, survivors on these alone.
 
     With numbers of mutants these alone, and nothing is recorded.
     """
     import pytest
 
-    fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * minutes
+    fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * given.minutes
 
     def work(session: Session) -> None:
-        done = finished(folder)
-        killed = {number for number, row in done.items() if row["result"] == "killed"}
-        through = {number for number, row in done.items() if row["budget"] >= budget and not later}
-        left = {n: m for n, m in enumerate(mutants) if n in only or not (only or n in killed | through)}
         sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants}
         session.marks = session.patches(dict(enumerate(mutants)), sources)
         reach = Reach(folder / "reach.jsonl")
-        for number in sorted(left, key=lambda n: (left[n].compiled or not left[n].statement, n)):
-            if time.time() > until:
-                break
-            mutant, last = left[number], None if only else done.get(number)
-            doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
-            ranked = {**dict.fromkeys(doctests, 10.0), **selection.ranked(mutant)}
-            row = of_mutant(
-                folder,
-                mutant,
-                number,
-                last,
-                budget,
-                session,
-                reach,
-                ranked,
-                math.inf if later else UNREACHED_MOST,
-                fresh,
-            )
-            if not only:
-                append(folder / "results.jsonl", {**row, "later": bool(later)})
-            place = number, f"{mutant.file}:{mutant.line}", mutant.operator
-            note(folder, *place, row["result"], row["by"], len(row["reached"]), "of", len(row["tests"]), row["wall"])
+        for budget in given.budget:
+            done = finished(folder)
+            left = [n for n in range(len(mutants)) if is_left(n, done.get(n), budget, given)]
+            for number in sorted(left, key=lambda n: (mutants[n].compiled or not mutants[n].statement, n)):
+                if time.time() > until:
+                    return
+                mutant, last = mutants[number], None if given.only else done.get(number)
+                doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
+                ranked = {**dict.fromkeys(doctests, 10.0), **selection.ranked(mutant)}
+                most_missed = math.inf if given.later else UNREACHED_MOST
+                row = of_mutant(folder, mutant, number, last, budget, session, reach, ranked, most_missed, fresh)
+                if not given.only:
+                    append(folder / "results.jsonl", {**row, "later": bool(given.later)})
+                place = number, f"{mutant.file}:{mutant.line}", mutant.operator
+                note(
+                    folder, *place, row["result"], row["by"], len(row["reached"]), "of", len(row["tests"]), row["wall"]
+                )
 
     os.chdir(folder)
     os.environ["PYTHONPATH"] = str(folder)
     sys.path.insert(0, str(folder))
     sys.dont_write_bytecode = False  # until the mutants begin
     plugin = Session(folder, work)
-    pytest.main([*QUIET, *(later or ["tests", "rotor"])], plugins=[plugin])
+    pytest.main([*QUIET, *(given.later or ["tests", "rotor"])], plugins=[plugin])
     if plugin.failed:
         raise plugin.failed
 
 
-class Reach:
-    """Which tests reach which mutants: known for all from every run of a test."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.known: dict[str, dict[str, Any]] = {}
-        for row in rows(path):
-            self.add(row, write=False)
-
-    def add(self, row: dict[str, Any], write: bool = True) -> None:
-        """One more run of a test; one in a process in which others ran before may find their results stored."""
-        known = self.known.setdefault(row["test"], {**row, "reached": []})
-        known["reached"] = sorted({*known["reached"], *row["reached"]})
-        if write:
-            append(self.path, row)
-
-    def scores(self, number: int, ranked: dict[str, float]) -> dict[str, float]:
-        """Tests that reach come first, the quick before the slow; then the others of their files; those that do not last."""
-        files: dict[str, float] = defaultdict(lambda: 1.0)
-        for test, row in self.known.items():
-            files[test.split("::")[0]] *= REACHED if number in row["reached"] else NOT_REACHED
-        out = {}
-        for test in ranked.keys() | {test for test, row in self.known.items() if number in row["reached"]}:
-            row, score = self.known.get(test, {"reached": [], "seconds": 0.3}), ranked.get(test, 1e-3)
-            if number in row["reached"]:
-                out[test] = 1e6 * (score + 0.01) / (0.3 + row["seconds"])
-            else:
-                weight = min(max(files[test.split("::")[0]], 0.05), 100.0)
-                out[test] = score * weight * (0.01 if test in self.known else 1.0)
-        return out
-
-    def chosen(self, number: int, ranked: dict[str, float], tests: set[str], most_missed: float) -> NextTest:
-        """The best of some tests again and again; what one reaches changes the scores of its file."""
-        scores = {test: score for test, score in self.scores(number, ranked).items() if test in tests}
-        factors: dict[str, float] = defaultdict(lambda: 1.0)
-        missed = 0
-
-        def chosen(last: tuple[str, bool] | None) -> str | None:
-            nonlocal missed
-            if last:
-                missed = 0 if last[1] else missed + 1
-                factors[last[0].split("::")[0]] *= REACHED if last[1] else NOT_REACHED
-            if not scores or missed >= most_missed:
-                return None
-            best = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
-            del scores[best]
-            return best
-
-        return chosen
+def is_left(number: int, last: dict[str, Any] | None, budget: float, given: argparse.Namespace) -> bool:
+    """Whether a mutant is to be run."""
+    if given.only:
+        return number in given.only
+    mine = number % given.part[1] == given.part[0] - 1
+    if given.later:
+        return mine and last is not None and last["result"] != "killed"
+    return mine and (last is None or (last["result"] != "killed" and last["budget"] < budget))
 
 
 def note(folder: Path, *words: object) -> None:
@@ -346,17 +286,50 @@ def stale_caches(folder: Path, mutant: Mutant) -> dict[Path, bytes]:
     return caches
 
 
-def summary(folder: Path, mutants: list[Mutant]) -> str:
-    """Killed and survived, with Wilson's interval of 95 %, and what survived."""
+def exchanged(folder: Path, mutants: list[Mutant], table: Path) -> None:
+    """Results as a table of CSV: read where the folder has none, written where it has."""
+    import csv
+
+    if not (folder / "results.jsonl").exists():
+        for row in csv.DictReader(table.read_text("utf-8").splitlines()):
+            known = {
+                "number": int(row["number"]),
+                "result": row["result"],
+                "by": row["by"],
+                "later": row["later"] == "yes",
+            }
+            append(folder / "results.jsonl", known | {"budget": float(row["budget"]), "tests": [], "reached": []})
+        return
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["number", "file", "line", "operator", "before", "after", "result", "by", "budget", "later"])
+        for number, row in sorted(finished(folder).items()):
+            mutant = mutants[number]
+            change = [" ".join(text.split())[:60] for text in (mutant.before, mutant.after)]
+            later = "yes" if row.get("later") else "no"
+            place = [number, mutant.file, mutant.line, mutant.operator]
+            writer.writerow([*place, *change, row["result"], row["by"], row["budget"], later])
+
+
+def summary(folder: Path, mutants: list[Mutant], equivalent: list[int]) -> str:
+    """Killed within the budget and by tests written since, with Wilson's intervals of 95 %, and what survived."""
     results = sorted(finished(folder).values(), key=lambda row: row["number"])
     counts = Counter(row["result"] for row in results)
-    killed, total = counts["killed"], len(results)
-    texts = [f"{total} of {len(mutants)} mutants run: {dict(counts)}; killed {wilson(killed, total)}"]
+    killed = {row["number"] for row in results if row["result"] == "killed"}
+    later = {row["number"] for row in results if row.get("later") and row["number"] in killed}
+    total = len({row["number"] for row in results} - (set(equivalent) - killed))  # what is killed is not equivalent
+    texts = [
+        f"{len(results)} of {len(mutants)} mutants run: {dict(counts)}; {len(results) - total} of them equivalent",
+        f"killed within the budget: {len(killed - later)} of {total}, {wilson(len(killed - later), total)}",
+        f"with tests written since: {len(killed)} of {total}, {wilson(len(killed), total)}",
+    ]
     for row in results:
-        mutant = mutants[row["number"]]
-        if row["result"] != "killed":
-            texts.append(f"{row['number']} {mutant.file}:{mutant.line} [{mutant.operator}] {mutant.before!r} -> {mutant.after!r} "
-                         f"({len(row['tests'])} tests: {' '.join(row['tests'][:3])} ...)")  # fmt: skip
+        mutant, number = mutants[row["number"]], row["number"]
+        if number not in killed:
+            mark = " equivalent" if number in equivalent else ""
+            change = f"[{mutant.operator}] {mutant.before!r} -> {mutant.after!r}"
+            reached = f"({len(row['reached'])} of {len(row['tests'])} tests reach it)"
+            texts.append(f"{number} {mutant.file}:{mutant.line} {change} {reached}{mark}")
     return "\n".join(texts)
 
 
@@ -379,8 +352,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=24)
     parser.add_argument("--minutes", type=float, default=math.inf, help="no further mutant after this")
     parser.add_argument(
-        "--budget", type=float, default=25.0, help="seconds of processor time a mutant; a larger one resumes survivors"
+        "--budget",
+        type=float,
+        nargs="+",
+        default=[8.0, 30.0],
+        help="seconds of processor time a mutant, and of survivors",
     )
+    parser.add_argument("--part", type=int, nargs=2, default=(1, 1), metavar=("K", "N"), help="every Nth mutant")
+    parser.add_argument(
+        "--equivalent", type=int, nargs="+", default=[], help="numbers judged equivalent, for the share"
+    )
+    parser.add_argument("--table", type=Path, help="results as CSV, read into a new folder, written from another")
     parser.add_argument(
         "--later", nargs="+", default=[], help="files of tests written since: survivors are run on these"
     )
@@ -403,8 +385,10 @@ def main() -> None:
             __import__(library)  # once, before children are forked
         if given.later:
             shutil.copytree(given.checkout.resolve() / "tests", folder / "tests", dirs_exist_ok=True)
-        run(folder, mutants, given.minutes, given.budget, given.later, given.only)
-    print(summary(folder, mutants))
+        run(folder, mutants, given)
+    if given.table:
+        exchanged(folder, mutants, given.table)
+    print(summary(folder, mutants, given.equivalent))
 
 
 if __name__ == "__main__":

@@ -1,16 +1,21 @@
-"""Tests in the order in which they are likely to see a change of the package: by rare words that they share, and by imports."""
+"""Tests in the order in which they are likely to see a change: by rare words that they share, imports, and what they are known to reach."""
 
 from __future__ import annotations
 
 import ast
+import json
 import math
 import re
 from collections import Counter, defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mutants import Mutant
+from mutation_session import NextTest
 
+REACHED, NOT_REACHED = 2.0, 0.7  # weight of the other tests of a file where a test reached the statement, or did not
+UNREACHED_MOST = 20  # test functions in a row that do not reach it, before the rest is left out
 WORD = re.compile(r"\w+")
 NEAR = (
     0.25,
@@ -120,3 +125,65 @@ class Selection:
             (weight / (2 + self.frequency[word]) for word, weight in words.items() if word in known), reverse=True
         )
         return sum(value / (1 + rank) for rank, value in enumerate(rare))
+
+
+class Reach:
+    """Which tests reach which mutants: known for all from every run of a test."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.known: dict[str, dict[str, Any]] = {}
+        for row in rows(path):
+            self.add(row, write=False)
+
+    def add(self, row: dict[str, Any], write: bool = True) -> None:
+        """One more run of a test; one in a process in which others ran before may find their results stored."""
+        known = self.known.setdefault(row["test"], {**row, "reached": []})
+        known["reached"] = sorted({*known["reached"], *row["reached"]})
+        if write:
+            append(self.path, row)
+
+    def scores(self, number: int, ranked: dict[str, float]) -> dict[str, float]:
+        """Tests that reach come first, the quick before the slow; then the others of their files; those that do not last."""
+        files: dict[str, float] = defaultdict(lambda: 1.0)
+        for test, row in self.known.items():
+            files[test.split("::")[0]] *= REACHED if number in row["reached"] else NOT_REACHED
+        out = {}
+        for test in ranked.keys() | {test for test, row in self.known.items() if number in row["reached"]}:
+            row, score = self.known.get(test, {"reached": [], "seconds": 0.3}), ranked.get(test, 1e-3)
+            if number in row["reached"]:
+                out[test] = 1e6 * (score + 0.01) / (0.3 + row["seconds"])
+            else:
+                weight = min(max(files[test.split("::")[0]], 0.05), 100.0)
+                out[test] = score * weight * (0.01 if test in self.known else 1.0)
+        return out
+
+    def chosen(self, number: int, ranked: dict[str, float], tests: set[str], most_missed: float) -> NextTest:
+        """The best of some tests again and again; what one reaches changes the scores of its file."""
+        scores = {test: score for test, score in self.scores(number, ranked).items() if test in tests}
+        factors: dict[str, float] = defaultdict(lambda: 1.0)
+        missed = 0
+
+        def chosen(last: tuple[str, bool] | None) -> str | None:
+            nonlocal missed
+            if last:
+                missed = 0 if last[1] else missed + 1
+                factors[last[0].split("::")[0]] *= REACHED if last[1] else NOT_REACHED
+            if not scores or missed >= most_missed:
+                return None
+            best = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
+            del scores[best]
+            return best
+
+        return chosen
+
+
+def rows(path: Path) -> list[dict[str, Any]]:
+    """Lines of JSON; none where there is no file."""
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()] if path.exists() else []
+
+
+def append(path: Path, row: dict[str, Any]) -> None:
+    """One more line of JSON."""
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row, ensure_ascii=False) + "\n")
