@@ -10,6 +10,8 @@ import pytest
 import rotor
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import write_molecule_file
+from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
+from rotor.tops.top import Top
 
 CM = rotor.units.MHZ_PER_CM
 ACETALDEHYDE = """
@@ -128,6 +130,27 @@ def test_acetaldehyde_from_smiles_has_its_splittings(call):
     assert frequency["E"] - frequency["A"] == pytest.approx(
         38506.03 - 38512.08, abs=1.5
     )  # JPL's catalogue; V3 within 10 %
+
+
+@pytest.mark.parametrize(
+    ("isotopes", "weights"),
+    [("", (1, 1)), ("4=2H,5=2H,6=2H", (11, 16)), ("7=2H", (1, 1)), ("4=2H,5=2H,6=2H,7=2H", (11, 16))],
+)
+def test_spin_weights_are_those_of_the_hydrogens_that_turn(isotopes, weights):
+    """CH3 4 and 4, CD3 11 and 16 with both components of E; the hydrogen of CHO takes no part."""
+    molecule = rotor.read("SMILES:CC=O").molecule
+    top = with_internal_rotation(Top.from_molecule(molecule.with_isotopes(isotopes) if isotopes else molecule))
+    levels = rotor.api.solve_levels(top, 0)
+    found = [int(levels.weight[levels.find(species=name, vt=0, j=0, ka=0, kc=0)]) for name in "AE"]
+    assert tuple(found) == weights
+
+
+def test_a_group_of_unlike_hydrogens_is_refused_by_name(call):
+    code, _, err = call(
+        "spectrum", "SMILES:CC=O", "--isotope", "4=2H", "--internal-rotation", "geometry", "--temperature", "20"
+    )
+    assert code == 2
+    assert "hydrogens of carbon 1 are not all alike" in err
 
 
 def test_constants_of_an_internal_rotor_on_the_command_line(call):

@@ -52,10 +52,11 @@ class Barrier:
 
 @dataclass(frozen=True)
 class MethylGroup:
-    """A group that turns against the rest: its F and ρ with the barrier (0 where it is not known), and that barrier."""
+    """A group that turns against the rest: its F and ρ with the barrier (0 where it is not known), that barrier, and its hydrogens."""
 
     rotor: InternalRotor
     barrier: Barrier | None
+    hydrogens: tuple[int, ...]
 
 
 def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup]:
@@ -86,7 +87,9 @@ def _with_moments(
         own = float(mass[hydrogens] @ np.sum(off**2, axis=1))
         barrier = barrier_beside(molecule, bonds, carbon)
         height = 0.0 if barrier is None else barrier.v3_cm * MHZ_PER_CM
-        made.append(MethylGroup(rotor_of_moments(own, frame.axes @ axis, frame.moments, height), barrier))
+        made.append(
+            MethylGroup(rotor_of_moments(own, frame.axes @ axis, frame.moments, height), barrier, tuple(hydrogens))
+        )
     return made
 
 

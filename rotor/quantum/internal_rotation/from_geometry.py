@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rotor import units
+from rotor.arrays import Ints
 from rotor.molecules.bonds import bonded_atoms
+from rotor.molecules.molecule import Molecule
 from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.top import Top
@@ -54,7 +57,7 @@ def with_internal_rotation(top: Top) -> Top:
     }
     spread = "within some 10 %" if group.barrier.safe else "within a factor of about 2"
     source = f"F0 and delta from the geometry; V3 = {group.barrier.v3_cm:g} cm-1 is that of {group.barrier.molecule}, {spread} here"
-    internal = InternalRotationConstants(values, "PAM", spin_states=_spin_states(top), source=source)
+    internal = InternalRotationConstants(values, "PAM", spin_states=_spin_states(top, group), source=source)
     return replace(top, internal_rotation=internal, notes=(*top.notes, f"internal rotation: {source}"))
 
 
@@ -65,7 +68,13 @@ def _group_of(top: Top) -> MethylGroup:
         raise ValueError(
             f"internal rotation of {name}: there is no geometry; give its constants, such as RAM F=... rho=... V3=..."
         )
-    groups = methyl_groups(top.molecule, bonded_atoms(top.molecule))
+    bonds = bonded_atoms(top.molecule)
+    groups = methyl_groups(top.molecule, bonds)
+    if not groups and (carbon := _of_unlike_hydrogens(top.molecule, bonds)):
+        raise ValueError(
+            f"internal rotation of {name}: the hydrogens of carbon {carbon} are not all alike (CH2D, CHD2); their potential is threefold, "
+            "their moments of inertia are not, so that there are no species A and E: such a group is not computed"
+        )
     if len(groups) != 1:
         raise ValueError(f"internal rotation of {name}: {len(groups)} methyl groups turn; computed is that of one")
     if groups[0].barrier is None or not groups[0].rotor.barrier_mhz:
@@ -73,9 +82,20 @@ def _group_of(top: Top) -> MethylGroup:
     return groups[0]
 
 
-def _spin_states(top: Top) -> int:
-    """2I + 1 of the nuclei that turn: 3 where every hydrogen of the molecule is deuterium of a CD3 group, else 2."""
+def _of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
+    """The number, from 1, of a carbon with three hydrogens of different isotopes; 0 for none."""
+    for carbon, near in enumerate(bonds):
+        hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
+        if (
+            molecule.symbols[carbon] == "C"
+            and len(hydrogens) == 3
+            and np.ptp([molecule.mass_numbers[i] for i in hydrogens])
+        ):
+            return carbon + 1
+    return 0
+
+
+def _spin_states(top: Top, group: MethylGroup) -> int:
+    """2I + 1 of the nuclei that turn: 3 of CD3, else 2."""
     assert top.molecule is not None
-    hydrogens = [nucleus for nucleus in top.molecule.nuclei if nucleus.element_number == 1]
-    turning = [nucleus.label for nucleus in hydrogens]
-    return 3 if turning.count("D") + turning.count("2H") == 3 else 2
+    return 3 if all(top.molecule.mass_numbers[i] == 2 for i in group.hydrogens) else 2
