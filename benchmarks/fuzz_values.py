@@ -19,6 +19,7 @@ import argparse
 import contextlib
 import fcntl
 import gc
+import hashlib
 import json
 import math
 import os
@@ -45,7 +46,7 @@ RESULTS = ROOT / "benchmarks" / "results" / "fuzz_values.jsonl"
 PIECE = 250
 WHOLE_PIECE = 50  # whole commands take longer: less is lost where a run is stopped
 SEED_S = 1.0  # bound on a seed as it stands: longer ones are left out
-NUMBER = re.compile(r"(?<![\w.(])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"(?<![\w.(])(?<![A-Za-z][-+])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 # a number that is none: not as a part of a word, of a path or of an option
 NOT_FINITE = re.compile(r"(?<![\w./\-])[-+]?(?:nan|NaN|inf|Infinity)(?![\w.(])")
 SHOWS = frozenset(
@@ -65,6 +66,11 @@ class Seed:
     kind: str
     words: tuple[str, ...]
     files: tuple[tuple[str, bytes], ...] = ()
+
+    @property
+    def digest(self) -> str:
+        """What the state file calls it."""
+        return hashlib.sha256(repr((self.kind, self.words, self.files)).encode()).hexdigest()[:16]
 
 
 Weighted = tuple[list[Seed], list[float]]  # seeds and how often each is drawn
@@ -124,7 +130,7 @@ def changed_number(text: str, rng: random.Random, size: bool) -> str:
     if whole and abs(value) < 20 and draw > 0.5:
         return str(int(value) + rng.randint(-1, 1))
     new = value * math.exp(rng.gauss(0, spread)) if value else rng.choice((0.0, 0.1, 1.0))
-    return str(round(new)) if whole and abs(new) >= 1 else f"{new:.{max(3, len(text.split('.')[-1]))}g}"
+    return str(round(new) or 1) if whole else f"{new:.{max(3, len(text.split('.')[-1]))}g}"
 
 
 def changed_text(text: str, rng: random.Random, share: float, size: bool = False) -> str:
@@ -211,8 +217,8 @@ def changed_words(seed: Seed, rng: random.Random, seeds: list[Seed]) -> list[str
         elif before.startswith("--") or (
             not words[at].startswith("--") and "." not in words[at][-6:-2] + words[at][-1:]
         ):
-            words[at] = changed_text(words[at], rng, 0.6, bool(SIZES.search(before)))
-    if rng.random() < 0.25:
+            words[at] = changed_text(words[at], rng, 0.4, bool(SIZES.search(before)))
+    if rng.random() < 0.15:
         same = [one.words for one in seeds if one.words[:1] == seed.words[:1] and one.kind == "command"]
         donor = rng.choice(same)
         options = [at for at, word in enumerate(donor) if word.startswith("--") and word not in words]
@@ -337,27 +343,22 @@ def answers(numbers: range, weighted: Weighted, hostile: dict[str, bytes], whole
 
 def seed_outcomes(seeds: list[Seed]) -> Iterator[Answer]:
     """Exit code and seconds of every seed as it stands; where it is slow, the second time: the first one compiles and loads modules."""
-    known: dict[Seed, Answer] = {}
     for seed in seeds:
-        if seed in known:  # a scene is a seed twice
-            yield known[seed]
-            continue
         with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, contextlib.chdir(folder):
             for name, content in seed.files:
                 Path(name).write_bytes(content)
             outcome = fuzz.run_words(list(seed.words), 5 * SEED_S)[0]
             again = fuzz.run_words(list(seed.words), SEED_S)[0] if 0.1 < outcome.seconds < 5 * SEED_S else outcome
         print(f"{min(outcome.seconds, again.seconds):.2f}", outcome.code, *seed.words, file=sys.__stderr__, flush=True)
-        known[seed] = {"code": outcome.code, "seconds": min(outcome.seconds, again.seconds)}
-        yield known[seed]
+        yield {"code": outcome.code, "seconds": min(outcome.seconds, again.seconds)}
 
 
 def weights_of(seeds: list[Seed], outcomes: list[dict[str, float]]) -> list[float]:
-    """Seeds of a verb by their speed, a hundredth for those that are refused as they stand; verbs by speed and number of seeds."""
+    """Seeds of a verb by their speed, a three-hundredth for those that are refused as they stand; verbs by speed and number of seeds."""
     weights: list[float] = []
     for outcome in outcomes:
         left_out = outcome["code"] is None or outcome["seconds"] > SEED_S / 2
-        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2.5 / (1 if outcome["code"] == 0 else 100))
+        weights.append(0.0 if left_out else (0.01 + outcome["seconds"]) ** -2.5 / (1 if outcome["code"] == 0 else 300))
     verbs = [(seed.kind, seed.words[0] if seed.words else "") for seed in seeds]
     sums, costs = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
     for verb, weight, outcome in zip(verbs, weights, outcomes, strict=True):
@@ -394,13 +395,17 @@ def main() -> None:
     gc.freeze()  # what is loaded is not looked through again in every case
     lines = [json.loads(line) for line in given.state.read_text("utf-8").splitlines()] if given.state.exists() else []
     seeds = all_seeds()
-    if not lines or lines[0].get("seeds") is None:
-        outcomes = in_child(seed_outcomes, seeds)
-        lines = [{"seeds": [[one["code"], round(one["seconds"], 3)] for one in outcomes]}]
-        given.state.write_text(json.dumps(lines[0]) + "\n", encoding="utf-8")
-    outcomes = [{"code": code, "seconds": seconds} for code, seconds in lines[0]["seeds"]]
-    if len(outcomes) != len(seeds):
-        raise SystemExit(f"{given.state}: is of {len(outcomes)} seeds, here are {len(seeds)}; begin another state")
+    known = lines[0]["seeds"] if lines else {}
+    missing = [seed for seed in dict.fromkeys(seeds) if seed.digest not in known]
+    if missing and len(lines) > 1:
+        raise SystemExit(
+            f"{given.state}: {len(missing)} of {len(seeds)} seeds are new since it was begun; begin another state"
+        )
+    if missing:
+        found = zip(missing, in_child(seed_outcomes, missing), strict=True)
+        known |= {seed.digest: [one["code"], round(one["seconds"], 3)] for seed, one in found}
+        given.state.write_text(json.dumps({"seeds": known}) + "\n", encoding="utf-8")
+    outcomes = [{"code": known[seed.digest][0], "seconds": known[seed.digest][1]} for seed in seeds]
     weighted = seeds, weights_of(seeds, outcomes)
     hostile = fuzz.seed_files()
     if given.case is not None:

@@ -234,6 +234,31 @@ def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     )  # the ratio of the file
 
 
+def test_criteria_that_too_few_lines_leave_undefined_are_dashes(call, folder):
+    """Five lines and four constants: AICc needs two lines more than constants, and the scale of the errors is one."""
+    top = rotor.Top.from_constants("A=9000 B=3100 C=2500 MHz")
+    levels = rotor.api.solve_levels(top, 4)
+    text = "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_mhz\n"
+    for upper, lower in (
+        ((1, 0, 1), (0, 0, 0)),
+        ((1, 1, 0), (1, 0, 1)),
+        ((2, 1, 2), (1, 1, 1)),
+        ((2, 2, 0), (2, 1, 1)),
+        ((3, 1, 3), (2, 0, 2)),
+    ):
+        ends = [levels.energy_mhz[levels.find(j=j, ka=ka, kc=kc)] for j, ka, kc in (upper, lower)]
+        text += ",".join(map(str, (*upper, *lower, round(ends[0] - ends[1], 2), 0.05))) + "\n"
+    Path("l.csv").write_text(text)
+    code, out, err = call(
+        "fit", "l.csv", "--constants", "A=9000 B=3100 C=2500 MHz", "--free", "A,B,C", "--try", "DK", "--json", "a.json"
+    )
+    assert code == 0, err
+    row = next(line for line in out.splitlines() if line.startswith("DK") and "added" in line)
+    assert " - " in row
+    assert "inf" not in out.split()
+    assert json.loads(Path("a.json").read_text())["trials"][0]["aicc"] is None
+
+
 def test_trying_choosing_suggesting_and_resampling(call, folder):
     write_lines(folder / "co.csv")
     common = ("fit", "co.csv", "--constants", "B=57000 D=0.17 MHz", "--free", "B,D")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -291,12 +292,18 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     return Table("", columns, rows, frozenset({"parameter"}))
 
 
+def _or_dash(value: float, form: str) -> str:
+    """A number, or a dash for what so few lines leave undefined."""
+    return format(value, form) if math.isfinite(value) else "-"
+
+
 def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
     columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
     rows = [
         [
-            one.name, "added" if one.added else "left out", f"{one.f_ratio:.3g}", f"{one.chance:.2g}", f"{one.aicc:.1f}",
-            f"{one.aicc_before:.1f}", f"{one.cross_validated:.4g}", f"{one.fit.weighted_rms:.4g}", "yes" if one.better else "no",
+            one.name, "added" if one.added else "left out", _or_dash(one.f_ratio, ".3g"), f"{one.chance:.2g}", _or_dash(one.aicc, ".1f"),
+            _or_dash(one.aicc_before, ".1f"), _or_dash(one.cross_validated, ".4g"), f"{one.fit.weighted_rms:.4g}",
+            "yes" if one.better else "no",
         ]
         for one in trials
     ]  # fmt: skip
