@@ -10,11 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.assignment.intensities import fit_intensities
-from rotor.assignment.peak_finding import peaks_of_spectrum
-from rotor.fitting.publication import publication_table
-from rotor.plots.assign import assignment_figure
-from rotor.plots.over import loomis_wood_figure
+from rotor.api import assignment_figure, fit_intensities, loomis_wood_figure, peaks_of_spectrum, publication_table
 
 # %matplotlib inline
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these 
     from rotor.alignment.qutip_objects import solve_windows as solve_windows
     from rotor.alignment.request import AlignRequest as AlignRequest
     from rotor.alignment.request import answer_align as answer_align
+    from rotor.assignment.intensities import fit_intensities as fit_intensities
+    from rotor.assignment.peak_finding import peaks_of_spectrum as peaks_of_spectrum
     from rotor.assignment.request import AssignRequest as AssignRequest
     from rotor.assignment.request import answer_assign as answer_assign
     from rotor.classical.effects.changing_inertia import ChangingInertia as ChangingInertia
@@ -141,11 +143,13 @@ if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these 
     from rotor.observed.spectrum import observed_spectrum as observed_spectrum
     from rotor.observed.start import start_components as start_components
     from rotor.plots.alignment import alignment_figure as alignment_figure
+    from rotor.plots.assign import assignment_figure as assignment_figure
     from rotor.plots.fit import fit_figure as fit_figure
     from rotor.plots.gas import band_figure as band_figure
     from rotor.plots.gas import equipartition_figure as equipartition_figure
     from rotor.plots.heat_capacity import Panel as Panel
     from rotor.plots.heat_capacity import heat_capacity_figure as heat_capacity_figure
+    from rotor.plots.over import loomis_wood_figure as loomis_wood_figure
     from rotor.plots.polhodes import polhode_figure as polhode_figure
     from rotor.plots.stark import stark_figure as stark_figure
     from rotor.plots.structure import structure_figure as structure_figure
