@@ -14,8 +14,7 @@ import numpy as np
 from scipy import constants
 
 import rotor
-from rotor.classical.internal_rotor import TurningTop, turning_motion
-from rotor.plots.torsion import torsion_figure
+from rotor.api import TurningTop, torsion_figure, turning_motion
 
 # %matplotlib inline
 

@@ -70,6 +70,8 @@ if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these 
     from rotor.classical.integrators.moser_veselov import MoserVeselov as MoserVeselov
     from rotor.classical.integrators.splitting import RotationSplitting as RotationSplitting
     from rotor.classical.integrators.splitting import SymmetricTopSplitting as SymmetricTopSplitting
+    from rotor.classical.internal_rotor import TurningTop as TurningTop
+    from rotor.classical.internal_rotor import turning_motion as turning_motion
     from rotor.classical.lyapunov import body_flow as body_flow
     from rotor.classical.lyapunov import lyapunov_exponents as lyapunov_exponents
     from rotor.classical.lyapunov import orbit as orbit
