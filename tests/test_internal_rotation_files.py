@@ -145,6 +145,19 @@ def test_spin_weights_are_those_of_the_hydrogens_that_turn(isotopes, weights):
     assert tuple(found) == weights
 
 
+def test_a_barrier_by_a_scan_is_that_of_the_torsion():
+    """V3 and V6 against the Fourier series of `rotor torsion`, whose zero is the geometry."""
+    top = with_internal_rotation(rotor.read("SMILES:CC=O"), "mmff")
+    torsion = rotor.torsion("SMILES:CC=O", bond="2-1").torsion
+    assert top.internal_rotation.values["V3"] + top.internal_rotation.values["V6"] * 0 == pytest.approx(
+        torsion.barrier_mhz, rel=0.01
+    )
+    angle = np.linspace(0, 2 * np.pi / 3, 200)
+    values = sum(0.5 * top.internal_rotation.values[f"V{n}"] * (1 - np.cos(n * angle)) for n in (3, 6))
+    assert values.max() == pytest.approx(torsion.barrier_mhz, rel=2e-3)
+    assert "relaxed scan with MMFF94" in top.internal_rotation.source
+
+
 def test_a_group_of_unlike_hydrogens_is_refused_by_name(call):
     code, _, err = call(
         "spectrum", "SMILES:CC=O", "--isotope", "4=2H", "--internal-rotation", "geometry", "--temperature", "20"

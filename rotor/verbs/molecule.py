@@ -102,7 +102,9 @@ class MoleculeInput:
         example="0+,0-",
     )
     internal_rotation: str | None = declared(
-        None, Text(), 'A methyl group that turns: "geometry" (barrier of a similar molecule), or "RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
+        None, Text(),
+        'A methyl group that turns: "geometry" (barrier of a similar molecule), "scan" (--calculator, or MMFF94), or '
+        '"RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
         "molecule.internal_rotation", panel=SPINS, example="RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.1227cm-1",
     )  # fmt: skip
     calculator: str | None = declared(
@@ -382,10 +384,11 @@ def _with_internal_rotation(top: Top, reading: Reading) -> Top:
     text = reading.given.internal_rotation
     if text is None:
         return top
-    if text.strip() == "geometry":
+    if text.strip() in ("geometry", "scan"):
         from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 
-        return reading.within("internal_rotation", lambda: with_internal_rotation(top))
+        engine = (reading.given.calculator or "mmff") if text.strip() == "scan" else None
+        return reading.within("internal_rotation", lambda: with_internal_rotation(top, engine))
     from rotor.tops.internal_rotation import InternalRotationConstants
 
     constants = reading.within("internal_rotation", lambda: InternalRotationConstants.parse(text))

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rotor import units
 from rotor.arrays import Ints
+from rotor.molecules.bond_rotation import bond_rotation
+from rotor.molecules.bond_scan import relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
@@ -18,13 +21,15 @@ from rotor.tops.top import Top
 IN_PLANE = 1e-3  # share of the top's axis along c up to which a molecule counts as symmetric about its plane ab
 
 
-def with_internal_rotation(top: Top) -> Top:
+def with_internal_rotation(top: Top, calculator: Any = None) -> Top:
     """The top with its methyl group turning: F0 and the angle of its axis from the geometry, V3 from the table of similar molecules.
 
     Parameters
     ----------
     top : Top
         With a geometry; its constants, dipole and distortion stay those of the principal axes.
+    calculator : optional
+        V3 and V6 of a relaxed scan with it instead: an ASE calculator, its name, or "mmff" for MMFF94.
 
     Returns
     -------
@@ -40,8 +45,7 @@ def with_internal_rotation(top: Top) -> Top:
     -----
     F0 follows from the geometry within about 2 %, V3 within what the note says; splittings go about as exp(-1.3 √(V3/F)).
     """
-    group = _group_of(top)
-    assert group.barrier is not None
+    group = _group_of(top, with_barrier=calculator is None)
     cosines = np.array(group.rotor.rho) * np.array(top.moments_u_angstrom2)  # λ_g I_α
     own = float(np.linalg.norm(cosines))
     direction = cosines / own
@@ -53,16 +57,35 @@ def with_internal_rotation(top: Top) -> Top:
     values = {
         "F0": units.ROTATIONAL_MHZ_U_ANGSTROM2 / own,
         "delta": float(np.arctan2(direction[1], direction[0])),
-        "V3": group.rotor.barrier_mhz,
     }
-    spread = "within some 10 %" if group.barrier.safe else "within a factor of about 2"
-    source = f"F0 and delta from the geometry; V3 = {group.barrier.v3_cm:g} cm-1 is that of {group.barrier.molecule}, {spread} here"
+    if calculator is None:
+        assert group.barrier is not None
+        values["V3"] = group.rotor.barrier_mhz
+        spread = "within some 10 %" if group.barrier.safe else "within a factor of about 2"
+        origin = f"is that of {group.barrier.molecule}, {spread} here"
+    else:
+        barriers, scan = _scanned(top, group, calculator)
+        values |= barriers
+        origin = f"of a {scan}, whose error is not known"
+    source = f"F0 and delta from the geometry; V3 = {values['V3'] / units.MHZ_PER_CM:.4g} cm-1 {origin}"
     internal = InternalRotationConstants(values, "PAM", spin_states=_spin_states(top, group), source=source)
     return replace(top, internal_rotation=internal, notes=(*top.notes, f"internal rotation: {source}"))
 
 
-def _group_of(top: Top) -> MethylGroup:
-    """The one group that turns; ValueError for none, several, or one whose barrier is not known."""
+def _scanned(top: Top, group: MethylGroup, calculator: Any) -> tuple[dict[str, float], str]:
+    """V3 and V6 in MHz of a relaxed scan about the bond of the group, counted from the minimum of the threefold term, and what made it."""
+    assert top.molecule is not None
+    carbon = next(i for i in bonded_atoms(top.molecule)[group.hydrogens[0]].tolist())
+    bearer = next(i for i in bonded_atoms(top.molecule)[carbon].tolist() if i not in group.hydrogens)
+    scan = relaxed_scan(bond_rotation(top.molecule, f"{bearer + 1}-{carbon + 1}"), calculator, points=36)
+    terms = np.array([np.mean(scan.energies_cm * np.exp(-1j * n * scan.angles)) for n in (3, 6)]) * 2 * units.MHZ_PER_CM
+    start = np.angle(-terms[0]) / -3  # of the minimum: the term is |t| cos 3(α - α0) with a negative sign
+    turned = terms * np.exp(1j * np.array([3, 6]) * start)
+    return {"V3": float(-2 * turned[0].real), "V6": float(-2 * turned[1].real)}, scan.source
+
+
+def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
+    """The one group that turns; ValueError for none, several, or one whose barrier is needed and not known."""
     name = top.name or "this top"
     if top.molecule is None:
         raise ValueError(
@@ -77,8 +100,10 @@ def _group_of(top: Top) -> MethylGroup:
         )
     if len(groups) != 1:
         raise ValueError(f"internal rotation of {name}: {len(groups)} methyl groups turn; computed is that of one")
-    if groups[0].barrier is None or not groups[0].rotor.barrier_mhz:
-        raise ValueError(f"internal rotation of {name}: no similar molecule with a threefold barrier is known; give V3")
+    if with_barrier and (groups[0].barrier is None or not groups[0].rotor.barrier_mhz):
+        raise ValueError(
+            f"internal rotation of {name}: no similar molecule with a threefold barrier is known; give V3, or scan it"
+        )
     return groups[0]
 
 
