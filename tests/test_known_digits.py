@@ -40,7 +40,7 @@ def test_info_of_a_guessed_geometry(call):
 def test_isotopologues_have_the_error_of_scaling(call):
     """0.02 % where heavy atoms were replaced, 0.8 % where hydrogen was; nothing for the molecule itself."""
     out = call("isotopologues", "water")[1]
-    rows = {line.split()[0]: line.split() for line in out.splitlines()[2:]}
+    rows = {line.split()[0]: line.split() for line in out.splitlines()[2:] if line.strip()}
     assert rows["H2O"][6] == "835852.406"
     heavy, light = rows["H2[18O]"], rows["H[2H]O"]
     assert (heavy[7], heavy[10]) == ("825440", "0.02")
