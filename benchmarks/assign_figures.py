@@ -118,7 +118,8 @@ def isotopologues(result: dict[str, Any]) -> Any:
         axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right", fontsize=7)
         axes.axhline(0, color="black", lw=0.5)
         axes.set_ylabel("species")
-        axes.legend(fontsize=7)
+        axes.set_ylim(top=1.45 * max(len(row["species"]) for row in rows))
+        axes.legend(fontsize=7, ncols=2, loc="upper left")
         return figure
 
 

@@ -74,7 +74,8 @@ def next_species(
 
     The search ends when a species is clear, when no better one came for a while, when all stages are done, or when the time is over.
     """
-    grown, tried, best, highest, chunks, last = list[Grown](), list[tuple[Floats, float]](), None, 0.0, 0, 0
+    grown, tried, highest, chunks, last = list[Grown](), list[tuple[Floats, float]](), 0.0, 0, 0
+    best: Grown | None = None
     need = 3 if len(seen.peaks) <= SCARCE else 4
     if len(seen.peaks) <= SCARCE:
         stages = (Stage(SCARCE, 0, len(families)),)

@@ -71,7 +71,7 @@ def series_order(lines: Lines, rows: Ints) -> Ints:
         if name in quanta:
             upper, lower = quanta[name]
             keys += [j[1] - lower - quanta["ka"][1], upper - lower] if name == "kc" else [lower, upper - lower]
-    return rows[np.lexsort([*keys, j[0] - j[1]])]
+    return np.asarray(rows[np.lexsort([*keys, j[0] - j[1]])], dtype=np.int64)
 
 
 def plot_loomis_wood(
