@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 DOCS = Path(__file__).resolve().parent
@@ -146,7 +147,15 @@ def public_page(package: Any) -> str:
         ):  # made from the declaration of the verb; the options page has its arguments
             rows.append(f"| `rotor.{name}` | {thing.__doc__.strip().splitlines()[0]} |")
             continue
+        if not hasattr(thing, "__qualname__"):  # a module of building blocks, or a constant
+            rows.append(f"| `{module.__name__}.{name}` | {_of_constant(thing)} |")
+            continue
         place = f"{thing.__module__}.{thing.__qualname__}"
+        if isinstance(thing, type) and thing.__name__ not in vars(sys.modules[thing.__module__]):
+            rows.append(
+                f"| `{module.__name__}.{name}` | {thing.__doc__.strip().splitlines()[0]} The options page has its keys. |"
+            )
+            continue  # made from the declaration of a verb
         if place not in known:
             raise ValueError(
                 f"{module.__name__}.{name} is {place}, which has no entry in the reference: its module must be public"
@@ -155,6 +164,15 @@ def public_page(package: Any) -> str:
         rows.append(f"| {{py:obj}}`{module.__name__}.{name} <{place}>` | {summary} |")
     table = "\n".join(["| name | what it is |", "|---|---|", *rows])
     return f"# API\n\nThe public names of the package:\n\n{table}\n\nThe other pages of this part have all modules, folder by folder.\n"
+
+
+def _of_constant(thing: Any) -> str:
+    """A module by its first line, a number by its value, others by what they hold."""
+    if isinstance(thing, ModuleType):
+        return (thing.__doc__ or "").strip().splitlines()[0].replace("|", "\\|")
+    if isinstance(thing, float):
+        return f"the number {thing!r}"
+    return f"the {type(thing).__name__} of {', '.join(f'`{type(part).__name__}`' for part in thing)}"
 
 
 def build(out: Path) -> int:
