@@ -258,7 +258,7 @@ def parse_molecule_file(
         raise ValueError(f"{where}: neither [constants] nor [geometry]: one of them, or both, make a molecule file")
 
     sources = {name: table.text("source") for name, table in tables.items() if "source" in table.content}
-    unverified = frozenset().union(*(unverified_in(name, table) for name, table in tables.items()))
+    unverified: frozenset[str] = frozenset().union(*(unverified_in(name, table) for name, table in tables.items()))
     if listed and "constants" in tables:
         tables = {name: table for name, table in tables.items() if name in ("constants", "dipole", "serves")}
     top = TableReader(where, "", content)
