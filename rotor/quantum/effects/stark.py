@@ -296,9 +296,9 @@ def acting(
 
 def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> Contraction:
     """∂(dipole along Z)/∂μ of one component of the top's dipole, which all states have that have none of their own."""
-    own = (0.0, 0.0, 0.0)
-    with_unit = dipoles_by_state(top, tuple(np.eye(3)[axis].tolist()), effects)
-    none = dipoles_by_state(top, own, effects)
+    x, y, z = np.eye(3)[axis].tolist()
+    with_unit = dipoles_by_state(top, (x, y, z), effects)
+    none = dipoles_by_state(top, (0.0, 0.0, 0.0), effects)
     states = {pair: tuple(np.subtract(one, none[pair]).tolist()) for pair, one in with_unit.items()}
     return Contraction(np.eye(3)[axis], Z, states if len(states) > 1 else {})
 

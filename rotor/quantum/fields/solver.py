@@ -192,8 +192,8 @@ def _spanned(
         if basis.shape[1] > len(terms[0]) // 2:
             return None
         moved, ordered = tuple(one @ basis for one in terms), sorted(anchors)
-        middles = [(i + k) // 2 for i, k in pairwise(ordered) if k > i + 1]
-        for places in map(np.array, (middles, range(len(fields))) if middles else (range(len(fields)),)):
+        middles = np.array([(i + k) // 2 for i, k in pairwise(ordered) if k > i + 1], dtype=np.int64)
+        for places in (middles, np.arange(len(fields))) if len(middles) else (np.arange(len(fields)),):
             states = _in_basis(basis, moved, fields[places], count)
             error = np.where(np.isin(places, anchors), 0.0, states[2].max(axis=1))
             if error.max(initial=0.0) > PART_OF_TOLERANCE * tolerance_mhz:

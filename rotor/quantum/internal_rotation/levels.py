@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 TurningTops = RamModel | TwoTops
+FEW = 1 << 14  # elements of a matrix that is faster without being sparse
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
@@ -127,10 +128,14 @@ class TorsionBlock(MomentBlock):
         """Reduced elements (n_up, n_low) of one component."""
         assert isinstance(low, TorsionBlock)
         entries = self.moments.between(tensors)[self.number, low.number]
-        from scipy.sparse import csr_array
-
         shape = len(self.vectors), len(low.vectors)
-        matrix = csr_array((entries.values, (entries.rows, entries.columns)), shape=shape)
+        if shape[0] * shape[1] <= FEW:
+            matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
+            matrix[entries.rows, entries.columns] = entries.values
+        else:
+            from scipy.sparse import csr_array
+
+            matrix = csr_array((entries.values, (entries.rows, entries.columns)), shape=shape)
         return np.asarray(self.vectors.conj().T @ (matrix @ low.vectors))
 
     def slopes(self, names: Sequence[str]) -> Floats:
