@@ -216,3 +216,31 @@ def test_a_field_on_a_molecule_with_spins_has_species_and_spins(acetaldehyde, ca
     code, out, _ = call("stark", str(acetaldehyde), "--hyperfine", "--field", "0:1kV/cm:2", "--states", "1")
     assert code == 0
     assert "E 0 1 0 1 2" in out
+
+
+def test_raman_lines_of_both_species_have_the_strengths_of_a_rigid_top(call, tmp_path):
+    """v_t = 0 behind 408 cm-1, the tensor turned into the frame of rho: S of A as of the rigid top, of E twice as much."""
+    found = {}
+    for name, options in {"rigid": (), "turning": ("--internal-rotation", "geometry")}.items():
+        path = tmp_path / f"{name}.csv"
+        tensor = ("--polarizability", "5,4.4,4", "--temperature", "20", "--jmax", "2", "--csv", str(path))
+        assert call("raman", "SMILES:CC=O", *options, *tensor)[0] == 0
+        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        found[name] = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
+    strength = next(key for key in found["rigid"][0] if key.startswith("strength"))
+
+    def of(row):
+        return tuple(row[key] for key in row if key.split("_")[0] in ("j", "ka", "kc"))
+
+    rigid = {of(row): float(row[strength]) for row in found["rigid"]}
+    turning = [row for row in found["turning"] if {row[key] for key in row if key.startswith("vt_")} == {"0"}]
+    compared = 0
+    for row in turning:
+        species = {row[key] for key in row if key.startswith("species_")}
+        if of(row) in rigid and species == {"A"}:
+            assert float(row[strength]) == pytest.approx(rigid[of(row)], rel=0.03)
+            compared += 1
+    assert compared > 10
+    far = [row for row in turning if abs(int(row["j_initial"]) - int(row["j_final"])) == 2]  # none is elastic
+    total = {name: sum(float(row[strength]) for row in far if row["species_initial"] == name) for name in "AE"}
+    assert total["E"] == pytest.approx(2 * total["A"], rel=0.01)
