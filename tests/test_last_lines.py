@@ -87,3 +87,33 @@ def test_a_saved_scene_states_the_same(verb, call, folder):
     found = json.loads((folder / "b.json").read_text())
     assert found.get("errors", found.get("facts", {}).get("errors")) == content
     assert json.loads((folder / "a.csv.provenance.json").read_text())["errors"] == content
+
+
+WITH_ACCURACY = {
+    "levels": ("1 kHz", 'molecule = "OCS"\n'),
+    "spectrum": ("1 kHz", 'molecule = "OCS"\n'),
+    "raman": ("1 kHz", 'molecule = "N2"\n'),
+    "thermo": ("0.1 %", 'molecule = "CO"\n[conditions]\ntemperature = "20 K"\n'),
+    "stark": ("1 kHz", 'molecule = "OCS"\n[conditions]\nfield = "0:50:3"\n'),
+    "torsion": ("1 kHz", 'molecule = "C2H6"\n[observables]\nbond = "1-2"\npotential = "V3=1013 cm-1"\n'),
+    "emission": ("1 mK", '[[molecules]]\nsource = "CO"\n[conditions]\nrange = "115:116GHz"\n'),
+    "tumble": (
+        "1e-6 rad",
+        "[body]\nmoments = [1.0, 2.0, 2.5]\nangular_velocity = [1.0, 2.0, 3.0]\n"
+        '[[effects]]\neffect = "linear drag"\ncoefficients = [0.1, 0.1, 0.1]\n[conditions]\ntimes = "0:5:6"\n',
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WITH_ACCURACY)
+def test_an_accuracy_is_compared_with_the_numerical_error_that_is_stated(kind, call, folder):
+    """The last line has the number of the budget, of this answer; where settings were tried, at least that."""
+    accuracy, body = WITH_ACCURACY[kind]
+    (folder / "s.toml").write_text(f'schema = 1\nkind = "{kind}"\naccuracy = "{accuracy}"\n{body}')
+    code, out, err = call("run", "s.toml", "--json", "a.json")
+    assert code == 0, err
+    content = json.loads((folder / "a.json").read_text())
+    budget, reached = ErrorBudget.from_json(content["errors"]), content["accuracy"]
+    scale = 100.0 if reached["unit"] == "%" and budget.unit != "%" else 1.0
+    assert reached["error"] == pytest.approx(scale * budget.numerical, rel=1e-9)
+    assert f"numerical error at most {reached['error']:.2g}" in plain(out)

@@ -68,18 +68,22 @@ def apart(one: Motion, other: Motion) -> float:
     return float(distance(one.attitude, other.attitude).max())
 
 
-def driven_budget(motion: Motion, truncation: ErrorTerm) -> ErrorBudget:
-    """The errors of the attitude of a driven body in rad, largest over its times."""
+def rounding_of_steps(motion: Motion) -> float:
+    """Rounding of the attitude of a stepped motion, rad."""
     from rotor.geometry.rotations import distance
 
     turned = float(
         distance(motion.attitude[1:], motion.attitude[:-1]).sum()
     )  # less than the whole between distant times
-    rounding = EVALUATED * (motion.steps + math.sqrt(motion.steps) * max(turned, 0.1 * motion.steps))
+    return EVALUATED * (motion.steps + math.sqrt(motion.steps) * max(turned, 0.1 * motion.steps))
+
+
+def driven_budget(motion: Motion, truncation: ErrorTerm) -> ErrorBudget:
+    """The errors of the attitude of a driven body in rad, largest over its times."""
     return ErrorBudget(
         of="attitude",
         unit="rad",
-        rounding=ErrorTerm(rounding, f"{motion.steps} steps"),
+        rounding=ErrorTerm(rounding_of_steps(motion), f"{motion.steps} steps"),
         truncation=truncation,
         model=ErrorTerm(None, "a rigid body under the effects named, and no others"),
         data=ErrorTerm(None, "moments, effects and start have no stated uncertainty"),

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
-from rotor.classical.step_errors import error_by_finer
+from rotor.classical.step_errors import error_by_finer, rounding_of_steps
 from rotor.requests.knob import Choice
 
 if TYPE_CHECKING:
@@ -52,10 +52,11 @@ class _Motions:
         return self.made[decade]
 
     def error(self, decade: int) -> float:
-        """The largest error of an attitude in radians, see `error_by_finer`."""
+        """The largest error of an attitude in radians, of the steps (`error_by_finer`) and of rounding."""
         finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
         decades = {tolerance_of(one): one for one in finer}
-        return error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
+        of_steps = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
+        return of_steps + rounding_of_steps(self.at(decade))
 
 
 def tolerance_of(decade: int) -> float:

@@ -17,7 +17,7 @@ def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
     """J max, how exact energies are, and the population at the edge, as a line of the report."""
     accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
     rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
-    return "accuracy", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
+    return "numerical error", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
 
 
 def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[slice], list[str]]) -> Table:

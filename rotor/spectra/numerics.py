@@ -46,7 +46,7 @@ def shift_error(found: Any, reference: Any) -> float:
 
 def error_of_list(answer: Any) -> float:
     """The error of the frequencies of lines in MHz."""
-    return levels_error(answer.lines.top, answer.lines.levels)
+    return levels_error(answer, answer.lines.top, answer.lines.levels)
 
 
 def sweeps_of_lines(

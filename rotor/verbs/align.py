@@ -187,7 +187,7 @@ def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str,
         ("gas", _ensemble_text(trace)),
         ("J max", str(trace.jmax)),
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
-        ("accuracy", accuracy),
+        ("numerical error", accuracy),
     ]
 
 

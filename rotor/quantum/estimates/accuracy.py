@@ -17,7 +17,7 @@ from rotor.arrays import Floats
 from rotor.quantum.estimates.plans import plan_of_levels
 from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Setting, Sweep, Sweeps
-from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.numerics import Goal, Numerics, numerical_error
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
@@ -80,16 +80,10 @@ def rounding_mhz(levels: Any) -> float:
     return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
 
 
-def levels_error(top: Any, levels: Any) -> float:
-    """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
-    from rotor.quantum.hyperfine_method import used_method
-
-    rounding = rounding_mhz(levels)
-    has_spins = any(effect.spins(top) for effect in levels.effects)
-    if has_spins:
-        used = used_method(levels)
-        return rounding + (used.estimate_mhz if used else 0.0)
-    return rounding + (0.0 if top.spin_constants is None else _spin_size(top))
+def levels_error(answer: Any, top: Any, levels: Any) -> float:
+    """The numerical error that an answer states, and the size of known spins that are left out."""
+    has_spins = top.spin_constants is None or any(effect.spins(top) for effect in levels.effects)
+    return numerical_error(answer) + (0.0 if has_spins else _spin_size(top))
 
 
 def energies_like(reference: Levels, levels: Levels) -> Floats:
@@ -205,7 +199,11 @@ def sweeps_of_levels(request: Any) -> Sweeps:
 
 
 LEVELS = Numerics(
-    {"MHz": Goal("energies", choose_spins, lambda answer: levels_error(answer.request.top, answer.table.levels))},
+    {
+        "MHz": Goal(
+            "energies", choose_spins, lambda answer: levels_error(answer, answer.request.top, answer.table.levels)
+        )
+    },
     sweeps=sweeps_of_levels,
     plan=plan_of_levels,
     rounding=lambda request: rounding_of(request.top, request.jmax),
