@@ -307,7 +307,7 @@ SUBJECTS: Sequence[Subject] = (
         "cut",
         "Cut of a line list",
         "The part of the intensity that all lines below the cut hold together, beside a cut two decades lower.",
-        "Each decade of the cut leaves out about a tenth of what the decade before did, and costs a tenth to a fifth more time.",
+        "Each decade of the cut leaves out about a tenth of what the decade before did, and costs nothing to a half more time.",
         cut,
     ),
     Subject(

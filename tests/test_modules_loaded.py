@@ -25,6 +25,8 @@ SPINS_NAMED = {
 }  # constants of every effect may be free in a fit
 LOADED = {  # of FAMILIES, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermodynamics.functions"},
+    "info": set(),
+    "isotopologues": set(),
     "levels": set(),
     "raman": {"rotor.spectra", "rotor.spectra.raman"},
     "stark": {"rotor.spectra", "rotor.spectra.fields", "rotor.quantum.effects.stark", "rotor.quantum.fields"},
