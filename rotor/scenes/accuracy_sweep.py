@@ -29,6 +29,7 @@ from rotor.table import Table
 
 Progress = Callable[[str, str], object]
 SHORT_SECONDS, ROUNDS = 1.0, 5  # settings that are shorter are timed in so many rounds
+KNOWN_SECONDS = 0.1  # below which one call does not say how much longer the next one takes
 LEAST_SCATTER = 0.1  # of a time: processor time depends on what else uses memory and caches
 LEAST_SECONDS = 5e-3  # of one timing: shorter calls are repeated in it
 COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated
@@ -202,7 +203,7 @@ def _next_seconds(taken: list[float]) -> float:
     """How long the next setting may take: as much longer than the last one as that was than the one before; nothing is known at first."""
     if not taken:
         return 0.0
-    if len(taken) == 1 or taken[-2] < 1e-3:
+    if len(taken) == 1 or taken[-2] < KNOWN_SECONDS:
         return taken[-1]
     return taken[-1] * max(taken[-1] / taken[-2], 1.0)
 
