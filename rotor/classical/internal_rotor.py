@@ -77,7 +77,8 @@ class TurningTop:
     @cached_property
     def _rest(self) -> tuple[Floats, Floats]:
         """Principal moments of J, and its axes as columns along those of the whole; a proper rotation."""
-        whole = np.diag(np.asarray(self.moments)) - self.own * np.outer(self.axis, self.axis)
+        axis = np.asarray(self.axis, dtype=float)
+        whole = np.diag(np.asarray(self.moments)) - self.own * np.outer(axis, axis)
         moments, axes = np.linalg.eigh(whole)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
         return moments, axes
@@ -95,7 +96,7 @@ class TurningTop:
     @cached_property
     def _axis(self) -> Floats:
         """λ along the axes of J."""
-        return np.asarray(self.rest_axes.T @ self.axis)
+        return np.asarray(self.rest_axes.T @ np.asarray(self.axis, dtype=float))
 
     @cached_property
     def reduced_moment(self) -> float:
