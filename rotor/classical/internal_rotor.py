@@ -63,7 +63,7 @@ class TurningTop:
         moments, axis = checked_moments(self.moments), np.asarray(self.axis, dtype=float)
         length = float(np.linalg.norm(axis))
         if axis.shape != (3,) or not length > 0:
-            raise ValueError(f"axis of a top {self.axis}: expected three numbers along the principal axes, not all 0")
+            raise ValueError(f"axis of a top {axis}: expected three numbers along the principal axes, not all 0")
         if any(n < 1 for n in self.barriers):
             raise ValueError(f"barriers {dict(self.barriers)}: terms V_n are counted from n = 1")
         object.__setattr__(self, "moments", moments)
