@@ -42,7 +42,6 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
-from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
@@ -195,6 +194,8 @@ def _of_csv(
 
 def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, str]) -> dict[str, str]:
     """A row with the field of both states as a whole number of steps."""
+    from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM  # with all that fields need
+
     found = [name for name in _FIELD if name in columns]
     if len(found) != 1:
         raise ValueError(f"{path}: one column of {', '.join(_FIELD)} is needed, the field of each line")
