@@ -286,7 +286,10 @@ def _not_results(words: list[str], printed: str, files: list[Path]) -> list[str]
                if (found := NOT_FINITE.search(text))]  # fmt: skip
     for name, text in texts.items():
         if name.endswith(".json") or (
-            name == "printed" and "--json" in words[:-1] and words[words.index("--json") + 1] == "-"
+            name == "printed"
+            and "--json" in words[:-1]
+            and words[words.index("--json") + 1] == "-"
+            and not {"--help", "--help-all"} & {*words}
         ):
             try:
                 json.loads(text)
