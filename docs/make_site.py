@@ -69,6 +69,7 @@ def on_the_site(text: str) -> str:
 def one_level_down(text: str) -> str:
     """Links of a page of docs/validation or docs/verbs: to pages and pictures of the site, elsewhere the name of the file alone."""
     text = re.sub(r"\]\(\.\./\.\./CONVENTIONS\.md\)", "](../conventions.md)", text)
+    text = text.replace("```mermaid", "```text")  # Sphinx has no drawing of it
     return re.sub(r"\[([^\]]+)\]\(\.\./\.\./[^)]*\)", r"\1", text)
 
 
