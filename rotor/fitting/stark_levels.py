@@ -128,8 +128,8 @@ class StarkLevels(LevelModel):
         known = {("n" if "n" in columns else "j"): levels.j, **levels.quanta}
         keys = np.column_stack([known[name] for name in columns])
         place = {key: row for row, key in enumerate(map(tuple, keys.tolist()))}
-        wanted = np.column_stack(list(columns.values())).tolist()
-        return np.array([place.get(tuple(key), -1) for key in wanted]), m
+        labels = np.column_stack(list(columns.values())).tolist()
+        return np.array([place.get(tuple(key), -1) for key in labels]), m
 
     def _slopes(self, constants: TopConstants, group: Labelled, states: BlockStates, number: Ints) -> Floats:
         """∂E/∂c (labels, names)."""
