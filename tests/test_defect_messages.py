@@ -88,7 +88,9 @@ def test_a_plan_of_a_body_that_turns_1e13_times_is_short(call, folder, momentum)
     start = time.process_time()
     code, out, err = call("plan", "s.toml")
     assert (code, err) == (0, "")
-    assert time.process_time() - start < 200  # s, mostly compilation on a busy machine; steps one by one would take months
+    assert (
+        time.process_time() - start < 200
+    )  # s, mostly compilation on a busy machine; steps one by one would take months
     steps = int(next(line for line in out.splitlines() if line.startswith("steps")).split()[1].replace(",", ""))
     assert steps > 1e7
 
