@@ -14,12 +14,18 @@ from functools import cached_property
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.fitting.top_constants import ConstantSet
+from rotor.fitting.top_constants import DIPOLES, ConstantSet
+from rotor.tops.constants import UnknownConstantError
 from rotor.units import parse_quantity
 
 _NAME = r"(\w+(?:-[abc]{2}(?:_\w+)?(?=\())?(?:\([^()]*\))?(?:\[[^\[\]]*\])?)"  # DeltaJ, A[1], G_c[0,1], chi_bb-cc(14N)
 _TIE = re.compile(
     rf"\s*{_NAME}\s*=\s*(?:([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*\*\s*)?{_NAME}\s*(?:([+-])\s*(.+))?\s*$"
+)
+
+_FURTHER = (
+    f"a fit has also {', '.join(DIPOLES)} (lines in a field), E[1] and A[1] of further states, G_c[0,1] of pairs of states, chi_aa(14N) of "
+    "spins, F, rho and V3 of an internal rotor"
 )
 
 
@@ -144,7 +150,9 @@ def parameters(
     chosen = [_known(name, constants, "free") for name in free]
     twice = next((name for name in chosen if chosen.count(name) > 1), None)
     if twice:
-        raise ValueError(f"free: {twice} is named twice among the free constants; once is enough")
+        typed = " and ".join(dict.fromkeys(text for text, name in zip(free, chosen, strict=True) if name == twice))
+        alike = "are one constant" if " and " in typed else "is named twice among the free constants"
+        raise ValueError(f"free: {typed} {alike}; once is enough")
     if not chosen:
         raise ValueError("free: no constant is free; name those that are to be fitted, such as A,B,C")
 
@@ -175,7 +183,10 @@ def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
     0.0
     """
     missing = [name for name in names if name not in constants]
-    return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
+    try:
+        return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
+    except UnknownConstantError as error:
+        raise ValueError(f"{error}; {_FURTHER}") from None
 
 
 def _known(name: str, constants: ConstantSet, where: str) -> str:

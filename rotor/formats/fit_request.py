@@ -214,12 +214,7 @@ def fit_of_lines(
     try:
         begin = with_names(has, names)
     except ValueError as error:
-        more = (
-            "; constants of states are written as E[1] and A[1], of pairs of states as G_c[0,1], of spins as chi_aa(14N)"
-            if isinstance(has, TopConstants) and not any(sign in str(error).partition(":")[0] for sign in "[(")
-            else ""
-        )
-        raise ValueError(f"free: {error}{more}") from None
+        raise ValueError(f"free: {error}") from None
     for tie in ties:  # a constant that follows another need not be in the start
         try:
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])

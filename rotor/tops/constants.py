@@ -82,8 +82,8 @@ class Constants:
         terms: Mapping[Powers, float | str] | None = None,
         **values_mhz: float | str,
     ) -> None:
+        refuse_unknown(values_mhz)
         given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
-        _refuse_unknown(given)
         numbers = {name: _finite(name, value) for name, value in given.items()}
         kind = kind_of(numbers, kind)
         values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
@@ -94,7 +94,7 @@ class Constants:
         _refuse_strays("sources", origins, values)
 
         reduction = reduction_of(kind, values, reduction)
-        _refuse_misplaced(kind, reduction, values)
+        _refuse_misplaced(kind, reduction, dict(zip(values, (*values_mhz, *values), strict=False)))
         _refuse_disorder(kind, values)
 
         content = {
@@ -172,11 +172,10 @@ class Constants:
         'A=9.0 B=3.0 C=2.5 MHz'
         """
         changes |= _spelled(changes.pop("terms", None))
-        moved = _renamed(
-            [(name, value) for name, value in changes.items() if name not in _SETTINGS],
-            lambda name: _name_in(self.kind, _published_name(name)),
-        )
-        values = {name: value for name, value in {**self.values, **moved}.items() if value is not None}
+        typed = {name: value for name, value in changes.items() if name not in _SETTINGS}
+        moved = _renamed(typed.items(), lambda name: _name_in(self.kind, _published_name(name)))
+        as_typed = dict(zip(moved, typed, strict=True))  # errors quote the names that were typed
+        values = {as_typed.get(n, n): value for n, value in {**self.values, **moved}.items() if value is not None}
         settings = self._settings()
         for table in ("uncertainties", "sources"):
             settings[table] = {name: thing for name, thing in settings[table].items() if name not in moved}
@@ -272,16 +271,24 @@ def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) ->
     return renamed
 
 
-def _refuse_unknown(names: Iterable[str]) -> None:
-    for name in names:
+class UnknownConstantError(ValueError):
+    """A name that is none of a rotational constant."""
+
+
+def refuse_unknown(typed: Iterable[str]) -> None:
+    """UnknownConstantError for a name that no kind of top has, quoted as it was typed."""
+    for text in typed:
+        name = _published_name(text)
         if name not in KNOWN and not powers_of_spelled(name):
             near = [known for known in KNOWN if known.casefold() == name.casefold()]
             near = near or difflib.get_close_matches(name, KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
-            if _OF_SPIN_OR_STATE.match(name):
+            if re.fullmatch("mu[abc]", name):
+                hint = "the dipole is no rotational constant; a molecule file has it as dipole = { a = 1.0 }, some commands as --dipole. "
+            elif _OF_SPIN_OR_STATE.match(name):
                 hint = "constants of spins and of further states go to a Top, as spin_constants and states, such as chi_aa(14N). "
-            raise ValueError(
-                f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
+            raise UnknownConstantError(
+                f"{text!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
             )
 
@@ -292,18 +299,19 @@ def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float])
         raise ValueError(f"{what} of {', '.join(strays)}, but there is no such constant here: {', '.join(values)}")
 
 
-def _refuse_misplaced(kind: str, reduction: str | None, values: Mapping[str, float]) -> None:
+def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]) -> None:
+    """ValueError for a name that this kind of top has not; typed: every name as it was typed."""
     allowed = vocabulary(kind, reduction)
-    for name in values:
+    for name in typed:
         if powers := powers_of_spelled(name):
             _refuse_named_term(kind, reduction, name, powers)
         elif name not in allowed:
             near = _counterpart(name, allowed)
             ways = [f"use {near}"] if near else []
-            if kind in ("prolate", "oblate") and {*RIGID} <= {*values}:
+            if kind in ("prolate", "oblate") and {*RIGID} <= {*typed}:
                 ways.append("say kind='asymmetric'")
             hint = f"{' or '.join(ways)}; " if ways else ""
-            raise ValueError(f"{name} is no constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
+            raise ValueError(f"{typed[name]} is no constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
 
 
 def _refuse_named_term(kind: str, reduction: str | None, name: str, powers: Powers) -> None:
