@@ -264,10 +264,12 @@ def _spelled(values: Mapping[Powers, Any] | None) -> dict[str, Any]:
 
 def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) -> dict[str, Any]:
     renamed: dict[str, Any] = {}
-    for name, thing in things:
-        if rename(name) in renamed:
-            raise ValueError(f"{name} is given twice (names are read as {rename(name)}); leave one out")
-        renamed[rename(name)] = thing
+    typed: dict[str, str] = {}
+    for text, thing in things:
+        name = rename(text)
+        if (first := typed.setdefault(name, text)) != text:
+            raise ValueError(f"{first} and {text} are one constant, {name}; leave one out")
+        renamed[name] = thing
     return renamed
 
 
