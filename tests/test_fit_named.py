@@ -287,7 +287,7 @@ def test_the_command_with_advice(case, call):
     [
         ("A,B[2]", "--free: B[2]: there is no state 2; the constants to start from have 2, counted from 0"),
         ("A,G_c[0,2]", "--free: G_c[0,2]: there is no state 2"),
-        ("G_c[0,1],G_c[1,0]", "--free: G_c[0,1] is named twice"),
+        ("G_c[0,1],G_c[1,0]", "--free: G_c[0,1] and G_c[1,0] are one constant"),
         ("A,chi_aa(15N)", "--free: chi_aa(15N): there is no spin 15N; the constants to start from have 14N"),
         ("A,Q[1]", "--free: Q[1]: a state of this asymmetric top has E, A, B, C,"),
         ("A,A[0]", "--free: A[0]: state 0 is the top's own, whose constants have no brackets"),
