@@ -268,4 +268,4 @@ def test_a_name_of_states_or_spins_that_there_is_not_says_how_they_are_written(c
     code, _, err = call("fit", "lines.csv", "--start", "states.toml", "--free", "A,Foo")
     assert code == 2
     assert "'Foo' is not a rotational constant" in err
-    assert "of states are written as E[1] and A[1], of pairs of states as G_c[0,1], of spins as chi_aa(14N)" in err
+    assert "E[1] and A[1] of further states, G_c[0,1] of pairs of states, chi_aa(14N) of spins" in err

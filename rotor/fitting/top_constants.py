@@ -23,7 +23,7 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.spin_effect import parse_name
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.tops.constants import Constants, refuse_unknown
+from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 from rotor.tops.spins.spin_constants import SpinConstants, spins_of
 from rotor.tops.states.state_constants import StateConstants, states_of_name
@@ -140,16 +140,14 @@ class TopConstants:
         """
         if "(" in name:
             return parse_name(name).text
-        if self._has_own_spelling(name):
+        if self.in_field and name in DIPOLES:
+            return name
+        if self.top.internal_rotation is not None and is_torsional(name):
             return name
         if "[" not in name:
             return self.top.constants.own_name(name)
         states, head = states_of_name(name), name.partition("[")[0].strip()
         return parse_name(name).text if len(states) == 2 else f"{self.top.constants.own_name(head)}[{states[0]}]"
-
-    def _has_own_spelling(self, name: str) -> bool:
-        """Whether a name is that of a dipole in a field or of an internal rotor, which are spelled in one way."""
-        return (self.in_field and name in DIPOLES) or (self.top.internal_rotation is not None and is_torsional(name))
 
     def replace(self, **changes: Any) -> TopConstants:
         """A changed set: constants that it lacks are added, those set to None left out.
@@ -158,9 +156,9 @@ class TopConstants:
         spin that the top has not, and for names that states or spins do not have.
         """
         given: Mapping[str, float] | None = changes.pop("uncertainties", None)
-        for name in changes:
-            self._refuse_unknown(name)
         new = {self.own_name(name): value for name, value in changes.items()}
+        for name in new:
+            self._refuse_unknown(name)
         values = {name: value for name, value in {**self.values, **new}.items() if value is not None}
         known = self.uncertainties if given is None else {self.own_name(name): error for name, error in given.items()}
         errors = {
@@ -200,10 +198,7 @@ class TopConstants:
         return TopConstants(made, self.hyperfine, dipole, dipole_errors)
 
     def _refuse_unknown(self, name: str) -> None:
-        """ValueError for a state or a spin that the set has not, and for a name that no constant has."""
-        head, bracket, inside = name.partition("[")
-        if not ("(" in name or "," in inside or self._has_own_spelling(name) or (bracket and head == "E")):
-            refuse_unknown([head])
+        """ValueError for a state or a spin that the set has not."""
         states = parse_name(name).states if "(" in name else states_of_name(name) if "[" in name else None
         count = 1 if self.top.states is None else self.top.states.count
         if states and max(states) >= count:

@@ -23,7 +23,7 @@ from rotor.units import parse_quantity
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
 LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below that of any body of atoms, far above that of H2 (1.8e6 MHz)
-_OF_SPIN_OR_STATE = re.compile(r"(chi|eps|[CTDGF])[abc]{1,2}|(bF|W|E|gamma|lambda|[CJ]iso)\b")
+_OF_SPIN_OR_STATE = re.compile(r"(chi|eps|[CTDGF])_?[abc]{1,2}|(b_?F|W|E|gamma|lambda|[CJ]_?iso)\b")
 _SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
 
 
@@ -82,8 +82,8 @@ class Constants:
         terms: Mapping[Powers, float | str] | None = None,
         **values_mhz: float | str,
     ) -> None:
-        refuse_unknown(values_mhz)
         given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
+        _refuse_unknown(given)
         numbers = {name: _finite(name, value) for name, value in given.items()}
         kind = kind_of(numbers, kind)
         values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
@@ -249,9 +249,10 @@ class Constants:
 
 
 def _published_name(name: str) -> str:
-    """Greek letters spelled out, underscores taken away: `Δ_JK` is `DeltaJK`."""
+    """Greek letters spelled out, underscores taken away: `Δ_JK` is `DeltaJK`; a name that no constant has stays as it was typed."""
     plain = name.replace("_", "")
-    return _GREEK.get(plain[:1], plain[:1]) + plain[1:]
+    plain = _GREEK.get(plain[:1], plain[:1]) + plain[1:]
+    return plain if plain in KNOWN or powers_of_spelled(plain) else name
 
 
 def _name_in(kind: str, name: str) -> str:
@@ -267,9 +268,9 @@ def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) ->
     typed: dict[str, str] = {}
     for text, thing in things:
         name = rename(text)
-        if (first := typed.setdefault(name, text)) != text:
-            raise ValueError(f"{first} and {text} are one constant, {name}; leave one out")
-        renamed[name] = thing
+        if name in typed:
+            raise ValueError(f"{typed[name]} and {text} are one constant, {name}, which is given twice; leave one out")
+        typed[name], renamed[name] = text, thing
     return renamed
 
 
@@ -277,20 +278,18 @@ class UnknownConstantError(ValueError):
     """A name that is none of a rotational constant."""
 
 
-def refuse_unknown(typed: Iterable[str]) -> None:
-    """UnknownConstantError for a name that no kind of top has, quoted as it was typed."""
-    for text in typed:
-        name = _published_name(text)
+def _refuse_unknown(names: Iterable[str]) -> None:
+    for name in names:
         if name not in KNOWN and not powers_of_spelled(name):
             near = [known for known in KNOWN if known.casefold() == name.casefold()]
-            near = near or difflib.get_close_matches(name, KNOWN, n=3)
+            near = near or difflib.get_close_matches(name.replace("_", ""), KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
-            if re.fullmatch("mu[abc]", name):
+            if re.fullmatch("mu_?[abc]", name):
                 hint = "the dipole is no rotational constant; a molecule file has it as dipole = { a = 1.0 }, some commands as --dipole. "
             elif _OF_SPIN_OR_STATE.match(name):
                 hint = "constants of spins and of further states go to a Top, as spin_constants and states, such as chi_aa(14N). "
             raise UnknownConstantError(
-                f"{text!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
+                f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
             )
 
