@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from rotor.fitting.stark_levels import stark_levels
-from rotor.fitting.top_constants import FIELD_STEP_KV_PER_CM, TopConstants
+from rotor.fitting.top_constants import TopConstants
 from rotor.formats.fit_request import answer_fit, fit_of_lines
+from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
 from rotor.spectra.fields.lines import field_lines
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top

@@ -11,15 +11,14 @@ V_b the eigenvectors of a block b of the free molecule, O_c,b its linear blocks,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.fitting.top_constants import DIPOLES, FIELD_STEP_KV_PER_CM, TopConstants
+from rotor.fitting.top_constants import DIPOLES, TopConstants
 from rotor.quantum.basis.state_elements import linear_blocks_of
-from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import dipole_derivative, map_request
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.fields.block_states import BlockStates, basis_order, solve_block
@@ -29,7 +28,7 @@ from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.solved_space import SolvedFieldBlock
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.linear_stacks import LinearBlock
-from rotor.quantum.quanta import label_value
+from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, label_value
 from rotor.quantum.solve import solve_levels
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
 
@@ -47,23 +46,22 @@ class Labelled(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StarkLevels(LevelModel):
-    """Levels in fields by label, for any values of the constants and of the dipole."""
+    """Levels in fields by label, for any values of the constants and of the dipole; jmax: that of the basis at the constants `start`."""
 
     names: tuple[str, ...]
     start: TopConstants
     labels: Ints
-    _jmax: dict[str, int] = field(default_factory=dict)
+    jmax: int
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`; the dipole in D, derivatives by it in MHz/D. Raises MissingLevelsError for labels that no level has."""
         values = [value or AT_ZERO_MHZ for value in np.asarray(values_mhz).tolist()]
         constants = self.start.replace(**dict(zip(self.names, values, strict=True)))
-        request = self._request(constants)
+        request, jmax = _request(constants, self.labels), self.jmax
         energies, slopes = np.empty(len(self.labels)), np.zeros((len(self.labels), len(self.names)))
         while True:
-            jmax = self._jmax["jmax"]
             error = 0.0
-            for group in self._groups(request, jmax):
+            for group in self.groups(request, jmax):
                 fields, number = np.unique(group.fields, return_inverse=True)
                 states = solve_block(request, group.block, request.problem(group.block), fields, jmax)
                 error = max(error, float(states.error[number, group.ranks].max()))
@@ -71,27 +69,14 @@ class StarkLevels(LevelModel):
                 slopes[group.places] = self._slopes(constants, group, states, number)
             if error <= 10 * request.tolerance_mhz:
                 return energies, slopes
-            self._jmax["jmax"] = jmax + 1
+            jmax += 1
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
         """1: states are named by the order of energies in their block."""
         return np.ones(len(self.labels))
 
-    def refuse_missing(self) -> None:
-        """MissingLevelsError for labels that no level has."""
-        request = self._request(self.start)
-        self._jmax["jmax"] = smallest_jmax(request)
-        self._groups(request, self._jmax["jmax"])
-
-    def _request(self, constants: TopConstants) -> MapRequest:
-        fields = np.unique(self.labels[:, -1]) * FIELD_STEP_KV_PER_CM
-        effects: Sequence[QuantumEffect] = constants.effects if constants.hyperfine else ()
-        return map_request(
-            constants.top, fields, int(self.labels[:, 0].max()), None, 0.0, tolerance_mhz=TOLERANCE_MHZ, effects=effects
-        )
-
-    def _groups(self, request: MapRequest, jmax: int) -> list[Labelled]:
-        """The labels by block."""
+    def groups(self, request: MapRequest, jmax: int) -> list[Labelled]:
+        """The labels by block; MissingLevelsError for labels that no level has."""
         space = request.space(jmax + request.margin)
         rows, m = self._rows(space.levels)
         groups, known = [], np.zeros(len(rows), dtype=bool)
@@ -125,7 +110,7 @@ class StarkLevels(LevelModel):
             turned = (m < 0) | ((m == 0) & (columns["k"] < 0))
             columns["k"] = np.where(turned, -columns["k"], columns["k"])
         m = np.abs(m)
-        known = {("n" if "n" in columns else "j"): levels.j, **levels.quanta}
+        known = {"j": levels.j, **levels.quanta}
         keys = np.column_stack([known[name] for name in columns])
         place = {key: row for row, key in enumerate(map(tuple, keys.tolist()))}
         labels = np.column_stack(list(columns.values())).tolist()
@@ -164,6 +149,12 @@ class StarkLevels(LevelModel):
         return total
 
 
+def _request(constants: TopConstants, labels: Ints) -> MapRequest:
+    """A map at the fields of the labels, which follows all of them."""
+    fields = np.unique(labels[:, -1]) * FIELD_STEP_KV_PER_CM
+    return map_request(constants.top, fields, int(labels[:, 0].max()), None, 0.0, tolerance_mhz=TOLERANCE_MHZ)
+
+
 def _expectation(block: LinearBlock, states: Floats) -> Floats:
     """Σ O_i(r, c) v_r* v_c (states, parameters) of columns over the functions of a block, (states, functions)."""
     density = (states[:, block.rows].conj() * states[:, block.columns]).real
@@ -180,6 +171,8 @@ def stark_levels(constants: TopConstants, labels: Ints) -> StarkLevels:
     if constants.top.internal_rotation is not None or constants.hyperfine:
         what = "internal rotation" if constants.top.internal_rotation is not None else "spins"
         raise ValueError(f"lines in a field with {what} are not fitted; take those of the rotation alone")
-    model = StarkLevels(tuple(constants.values), constants, np.asarray(labels, dtype=np.int64))
-    model.refuse_missing()
+    numbers = np.asarray(labels, dtype=np.int64)
+    request = _request(constants, numbers)
+    model = StarkLevels(tuple(constants.values), constants, numbers, smallest_jmax(request))
+    model.groups(request, model.jmax)  # refuses labels without a level
     return model

@@ -31,7 +31,6 @@ from rotor.tops.top import Top
 from rotor.tops.uncertain_numbers import write_number
 
 DIPOLES = ("mu_a", "mu_b", "mu_c")
-FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,6 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.top_constants import FIELD_STEP_KV_PER_CM
 from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK
@@ -42,7 +41,7 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
-from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
+from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, SPECIES_NUMBERS, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 

@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 
+FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
+
 # in which tables and files list them
 ORDER = (
     "species",
@@ -124,8 +126,8 @@ def label_value(name: str, value: int, half: bool = False) -> str:
     >>> label_value("species", 1), label_value("f", 3, half=True)
     ('E', '3/2')
     """
-    if name == "field":  # in steps of 1e-12 kV/cm, see `rotor.fitting.top_constants`
-        return f"{value * 1e-12:g} kV/cm"
+    if name == "field":
+        return f"{value * FIELD_STEP_KV_PER_CM:g} kV/cm"
     letters = {number: letter for letter, number in SPECIES_NUMBERS.items()}
     return letters.get(value, str(value)) if name == "species" else value_text(value, half)
 

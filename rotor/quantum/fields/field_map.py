@@ -284,24 +284,7 @@ def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
 def each_block(
     request: MapRequest, jmax: int, run: Callable[[FieldBlock], Of], executor: Executor | None = None
 ) -> list[Of]:
-    """`run` of every block that holds states of the map.
-
-    Parameters
-    ----------
-    request : MapRequest
-        What is solved.
-    jmax : int
-        Highest J of the basis; blocks reach beyond it by `request.margin`.
-    run : callable
-        Takes a block; must be picklable for a pool of processes.
-    executor : Executor, optional
-        The blocks are spread over it.
-
-    Returns
-    -------
-    list
-        What `run` returned, in the order of the blocks.
-    """
+    """What `run`, which is picklable, makes of each block that holds states of the map, in the order of `blocks_of_map`."""
     blocks = blocks_of_map(request, jmax)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
