@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
+from rotor.quantum.connected import coloured_components
 from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.quantum.fields.tilted_blocks import tilted_space
-from rotor.quantum.in_field import coloured_components
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

@@ -106,7 +106,9 @@ def test_without_coupling_both_species_have_the_map_of_the_rigid_top(intensity):
 
 def test_maps_do_not_depend_on_the_frame():
     """PAM against the same molecule in the rho-axis frame."""
-    from rotor.quantum.internal_rotation.frames import axis_of_angles, ram_of_pam, rho_axis
+    from rho_axis_frame import ram_of_pam
+
+    from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
 
     top = turning(frame="PAM", vt_max=0)
     rho = rho_axis(list(ABC.values()), 158e3, axis_of_angles(0.7))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotor.quantum import wigner
-from rotor.quantum.wigner import nine_j, six_j, three_j, three_j_over_m
+from rotor.quantum.wigner import nine_j, six_j, three_j
 
 ROUND_OFF = 3e-15  # some twenty correctly rounded factors
 
@@ -166,40 +166,6 @@ def test_nine_j_are_orthogonal():
     assert np.allclose(gram, np.diag(np.array(exists, float)), atol=1e-14)  # some ten terms
 
 
-# Families
-
-
-@pytest.mark.parametrize(
-    ("j1", "j2", "j3", "m1"), [(2, 1, 1, 0), (0, 3, 3, 0), (2.5, 3, 3.5, -0.5), (40, 30, 60, 3), (45.5, 50, 33.5, -7.5), (80, 80, 160, 4)]
-)  # fmt: skip
-def test_a_family_over_m_is_its_members(j1, j2, j3, m1):
-    m2, symbols = three_j_over_m(j1, j2, j3, m1)
-    members = three_j(j1, j2, j3, m1, m2, -m1 - m2)
-    assert len(m2) == min(j2, j3 - m1) - max(-j2, -j3 - m1) + 1
-    assert np.abs(symbols - members).max() < 1e-13 * np.abs(members).max()  # eigenvalues apart by J, elements of J²
-
-
-def test_a_family_at_j_1000():
-    m2, symbols = three_j_over_m(1000, 1000, 1000, 0)
-    assert np.sum(symbols**2) * 2001 == pytest.approx(1.0, rel=1e-14)
-    for place in (0, 1, 500, 997, 1000, 1001, 1500):
-        single = float(three_j(1000, 1000, 1000, 0, m2[place], -m2[place]))
-        assert symbols[place] == pytest.approx(single, rel=1e-11, abs=1e-16)  # elements of 1e6 over gaps of 2e3
-    assert abs(symbols[1000]) > 1e-4
-    assert 0 < abs(symbols[0]) < 1e-100
-
-
-def test_families_of_different_j1_are_orthogonal():
-    families = [three_j_over_m(j1, 150, 140, 5)[1] * math.sqrt(2 * j1 + 1) for j1 in (12, 13, 100, 200, 289, 290)]
-    m2 = [three_j_over_m(j1, 150, 140, 5)[0] for j1 in (12, 290)]
-    assert np.array_equal(*m2)
-    assert np.allclose(np.array(families) @ np.array(families).T, np.eye(6), atol=1e-12)  # as the family's accuracy
-
-
-def test_a_family_without_a_triangle_is_zero():
-    assert not three_j_over_m(50, 20, 20, 0)[1].any()
-
-
 # Routes and arguments
 
 
@@ -238,7 +204,6 @@ def test_shapes_broadcast():
         (lambda: three_j(-1, 1, 1, 0, 0, 0), "-1.0: an angular momentum is 0 or more"),
         (lambda: six_j(1, 1, 1, 1, 1, -1), "-1.0: an angular momentum is 0 or more"),
         (lambda: three_j(math.nan, 1, 1, 0, 0, 0), "nan: angular momenta"),
-        (lambda: three_j_over_m(1, 1, 1, 2), "m1 = 2"),
         (lambda: nine_j([1, 2, 3]), r"rows \(..., 3, 3\), found the shape \(3,\)"),
     ],
 )

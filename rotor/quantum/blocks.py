@@ -16,27 +16,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import ROUND_OFF, Elements
+from rotor.quantum.basis.labelled import Basis
+from rotor.quantum.connected import part_numbers
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.solvers.dominated import dominated_states
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
-
-
-class Functions(Protocol):
-    """A set of labelled functions that operators have elements between."""
-
-    @property
-    def labels(self) -> Mapping[str, Ints]:
-        """Quantum numbers by name."""
-
-    def elements(self, operators: Sequence[Operator]) -> Elements:
-        """Elements of operators on their common pattern."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +62,9 @@ class LinearBlocks:
     stacks: tuple[Stack, ...]
     _position: Ints
 
-    def solve(self, coefficients: ArrayLike, lowest: int | None = None) -> SolvedBlocks:
-        """All blocks solved at coefficients (terms,); with `lowest` that many states of each block."""
-        states = [eigenstates(matrices, lowest) for matrices in self.matrices(coefficients)]
-        return SolvedBlocks(self, tuple(states))
+    def solve(self, coefficients: ArrayLike) -> SolvedBlocks:
+        """All blocks solved at coefficients (terms,)."""
+        return SolvedBlocks(self, tuple(eigenstates(matrices) for matrices in self.matrices(coefficients)))
 
     def solve_dominated(self, coefficients: ArrayLike, by: NDArray[np.bool_]) -> SolvedBlocks:
         """Of each block the states with the largest shares in some of the functions (functions,), as many as these; or all."""
@@ -108,14 +98,6 @@ class LinearBlocks:
         flat[self._position] = np.asarray(coefficients, dtype=float) @ self.values
         return [flat[stack.place].reshape(-1, stack.size, stack.size) for stack in self.stacks]
 
-    @cached_property
-    def by_block(self) -> dict[int, slice]:
-        """Where the elements of each block stand: they are sorted by block."""
-        blocks = self.block[self.rows]
-        numbers, starts = np.unique(blocks, return_index=True)
-        stops = np.append(starts[1:], len(blocks))
-        return {int(n): slice(int(a), int(b)) for n, a, b in zip(numbers, starts, stops, strict=True)}
-
 
 @dataclass(frozen=True, eq=False)
 class SolvedBlocks:
@@ -136,24 +118,6 @@ class SolvedBlocks:
         """The rows of a block's functions, and its eigenvectors in columns."""
         stack, place = self._places[block]
         return self.linear.stacks[stack].functions[place], self.states[stack][1][place]
-
-    def slopes(self, levels: Ints) -> Floats:
-        """∂E/∂c (levels, terms) of the levels at these rows."""
-        linear = self.linear
-        slopes = np.zeros((len(levels), len(linear.names)))
-        blocks = linear.block[levels]
-        for block in np.unique(blocks).tolist():
-            chosen = np.flatnonzero(blocks == block)
-            _, vectors = self.vectors(block)
-            vectors = vectors[:, linear.rank[levels[chosen]]]
-            entries = linear.by_block.get(block)
-            if entries is None:
-                continue
-            rows, columns = linear.rank[linear.rows[entries]], linear.rank[linear.columns[entries]]
-            density = vectors[rows].conj() * vectors[columns]
-            density[rows != columns] *= 2
-            slopes[chosen] = (linear.values[:, entries] @ density).real.T
-        return slopes
 
     def slopes_of(self, elements: Elements, levels: Ints) -> Floats:
         """⟨ψ|O|ψ⟩ (levels, operators) of the levels at these rows, of Hermitian operators between the functions of these blocks."""
@@ -185,10 +149,10 @@ class SolvedBlocks:
         }
 
 
-def linear_blocks(functions: Functions, terms: Mapping[str, Operator]) -> LinearBlocks:
+def linear_blocks(functions: Basis, terms: Mapping[str, Operator]) -> LinearBlocks:
     """H_b(c) = Σ_i c_i O_i,b of named operators over a basis.
 
-    >>> from rotor.quantum.basis.labelled import Basis, rotation_labels
+    >>> from rotor.quantum.basis.labelled import rotation_labels
     >>> from rotor.quantum.operators.rotation import j_x, j_y, j_z
     >>> top = linear_blocks(Basis(rotation_labels(1)), {"A": j_z(2), "B": j_x() @ j_x(), "C": j_y() @ j_y()})
     >>> top.energies([10.0, 6.0, 4.0]).round(9).tolist()  # 0, and B + C, A + C, A + B
@@ -218,7 +182,7 @@ def blocks_of_elements(
     LinearBlocks
     """
     count = elements.count
-    part = connected_parts(count, elements.rows, elements.columns)
+    part = part_numbers(count, elements.rows, elements.columns)
     present = np.ones(count, dtype=bool) if needed is None else np.isin(part, part[needed])
     order = np.flatnonzero(present)
     keys = [np.asarray(column)[order] for column in labels.values()]
@@ -245,12 +209,3 @@ def blocks_of_elements(
         tuple(names), {name: np.asarray(column) for name, column in labels.items()}, rows, columns, values, block, rank,
         tuple(stacks), position,
     )  # fmt: skip
-
-
-def connected_parts(count: int, rows: Ints, columns: Ints) -> Ints:
-    """The number of the connected part of each of `count` functions that elements connect."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

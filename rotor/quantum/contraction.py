@@ -14,7 +14,7 @@ again, so that fits, fields and further spins need nothing else.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, product
 from typing import Any, NamedTuple
@@ -23,15 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import Elements, merged
-from rotor.quantum.basis.phases import with_real_phases
-from rotor.quantum.blocks import Functions, LinearBlocks, SolvedBlocks, blocks_of_elements, connected_parts
+from rotor.quantum.basis.elements import Elements
+from rotor.quantum.blocks import LinearBlocks, SolvedBlocks
+from rotor.quantum.connected import connected_parts
 from rotor.quantum.one_to_one import one_to_one
-from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.solvers.hermitian import eigenstates
-from rotor.quantum.wigner import nine_j, six_j, three_j
-
-NEGLIGIBLE = 1e-12  # of the largest element of an operator between two sectors: round-off of zero
+from rotor.quantum.spins.coupling import reduced_spin
+from rotor.quantum.wigner import nine_j, six_j
 
 Pair = tuple[int, int]  # row and column of sectors
 
@@ -99,31 +97,24 @@ class Space:
         }
 
 
-def contracted(solved: SolvedBlocks, functions: Functions, tensors: Mapping[str, tuple[int, Operator]]) -> Space:
-    """The eigenfunctions of linear blocks as a space.
+def contracted_elements(
+    solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]], retained: Mapping[int, Ints] | None = None
+) -> Space:
+    """The eigenfunctions of linear blocks of one J each as a space, one sector for each block, in the order of their numbers.
 
     Parameters
     ----------
     solved : SolvedBlocks
-        Blocks of one J each, over functions with a label J.
-    functions : Functions
-        The functions of the blocks.
-    tensors : mapping of str to (int, Operator)
-        Rank and operator of each tensor; the operator gives reduced elements.
+        Over functions with a label J.
+    tensors : mapping of str to (int, Elements)
+        Rank and reduced elements of each tensor.
+    retained : mapping of int to (n,) array, optional
+        By block the ranks of the states to take; all by default.
 
     Returns
     -------
     Space
-        One sector for each block, in the order of their numbers.
     """
-    elements = {name: (rank, functions.elements([operator])) for name, (rank, operator) in tensors.items()}
-    return contracted_elements(solved, elements)
-
-
-def contracted_elements(
-    solved: SolvedBlocks, tensors: Mapping[str, tuple[int, Elements]], retained: Mapping[int, Ints] | None = None
-) -> Space:
-    """The same, of reduced elements that are written already; retained: by block the ranks of the states to take, all by default."""
     linear = solved.linear
     present = [
         int(n) for n in np.unique(linear.block) if n >= 0 and (retained is None or len(retained.get(int(n), ())))
@@ -169,27 +160,15 @@ def _between_blocks(
     return blocks
 
 
-def spin_space(twice_i: int, name: str = "") -> Space:
-    """A spin: one state, with the tensors "I" + name and, for I ≥ 1, "Q" + name = [I × I]² / 2I(2I-1) (see `spin_quadrupole`).
+def spin_space(twice_i: int) -> Space:
+    """A spin: one state, with the tensors "I" and, for I ≥ 1, "Q" = [I × I]² / 2I(2I-1), see `reduced_spin`.
 
     >>> round(float(spin_space(2).tensors["I"].blocks[0, 0][0, 0] ** 2), 9)  # I(I+1)(2I+1)
     6.0
     """
-    i = twice_i / 2
-    tensors = {"I" + name: Tensor(1, {(0, 0): np.full((1, 1), np.sqrt(i * (i + 1) * (2 * i + 1)))})}
-    if twice_i > 1:
-        tensors["Q" + name] = Tensor(2, {(0, 0): np.full((1, 1), spin_quadrupole(twice_i))})
+    ranks = {"I": 1, "Q": 2} if twice_i > 1 else {"I": 1}
+    tensors = {k: Tensor(rank, {(0, 0): np.full((1, 1), reduced_spin(twice_i, rank))}) for k, rank in ranks.items()}
     return Space((Sector(twice_i, np.zeros(1)),), tensors)
-
-
-def spin_quadrupole(twice_i: int) -> float:
-    """⟨I‖T²(I, I)‖I⟩/(2I(2I-1)), so that T²(χ)·T²(I, I)/(2I(2I-1)) = I·χ·I/(2I(2I-1)), the quadrupole coupling.
-
-    T²_0(I, I) = (3 I_z² - I²)/√6 in the state M = I, over the 3j symbol of eq. 5.4.1.
-    """
-    i = twice_i / 2
-    stretched = float(three_j(i, 2, i, -i, 0, i))
-    return float((3 * i * i - i * (i + 1)) / np.sqrt(6) / stretched / (2 * i * (2 * i - 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,41 +183,12 @@ class CoupledSpace:
     terms: Mapping[str, Mapping[Pair, Entry]]
     tensors: Mapping[str, tuple[int, Mapping[Pair, Entry]]]
 
-    def linear(self) -> LinearBlocks:
-        """Linear blocks of the energies before coupling ("energy") and of the coupled terms."""
-        space = Space(self.sectors, {})
-        start, count = space.starts(), len(space)
-        diagonal = np.arange(count)
-        energies = np.concatenate([sector.energies for sector in self.sectors])
-        names = ["energy", *self.terms]
-        pieces = [(diagonal, diagonal, 0, energies)]
-        for i, entries in enumerate(self.terms.values(), 1):
-            for (a, b), entry in entries.items():
-                matrix = entry.matrix()
-                r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(matrix).max(initial=0.0))
-                pieces.append((start[a] + r, start[b] + c, i, matrix[r, c]))
-                if a != b:
-                    pieces.append((start[b] + c, start[a] + r, i, matrix[r, c].conj()))
-        return blocks_of_elements(
-            names, space.labels(), with_real_phases(flat_elements(count, len(names), pieces)).elements
-        )
-
-    def solve(self, coefficients: Mapping[str, float], lowest: int | None = None) -> Space:
+    def solve(self, coefficients: Mapping[str, float]) -> Space:
         """The space of eigenfunctions of the energies plus Σ c_i (A_i·B_i)."""
-        parts = _connected_sectors(len(self.sectors), self.terms)
-        states, where = _solved_parts(self, parts, coefficients, lowest)
+        parts = connected_parts(len(self.sectors), (pair for entries in self.terms.values() for pair in entries))
+        states, where = _solved_parts(self, parts, coefficients)
         tensors = {name: Tensor(rank, _moved(entries, states, where)) for name, (rank, entries) in self.tensors.items()}
         return Space(tuple(sector for sector, _ in states), tensors)
-
-
-def flat_elements(count: int, terms: int, pieces: Iterable[tuple[Ints, Ints, int, NDArray[Any]]]) -> Elements:
-    """Elements of pieces (rows, columns, number of the term, values)."""
-    rows, columns, term, values = zip(*pieces, strict=True)
-    number = np.repeat(term, [len(piece) for piece in rows])
-    joined = np.concatenate(values)
-    table = np.zeros((terms, len(joined)), dtype=joined.dtype)
-    table[number, np.arange(len(joined))] = joined
-    return merged(count, np.concatenate(rows), np.concatenate(columns), table)
 
 
 def coupled(
@@ -247,7 +197,6 @@ def coupled(
     scalars: Mapping[str, tuple[str, str]],
     carried: Mapping[str, tuple[str | None, str | None, int]],
     totals: Sequence[int],
-    allowed: Callable[[Sector, Sector], bool] = lambda a, b: True,
 ) -> CoupledSpace:
     """The product of two spaces, coupled to the doubled total angular momenta `totals`.
 
@@ -261,8 +210,6 @@ def coupled(
         Tensors [A × B]^k of the product for later use: A, B (None: the unit operator) and k.
     totals : sequence of int
         Twice the total angular momenta.
-    allowed : callable, optional
-        Whether the product of two sectors exists: the statistics of like nuclei.
 
     Returns
     -------
@@ -271,8 +218,6 @@ def coupled(
     sectors: list[Sector] = []
     rows: dict[Pair, dict[int, int]] = {}
     for (i, a), (j, b) in product(enumerate(first.sectors), enumerate(second.sectors)):
-        if not allowed(a, b):
-            continue
         rows[i, j] = {}
         for total in totals:
             if (
@@ -356,17 +301,8 @@ def _product(
     }
 
 
-def _connected_sectors(count: int, terms: Mapping[str, Mapping[Pair, Entry]]) -> list[list[int]]:
-    """Sectors that the terms connect."""
-    pairs = np.array([pair for entries in terms.values() for pair in entries], dtype=np.int64).reshape(-1, 2)
-    members: dict[int, list[int]] = defaultdict(list)
-    for sector, part in enumerate(connected_parts(count, pairs[:, 0], pairs[:, 1]).tolist()):
-        members[part].append(sector)
-    return list(members.values())
-
-
 def _solved_parts(
-    space: CoupledSpace, parts: Sequence[Sequence[int]], coefficients: Mapping[str, float], lowest: int | None
+    space: CoupledSpace, parts: Sequence[Sequence[int]], coefficients: Mapping[str, float]
 ) -> tuple[list[tuple[Sector, NDArray[Any]]], dict[int, tuple[int, slice]]]:
     """Sectors of eigenfunctions with their vectors, and (part, rows) of each sector of the product."""
     where: dict[int, tuple[int, slice]] = {}
@@ -389,7 +325,7 @@ def _solved_parts(
         by_size[len(matrix), np.iscomplexobj(matrix)].append(number)
     solved: dict[int, tuple[Sector, NDArray[Any]]] = {}
     for numbers in by_size.values():
-        energies, vectors = eigenstates(np.stack([matrices[number] for number in numbers]), lowest)
+        energies, vectors = eigenstates(np.stack([matrices[number] for number in numbers]))
         for number, e, v in zip(numbers, energies, vectors, strict=True):
             labels = {"sectors": tuple(parts[number]), "functions": _named_functions(space, parts[number], v)}
             solved[number] = Sector(space.sectors[parts[number][0]].twice_j, e, labels), v

@@ -8,19 +8,16 @@ one, so that the sum of all these overlaps is largest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.wang.basis import WangBlock, names_of
-
-if TYPE_CHECKING:
-    pass
 
 NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
 
@@ -53,25 +50,6 @@ class CoupledBlock:
     labels: Ints
     mixing: Floats
     start: int = 0
-
-
-def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """The connected parts of the graph, by their lowest members, each in rising order."""
-    above = list(range(count))
-
-    def root(i: int) -> int:
-        while above[i] != i:
-            above[i] = above[above[i]]
-            i = above[i]
-        return i
-
-    for i, k in edges:
-        low, high = sorted((root(i), root(k)))
-        above[high] = low
-    members: dict[int, list[int]] = {}
-    for i in range(count):
-        members.setdefault(root(i), []).append(i)
-    return list(members.values())
 
 
 def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:

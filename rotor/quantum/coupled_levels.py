@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
-from rotor.quantum.coupled import CoupledBlock, connected_parts, names_of_states, parts_of
+from rotor.quantum.connected import connected_parts
+from rotor.quantum.coupled import CoupledBlock, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.levels import Levels, weights_by_state
 from rotor.quantum.states import Coupling, OperatorOfJ, State

@@ -17,7 +17,6 @@ since (F' K F; M 0 -M) = (-1)^(F' + F + K) (F' K F; -M 0 M) and the elements of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -43,34 +42,3 @@ def _factors(twice_up: int, twice_low: int, rank: int, q: int) -> Floats:
     m = np.arange(-twice_low, twice_low + 1, 2) / 2
     j_up, j_low = (twice // 2 if twice % 2 == 0 else twice / 2 for twice in (twice_up, twice_low))
     return np.asarray(coupling(j_low, j_up, rank, q, m) / np.sqrt((twice_up + 1.0) * (twice_low + 1)))
-
-
-def coloured_components(
-    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]
-) -> list[tuple[list[int], list[int], bool]]:
-    """Connected components of a graph with a colour 0 or 1 for each node, and whether all edges agree with the colours.
-
-    An edge (a, b, 1) asks for different colours, (a, b, 0) for the same one.
-
-    >>> coloured_components([0, 1, 2], [(0, 1, 1)])
-    [([0, 1], [0, 1], True), ([2], [0], True)]
-    """
-    beside: dict[int, list[tuple[int, int]]] = {node: [] for node in nodes}
-    for a, b, odd in edges:
-        beside[a].append((b, odd))
-        beside[b].append((a, odd))
-    colour: dict[int, int] = {}
-    out = []
-    for start in nodes:
-        if start in colour:
-            continue
-        colour[start], component, agree = 0, [start], True
-        for node in component:  # grows while it is walked
-            for other, odd in beside[node]:
-                if other not in colour:
-                    colour[other] = (colour[node] + odd) % 2
-                    component.append(other)
-                agree = agree and colour[other] == (colour[node] + odd) % 2
-        members = sorted(component)
-        out.append((members, [colour[node] for node in members], agree))
-    return out

@@ -13,7 +13,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
-from rotor.quantum.coupled import connected_parts, names_of_functions, names_of_states, parts_of
+from rotor.quantum.connected import connected_parts
+from rotor.quantum.coupled import names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks

@@ -88,12 +88,6 @@ class SolvedBlock:
     vectors: Floats
     start: int
 
-    @property
-    def jz_squared(self) -> Floats:
-        """⟨Jz²⟩ of every state, (n,): how prolate (or oblate) it is along the z of the representation."""
-        k = self.basis.k
-        return np.asarray((self.vectors**2).T @ (k * k).astype(float))
-
 
 @dataclass(frozen=True, eq=False)
 class Levels(Table):

@@ -10,7 +10,7 @@ with three x and three y, or three x and four y. Factorials come from a table of
 exponents of two. The terms over the first one are added in floating point for whole arrays; where they cancel by more
 than `CANCELLATION`, the sum is made once more, exactly, in Python's integers. So every symbol is right to some 1e-15 of
 itself, and what is zero is zero. With one small number among j1, j2, j3 there are few terms, and any J is fast; three
-large J go to the integers one by one (about 20 ms at J = 1000), or with `three_j_over_m` all m at once.
+large J go to the integers one by one (about 20 ms at J = 1000).
 
 Arguments are the quantum numbers themselves (2.5 for 5/2), scalars or arrays that broadcast. A symbol that breaks a
 triangle rule, or |m| ≤ j, or m1 + m2 + m3 = 0, is 0.
@@ -30,8 +30,6 @@ from rotor.arrays import Floats, Ints
 Scaled = tuple[Floats, Ints]  # mantissas and exponents of 2
 
 CANCELLATION = 32.0  # Σ|term| / |Σ term| above which the sum is made in integers
-_HUGE = 1e200
-_FEW_TERMS = 20  # twice the j below which the sum is short
 
 
 # The symbols
@@ -125,63 +123,6 @@ def nine_j(rows: ArrayLike) -> Floats:
         term = six_j(a, d, g, h, i, x) * six_j(b, e, h, d, x, f) * six_j(c, f, i, x, a, b)
         total += (-1) ** doubled * (doubled + 1) * term
     return np.asarray(total)
-
-
-def three_j_over_m(j1: float, j2: float, j3: float, m1: float) -> tuple[Floats, Floats]:
-    """All 3j symbols (j1 j2 j3; m1 m2 -m1-m2) of one m1.
-
-    Parameters
-    ----------
-    j1, j2, j3 : float
-        Angular momenta, integers or half-integers.
-    m1 : float
-        Projection of the first.
-
-    Returns
-    -------
-    m2 : (n,) array
-        Rising.
-    symbols : (n,) array
-        Zeros where the triangle rule is broken. Errors are some 1e-12 of the largest symbol at J = 1000; values below
-        1e-308 are 0.
-
-    Raises
-    ------
-    ValueError
-        For a negative j, and for an m1 larger than j1 or not like it (integer or half-integer).
-
-    Notes
-    -----
-    As a function of m2 they are the eigenvector of (J2 + J3)² with the eigenvalue j1(j1+1),
-
-        c(m2-1) x(m2-1) + [j2(j2+1) + j3(j3+1) - j1(j1+1) + 2 m2 m3] x(m2) + c(m2) x(m2+1) = 0,
-        c(m2)² = (j2-m2)(j2+m2+1)(j3+m3)(j3-m3+1),     Σ x² = 1/(2 j1+1),     sign (-1)^(j2-j3-m1) at the last m2
-
-    Like the recursions of K. Schulten and R. G. Gordon, J. Math. Phys. 16, 1961 (1975), it is run from both ends to the
-    middle, where both directions are stable. Where one j is small, `three_j` is used, because the eigenvalues are close
-    to each other then, in units of the matrix.
-
-    Examples
-    --------
-    >>> m2, symbols = three_j_over_m(2, 1, 1, 0)
-    >>> m2.tolist(), (symbols**2 * 30).round(9).tolist()
-    ([-1.0, 0.0, 1.0], [1.0, 4.0, 1.0])
-    """
-    a, b, c, m = (int(value) for value in _doubled(j1, j2, j3, m1))
-    if min(a, b, c) < 0 or abs(m) > a or (a + m) % 2:
-        raise ValueError(f"j1 = {j1}, j2 = {j2}, j3 = {j3}, m1 = {m1}: j are 0 or more, |m1| at most j1 and like it")
-    first, last = max(-b, -c - m), min(b, c - m)
-    doubled = np.arange(first, last + 1, 2)
-    if not (abs(a - b) <= c <= a + b and (a + b + c) % 2 == 0):
-        return doubled / 2, np.zeros(len(doubled))
-
-    other = -m - doubled
-    if min(a, b, c) < _FEW_TERMS:
-        return doubled / 2, three_j(a / 2, b / 2, c / 2, m / 2, doubled / 2, other / 2)
-    diagonal = (b * (b + 2) + c * (c + 2) - a * (a + 2) + 2 * doubled * other) / 4
-    beside = np.sqrt((b - doubled) * (b + doubled + 2.0) * (c + other) * (c - other + 2.0))[:-1] / 4
-    found = _null_vector(diagonal, beside)
-    return doubled / 2, (-1) ** ((b - c - m) // 2) * found / np.sqrt(a + 1)
 
 
 # Arguments
@@ -311,42 +252,3 @@ def _exact_sum_of_ratios(falling: list[int], rising: list[int], growing: bool, t
         n, d = down * d + up * n, down * d
     shift = n.bit_length() - d.bit_length()
     return (n / (d << shift) if shift >= 0 else (n << -shift) / d), shift
-
-
-# The recursion over m
-
-
-def _null_vector(diagonal: Floats, beside: Floats) -> Floats:
-    """The vector of length 1 that a tridiagonal matrix takes to zero, its last component positive."""
-    size = len(diagonal)
-    if size == 1:
-        return np.ones(1)
-    reach = np.zeros(size)
-    reach[:-1] += beside
-    reach[1:] += beside
-    oscillating = np.flatnonzero(np.abs(diagonal) <= reach)
-    middle = int(oscillating[len(oscillating) // 2]) if len(oscillating) else int(np.argmin(np.abs(diagonal) - reach))
-    middle = min(middle, size - 2)
-
-    left = _recursion(diagonal, beside, middle + 2)
-    right = _recursion(diagonal[::-1], beside[::-1], size - middle)[::-1]
-    left /= np.abs(left).max()
-    right /= np.abs(right).max()
-    ratio = float(left[-2:] @ right[:2]) / float(left[-2:] @ left[-2:])
-    whole = np.concatenate([ratio * left[:-2], right])
-    return np.asarray(whole / np.linalg.norm(whole))
-
-
-def _recursion(diagonal: Floats, beside: Floats, count: int) -> Floats:
-    """The first `count` (2 or more) components up to a positive factor, the first being positive."""
-    d, c = diagonal.tolist(), beside.tolist()
-    out = np.zeros(count)
-    out[0], out[1] = 1.0, -d[0] / c[0]
-    before, here = 1.0, out[1]
-    for i in range(1, count - 1):
-        before, here = here, -(d[i] * here + c[i - 1] * before) / c[i]
-        out[i + 1] = here
-        if abs(here) > _HUGE:
-            out[: i + 2] /= _HUGE
-            before, here = before / _HUGE, here / _HUGE
-    return out

@@ -80,22 +80,6 @@ class Basis:
         return key
 
 
-def product(*factors: Mapping[str, Ints]) -> dict[str, Ints]:
-    """Labels of the products of functions of several factors, the last factor running fastest.
-
-    >>> {name: column.tolist() for name, column in product({"a": np.array([0, 1])}, {"b": np.array([5, 6])}).items()}
-    {'a': [0, 0, 1, 1], 'b': [5, 6, 5, 6]}
-    """
-    labels: dict[str, Ints] = {}
-    count = 1
-    for factor in factors:
-        size = len(next(iter(factor.values())))
-        labels = {name: np.repeat(column, size) for name, column in labels.items()}
-        labels |= {name: np.tile(np.asarray(column), count) for name, column in factor.items()}
-        count *= size
-    return labels
-
-
 def rotation_labels(jmax: int, jmin: int = 0) -> dict[str, Ints]:
     """J and K of all |J K⟩ with J from `jmin` to `jmax`, K rising."""
     every_j = np.arange(jmin, jmax + 1)

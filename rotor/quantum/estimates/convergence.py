@@ -205,7 +205,7 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
 
     There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
-    ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
+    ⟨Jz²⟩ itself is not the measure, since it falls by a little near the separatrix of a
     rigid top, where labels are in perfect order.
     """
     out: list[tuple[int, str]] = []

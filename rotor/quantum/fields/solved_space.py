@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.quantum.connected import coloured_components, connected_parts
 from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements, axial_k
-from rotor.quantum.in_field import coloured_components, space_factor
+from rotor.quantum.in_field import space_factor
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.reduced import twice_total
 from rotor.quantum.solve import solve_levels
@@ -243,8 +244,8 @@ def solved_space(
     if not set(BEFORE_J) & set(free.quanta):
         return space
     family = np.zeros(len(free), dtype=np.int64)
-    edges = [(up, low, 0) for one in operators for up, lows in space.below(one).items() for low, _ in lows]
-    for number, (members, _, _) in enumerate(coloured_components(range(len(sectors)), edges)):
+    edges = [(up, low) for one in operators for up, lows in space.below(one).items() for low, _ in lows]
+    for number, members in enumerate(connected_parts(len(sectors), edges)):
         for i in members:
             family[sectors[i].rows] = number
     return replace(space, levels=replace(free, family=family))

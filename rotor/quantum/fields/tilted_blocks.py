@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.connected import connected_parts
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.fields.solved_space import solved_levels
-from rotor.quantum.in_field import coloured_components
 from rotor.quantum.reduced import twice_total
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang.basis import WangBlock, wang_blocks
@@ -116,12 +116,10 @@ class TiltedSpace(FieldSpace):
         nodes = [(i, k) for i, j in enumerate(self._j) for k in range(len(self._of_m[j]))]
         number = {pair: n for n, pair in enumerate(nodes)}
         edges = [
-            (number[up], number[low], 0)
-            for contraction in self.contractions
-            for up, low in self._connected(contraction)
+            (number[up], number[low]) for contraction in self.contractions for up, low in self._connected(contraction)
         ]
-        components = coloured_components(range(len(nodes)), edges)
-        return [self._block(n, [nodes[i] for i in members]) for n, (members, _, _) in enumerate(components)]
+        parts = connected_parts(len(nodes), edges)
+        return [self._block(n, [nodes[i] for i in members]) for n, members in enumerate(parts)]
 
     def _block(self, number: int, members: list[tuple[int, int]]) -> TiltedBlock:
         rows, abs_m = [], []

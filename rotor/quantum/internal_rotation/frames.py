@@ -12,7 +12,7 @@ The axes of the RAM have z along ρ; for ρ in the plane ab, at the angle θ = a
 
     A_RAM = A cos²θ + B sin²θ,    B_RAM = A sin²θ + B cos²θ,    D_ab = -½ (A - B) sin 2θ,    C_RAM = C,
 
-an exact rotation: A_RAM stands beside F (p - ρPz)². Published A that contain Fρ² (IAM, A_eff = A + Fρ²) are converted by `without_rho`.
+an exact rotation: A_RAM stands beside F (p - ρPz)². Published A may contain Fρ² (IAM, A_eff = A + Fρ²).
 """
 
 from __future__ import annotations
@@ -67,55 +67,3 @@ def rho_axis(constants: ArrayLike, f0: float, cosines: ArrayLike) -> RhoAxis:
 def axis_of_angles(delta: float, epsilon: float = 0.0) -> Floats:
     """Cosines of a top's axis to a, b, c from XIAM's angles δ (from a) and ε (about a, from b), in radians."""
     return np.array([np.cos(delta), np.sin(delta) * np.cos(epsilon), np.sin(delta) * np.sin(epsilon)])
-
-
-def ram_of_pam(constants: ArrayLike, top: RhoAxis) -> dict[str, float]:
-    """A, B, C, Dab, Dbc, Dac, F and rho of the rho-axis frame from A, B, C of the principal axes.
-
-    Parameters
-    ----------
-    constants : (3,) array
-        A, B, C, in any unit.
-    top : RhoAxis
-        F in the same unit, and ρ.
-
-    Returns
-    -------
-    dict of str to float
-        In this unit; those of D that vanish by symmetry are left out.
-
-    Examples
-    --------
-    >>> ram = ram_of_pam([3.0, 2.0, 1.0], RhoAxis(5.0, np.array([0.3, 0.3, 0.0])))
-    >>> {name: round(value, 6) for name, value in ram.items()}
-    {'A': 2.5, 'B': 2.5, 'C': 1.0, 'F': 5.0, 'rho': 0.424264, 'Dab': -0.5}
-    """
-    axes = top.axes
-    tensor = axes @ np.diag(np.asarray(constants, dtype=float)) @ axes.T
-    found = {"A": tensor[0, 0], "B": tensor[1, 1], "C": tensor[2, 2], "F": top.f, "rho": top.rho}
-    scale = 1e-14 * float(np.abs(tensor).max())
-    mixed = {"Dab": tensor[0, 1], "Dbc": tensor[1, 2], "Dac": tensor[0, 2]}
-    return {name: float(value) for name, value in (found | {n: v for n, v in mixed.items() if abs(v) > scale}).items()}
-
-
-def pam_of_ram(ram: dict[str, float]) -> tuple[Floats, RhoAxis]:
-    """A, B, C of the principal axes, and F with ρ along them, from constants of the rho-axis frame: the inverse of `ram_of_pam`.
-
-    >>> constants, top = pam_of_ram({"A": 2.5, "B": 2.5, "C": 1.0, "F": 5.0, "rho": 0.424264, "Dab": -0.5})
-    >>> constants.round(9).tolist(), np.abs(top.rho_abc).round(6).tolist()
-    ([3.0, 2.0, 1.0], [0.3, 0.3, 0.0])
-    """
-    a, b, c = ram["A"], ram["B"], ram["C"]
-    ab, bc, ac = (ram.get(name, 0.0) for name in ("Dab", "Dbc", "Dac"))
-    values, vectors = np.linalg.eigh(np.array([[a, ab, ac], [ab, b, bc], [ac, bc, c]]))
-    order = [2, 1, 0]
-    return values[order], RhoAxis(ram["F"], ram["rho"] * vectors[0, order])
-
-
-def without_rho(effective: float, f: float, rho: float) -> float:
-    """A beside F (p - ρPz)² from an A that contains Fρ² (H = A_eff Pz² - 2Fρ p Pz + F p²).
-
-    >>> without_rho(10.0, 5.0, 0.2)
-    9.8
-    """
-    return effective - f * rho**2

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
@@ -101,8 +100,3 @@ UNIT = diagonal(lambda labels: 1.0)
 def half_anticommutator(a: Operator, b: Operator) -> Operator:
     """½(ab + ba), Hermitian where a and b are."""
     return 0.5 * (a @ b + b @ a)
-
-
-def ket_bra(new: int, old: int, label: str = "v") -> Operator:
-    """|new⟩⟨old| of one label, such as the number of a vibrational state."""
-    return shift(lambda labels: np.asarray(labels[label] == old, dtype=float), **{label: new - old})

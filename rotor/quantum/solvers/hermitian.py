@@ -4,7 +4,6 @@
 |---|---|
 | size 1 | the element itself |
 | small matrices, many of them | one stacked call |
-| large, and only the lowest few states needed | LAPACK's relatively robust representations, for these states alone |
 | large, banded, energies alone | LAPACK's banded reduction |
 | other | LAPACK's divide and conquer |
 """
@@ -18,37 +17,16 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 
-FEW = 0.34  # share of the states up to which computing these alone is faster
-LARGE = 100  # size from which it is
+LARGE = 100  # size from which shapes are looked at
 NARROW = 15  # bandwidths in a size from which a banded solver is faster
 
 
-def eigenstates(matrices: NDArray[Any], lowest: int | None = None) -> tuple[Floats, NDArray[Any]]:
-    """Energies (blocks, n), rising, and eigenvectors (blocks, size, n) in columns.
-
-    Parameters
-    ----------
-    matrices : (blocks, size, size) array
-        Hermitian; the lower triangles are read.
-    lowest : int, optional
-        How many of the lowest states of each matrix; all by default.
-
-    Returns
-    -------
-    energies, vectors : arrays
-        Of n = min(size, lowest) states.
-    """
-    size = matrices.shape[1]
-    count = size if lowest is None else min(size, lowest)
-    if size == 1:
+def eigenstates(matrices: NDArray[Any]) -> tuple[Floats, NDArray[Any]]:
+    """Energies (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, of the lower triangles."""
+    if matrices.shape[1] == 1:
         return matrices[:, 0].real.copy(), np.ones_like(matrices)
-    if size < LARGE or count > FEW * size:
-        energies, vectors = np.linalg.eigh(matrices)
-        return energies[:, :count], vectors[:, :, :count]
-    from scipy.linalg import eigh
-
-    solved = [eigh(matrix, subset_by_index=(0, count - 1), driver="evr", check_finite=False) for matrix in matrices]
-    return np.stack([energies for energies, _ in solved]), np.stack([vectors for _, vectors in solved])
+    energies, vectors = np.linalg.eigh(matrices)
+    return energies, vectors
 
 
 def eigenvalues(matrices: NDArray[Any]) -> Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from rotor.quantum.coupled import connected_parts
+from rotor.quantum.connected import connected_parts
 from rotor.quantum.spins.contraction import Contracted, acting_numbers
 from rotor.quantum.spins.rotor import Channel
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.connected import part_numbers
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_of
 from rotor.quantum.spins.contraction import stacks_of
@@ -228,15 +229,10 @@ def _coupling(plan: Plan, channel: Channel, every: Ints) -> Floats:
 
 def _connected(matrix: Floats, sub_block: Ints) -> list[Ints]:
     """The functions of each part of the matrix that is connected, sub-blocks as a whole."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     scale = float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
     i, k = np.nonzero(np.abs(matrix) > _ZERO * scale)
     count = int(sub_block.max()) + 1
-    graph = coo_array((np.ones(len(i)), (sub_block[i], sub_block[k])), shape=(count, count))
-    _, component = connected_components(graph, directed=False)
-    of_function = component[sub_block]
+    of_function = part_numbers(count, sub_block[i], sub_block[k])[sub_block]
     return [np.flatnonzero(of_function == one) for one in np.unique(of_function)]
 
 

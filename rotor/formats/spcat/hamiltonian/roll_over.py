@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.connected import connected_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -85,7 +86,9 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
     if diag == 0:
         apart = _rolled_over(groups, k, hamiltonian.diagonal())
         linked[apart, :] = linked[:, apart] = False
-    parts = _components(linked)
+    parts = np.empty(len(k), dtype=np.int64)
+    for number, members in enumerate(connected_parts(len(k), np.argwhere(linked).tolist())):
+        parts[members] = number
     return np.asarray(np.unique(np.column_stack([groups, parts]), axis=0, return_inverse=True)[1].reshape(-1))
 
 
@@ -106,14 +109,3 @@ def _rolled_over(groups: Ints, k: Ints, diagonal: Floats) -> NDArray[np.bool_]:
         if len(falls):
             apart[members[first + falls[0] + 1 :]] = True
     return apart
-
-
-def _components(linked: NDArray[np.bool_]) -> Ints:
-    """The lowest function that each function is connected with, over any number of steps."""
-    parts = np.arange(len(linked))
-    linked = linked | linked.T | np.eye(len(linked), dtype=bool)
-    while True:
-        lowest = np.where(linked, parts[None, :], len(parts)).min(axis=1)
-        if (lowest == parts).all():
-            return parts
-        parts = lowest
