@@ -4,6 +4,10 @@ T_B = C (1 - e^-τ), τ = τ0 exp(-4 ln 2 x²), x = (ν - ν0)/Δν. With u = τ
 √(8 ln 2/e) C τ0 for any depth (at one standard deviation of a thin line), and at most √(8 ln 2/e) C (1 + √ln τ0) of a thick line, where
 |x| = √(ln(τ0/u)/4 ln 2) and u e^-u is below 1/e. A frequency that is off by δ makes an error of so much times δ/Δν, and no more than the
 whole line. A line that is left out adds C τ at most, and T_B is off by at most the relative error of Q.
+
+Couplings of spins that are left out shift no line, to first order: they split it about its centre of gravity, and it loses a part f of its
+depth at the centre, of the brightness C (e^-τ(1-f) - e^-τ). f follows from the components of the line for quadrupole coupling
+(`rotor.quantum.estimates.splittings.depth_lost`); of the others, of size δ, it is 1 - exp(-4 ln 2 (δ/Δν)²) at most.
 """
 
 from __future__ import annotations
@@ -11,13 +15,15 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor import units
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
-from rotor.quantum.estimates.limits import every_limit, populated_j
+from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, every_limit, populated_j
+from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission import KM_PER_S, contrast_k
 from rotor.spectra.emitters import CatalogueLines
@@ -25,6 +31,9 @@ from rotor.spectra.emitters import CatalogueLines
 if TYPE_CHECKING:
     from rotor.quantum.estimates.beyond import Limit
 
+SPLITTING = frozenset(
+    {QUADRUPOLE, "spin-rotation", "spin-spin", ELECTRON_SPIN}
+)  # which split lines about their centre of gravity
 STEEPEST = math.sqrt(8 * math.log(2) / math.e)
 
 
@@ -41,16 +50,13 @@ def brightness_budget(answer: Any) -> ErrorBudget:
     """The errors of T_B in K at the brightest line; those of the background alone where there is no line."""
     request, peak = answer.request, answer.peak
     number = 0 if peak is None else int(answer.lines.molecule[peak.row])
-    molecule, source, lines = request.molecules[number], request.sources[number], answer.emitted[number]
+    source, lines = request.sources[number], answer.emitted[number]
     observed = np.mean(request.range_mhz) if peak is None else peak.observed_mhz
     opaque = source.filling * abs(float(contrast_k(observed, source)))
     brightness, depth = (0.0, 0.0) if peak is None else (abs(peak.brightness_k), peak.optical_depth)
     per_mhz = opaque * steepness(depth) / (float(observed) * source.fwhm_km_s / KM_PER_S)
     rounding_mhz = 2 * ROUNDING * units.MHZ_PER_K * float(lines.energy_upper_k.max(initial=0.0))
     left_out = math.fsum(one.left_out_depth for one in answer.emitted)
-    limits: Sequence[Limit] = ()
-    if not isinstance(molecule, CatalogueLines):
-        limits = every_limit(molecule, populated_j(molecule, source.excitation_k), lines.effects)
     return ErrorBudget(
         of="brightness",
         unit="K",
@@ -62,19 +68,65 @@ def brightness_budget(answer: Any) -> ErrorBudget:
             f"lines of an optical depth below {request.least_depth:g}, together {left_out:.1g} at the most, and Q",
             "a smaller least depth",
         ),
-        model=_model(limits, per_mhz, brightness, isinstance(molecule, CatalogueLines)),
+        model=_model(answer, number, per_mhz, opaque),
         data=ErrorTerm(None, "dipoles and conditions of the source have no stated uncertainty"),
         statistics=NO_SAMPLES,
     )
 
 
-def _model(limits: Sequence[Limit], per_mhz: float, brightness: float, catalogue: bool) -> ErrorTerm:
-    """What frequencies that are off make of T_B at the centre of the line."""
-    if catalogue:
+def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm:
+    """What frequencies that are off, and splittings that are left out, make of T_B at the centre of the brightest line."""
+    request, peak, lines = answer.request, answer.peak, answer.emitted[number]
+    top, source = request.molecules[number], request.sources[number]
+    if isinstance(top, CatalogueLines):
         return ErrorTerm(None, "a catalogue does not say what its lines leave out")
-    term = model_term(limits)
+    limits = every_limit(top, populated_j(top, source.excitation_k), lines.effects)
+    splittings = [one for one in limits if one.name in SPLITTING and one.size_mhz is not None]
+    shifts = model_term([one for one in limits if one not in splittings])
+    if peak is None or not splittings:
+        return _shifted(shifts, per_mhz, 0.0 if peak is None else abs(peak.brightness_k))
+    split = _split(answer, number, splittings, opaque)
+    if shifts.value is None:
+        known = len(splittings) == len(limits)
+        return split if known else replace(split, source=f"{split.source}; {shifts.source} not estimated")
+    shift = _shifted(shifts, per_mhz, abs(peak.brightness_k))
+    larger, smaller = sorted((shift, split), key=lambda term: -(term.value or 0.0))
+    whole = min((larger.value or 0.0) + (smaller.value or 0.0), abs(peak.brightness_k))
+    return ErrorTerm(whole, f"{larger.source}; {smaller.source}", larger.remedy)
+
+
+def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:
+    """Shifts in MHz as a change of T_B, no more than the whole line."""
     if term.value is None:
         return term
+    text = f"lines shifted by {term.value:.2g} MHz: {term.source}"
+    return ErrorTerm(min(term.value * per_mhz, brightness), text, term.remedy)
+
+
+def _split(answer: Any, number: int, splittings: Sequence[Limit], opaque: float) -> ErrorTerm:
+    """What splittings take from T_B at the centre of the brightest line."""
+    peak, width = answer.peak, answer.peak.observed_mhz * answer.request.sources[number].fwhm_km_s / KM_PER_S
+    left = 1.0
+    for one in splittings:
+        of_quadrupole = one.name == QUADRUPOLE
+        left *= 1 - _of_quadrupole(answer, number, width) if of_quadrupole else _gaussian((one.size_mhz or 0.0) / width)
+    names = ", ".join(one.name for one in splittings)
     return ErrorTerm(
-        min(term.value * per_mhz, brightness), f"lines shifted by {term.value:.2g} MHz: {term.source}", term.remedy
+        opaque * math.exp(-peak.optical_depth) * math.expm1(peak.optical_depth * (1 - left)),
+        f"{names}: {100 * (1 - left):.2g} % of the depth split off the centre of the line",
+        f"{splittings[0].name} in the calculation",
     )
+
+
+def _gaussian(x: float) -> float:
+    """Depth at x widths from the centre."""
+    return math.exp(-4 * math.log(2) * x**2)
+
+
+def _of_quadrupole(answer: Any, number: int, width_mhz: float) -> float:
+    """The part of the depth of the brightest line that quadrupole coupling takes from its centre."""
+    top, row, quanta = answer.request.molecules[number], answer.peak.row, answer.emitted[number].quanta
+    upper, lower = (text[row].split() for text in (answer.lines.upper, answer.lines.lower))
+    k = 0 if top.kind == "linear" else abs(int(lower[quanta.index("k")])) if "k" in quanta else None
+    j = quanta.index("n" if "n" in quanta else "j")
+    return depth_lost(splitting_nuclei(top), (int(upper[j]), int(lower[j])), k, width_mhz)

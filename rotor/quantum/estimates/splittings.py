@@ -10,15 +10,23 @@ gradient in covalent bonds of the element, `GRADIENTS`, in atomic units e/(4π �
 (C-D of DCOOH, O-D of HCOOD and CH3OD), O 0.8 (HCO⁺), N 0.6 to 1 (HOCN, ICN, HCONH2, NH3, CH3CN, HCN), Cl 3.9 (CH3Cl, CH2BrCl), Br 7
 to 12 (2-bromopropane, CH3CH2Br, CH3Br, CH2Br2, HOBr), I 12 to 17 (CH3I, CH2ICN, CF3I, ICN, IN3); tests/test_limits.py has them and
 where they were read. Other elements count with 1. In ionic molecules such as KCl the halogens have far less.
+
+A line between J' and J has components at E(J', F') - E(J, F), E = χ (3K²/J(J+1) - 1) Y of a linear (K = 0) or symmetric top, with the parts
+(2F'+1)(2F+1) {J' F' I; F J 1}² of its intensity. Their mean is that of the line without the coupling: the centre of gravity stays, and an
+unresolved line loses a part of its depth at the centre, `depth_lost`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.arrays import Floats
+from rotor.quantum.wigner import six_j
 from rotor.tops.isotopes.isotopic_spins import chi_tensor
 
 if TYPE_CHECKING:
@@ -61,6 +69,61 @@ def spread(twice_spin: int) -> float:
     """
     values = [casimir(twice_spin, 1, f) for f in range(abs(twice_spin - 2), twice_spin + 3, 2)]
     return max(values) - min(values)
+
+
+def line_components(twice_spin: int, j_upper: int, j_lower: int, k: int) -> tuple[Floats, Floats]:
+    """Shifts in units of χ, and parts of the intensity, of the components of a line of one K.
+
+    >>> shifts, parts = line_components(2, 1, 0, 0)
+    >>> shifts.round(3).tolist(), parts.round(3).tolist()
+    ([-0.5, 0.25, -0.05], [0.111, 0.333, 0.556])
+    """
+    upper, lower = (np.arange(abs(2 * j - twice_spin), 2 * j + twice_spin + 1, 2) for j in (j_upper, j_lower))
+    twice_f, twice_g = (part.ravel() for part in np.meshgrid(upper, lower, indexing="ij"))
+    allowed = (np.abs(twice_f - twice_g) <= 2) & (twice_f + twice_g >= 2)
+    twice_f, twice_g = twice_f[allowed], twice_g[allowed]
+    f, g, spin = twice_f / 2, twice_g / 2, twice_spin / 2
+    parts = (twice_f + 1) * (twice_g + 1) * six_j(j_upper, f, spin, g, j_lower, 1) ** 2
+    energies = [
+        np.array([_first_order(twice_spin, j, k, one) for one in numbers])
+        for j, numbers in ((j_upper, twice_f), (j_lower, twice_g))
+    ]
+    return energies[0] - energies[1], parts / parts.sum()
+
+
+def _first_order(twice_spin: int, j: int, k: int, twice_f: int) -> float:
+    """Energy of a level in units of χ."""
+    return (3 * k**2 / (j * (j + 1)) - 1) * casimir(twice_spin, j, twice_f) if j else 0.0
+
+
+def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | None, fwhm_mhz: float) -> float:
+    """The part of its depth that an unresolved line loses at its centre: 1 - Σ w exp(-4 ln 2 (δ/Δν)²), δ and w of the components.
+
+    Parameters
+    ----------
+    nuclei : sequence of Splitting
+        Each by itself.
+    numbers : (int, int)
+        J of the upper and of the lower level.
+    k : int or None
+        0 of a linear top; None: the mean over all K, as of an asymmetric top.
+    fwhm_mhz : float
+        Full width of the line at half maximum.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
+    left = 1.0
+    every = range(min(numbers) + 1) if k is None else (k,)
+    for one in nuclei:
+        kept = []
+        for number in every:
+            shifts, parts = line_components(round(2 * one.spin), *numbers, number)
+            kept.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
+        left *= sum(kept) / len(kept)
+    return 1.0 - left
 
 
 def splitting_nuclei(top: Top) -> list[Splitting]:
