@@ -46,6 +46,8 @@ def command(context: typer.Context, options: Options) -> None:
 
 
 def _show(scene: Scene, plan: Plan) -> None:
+    from rotor.requests.plan import larger_ones
+
     print(scene.title or f"a scene of the kind {scene.kind}")
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
@@ -55,8 +57,9 @@ def _show(scene: Scene, plan: Plan) -> None:
         ("seconds", f"{plan.seconds:.2g} of the processor, without start-up and compilation"),
         ("memory", f"{plan.memory_mb:.2g} MB at the most, in use at one time"),
     ]
-    facts += [("left out" if not number else "", _text(one)) for number, one in enumerate(plan.left_out)]
-    show_facts(facts)
+    larger, others = larger_ones(plan.left_out, lambda one: one.size, lambda one: one.name)
+    texts = [_text(one) for one in larger] + ([others] if others else [])
+    show_facts([*facts, *(("left out" if not number else "", text) for number, text in enumerate(texts))])
 
 
 def _text(one: LeftOut) -> str:

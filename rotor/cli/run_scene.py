@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
@@ -68,6 +68,7 @@ class Options:
         None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
     )
     retry_failed: bool = option(False, "--retry-failed", help="Of a sweep: run again the points that failed before.")
+    errors: bool = option(False, "--errors", help="Print the table of errors: each source with its size.")
     json: str | None = json_option()
 
 
@@ -87,6 +88,8 @@ def command(context: typer.Context, options: Options) -> None:
     for name, used in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
         if used and not swept:
             raise ValueError(f"{name}: this scene has no sweep")
+    if swept and options.errors:
+        raise ValueError("--errors: is of one scene; a sweep has the errors of each point in its files")
     refuse_outside(scene, options.out)
     files = Files()
     files.ask_json(options.json)
@@ -158,7 +161,20 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
         return
     content = _content(result, options, command)
     text = lambda: json_with_rows(result.table, "rows", content)  # noqa: E731
-    deliver(files, {}, text, lambda: _show(result))
+
+    def show() -> None:
+        """The report, and the table of errors."""
+        _show(result)
+        _show_errors(content, options)
+
+    deliver(files, {}, text, show)
+
+
+def _show_errors(content: Mapping[str, Any], options: Options) -> None:
+    if options.errors:
+        from rotor.reports.error_table import show_errors
+
+        show_errors(content)
 
 
 def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
@@ -180,6 +196,7 @@ def _deliver(result: SceneResult, options: Options, files: Files, command: str) 
         verb.show(result.answer, report)
         files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
         show_facts([("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)])
+        _show_errors(content, options)
 
     deliver(files, {}, lambda: verb.json(result.answer, content), show)
 

@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rotor.reports.screen import show_facts
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 KINDS = {
     "rounding": "bound", "truncation": "bound", "model": "size, within a factor of 3", "data": "one standard deviation",
     "statistics": "one standard deviation",
 }  # fmt: skip
+
+
+def show_errors(content: Mapping[str, Any]) -> None:
+    """Print the table of errors of an answer, where its content has a budget."""
+    if "errors" in content:
+        print()
+        print(f"errors of {content['errors']['of']}")
+        show_facts(error_rows(content["errors"]))
 
 
 def error_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:

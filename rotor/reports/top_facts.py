@@ -38,10 +38,6 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
     return {**begin(command, text), **top_facts(top)}
 
 
-MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
-SMALL = 0.1  # of the largest: effects below it are counted together
-
-
 def error_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """The line of the error budget, where the content has one."""
     if "errors" not in content:
@@ -57,18 +53,9 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*error_facts(content), *_effects_and_limits(content)]
 
 
-def _larger_limits(limits: Sequence[Mapping[str, Any]]) -> tuple[list[Mapping[str, Any]], str]:
-    """The limits to print, and a sentence that counts the others: smaller than a tenth of the largest, or beyond the fourth."""
-    sizes = [limit["size_mhz"] for limit in limits if limit["size_mhz"] is not None]
-    least = SMALL * max(sizes, default=0.0)
-    larger = [limit for limit in limits if limit["size_mhz"] is None or limit["size_mhz"] >= least]
-    shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
-    others = [limit["name"] for limit in limits if limit not in shown]
-    return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
-
-
 def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     from rotor.quantum.estimates.beyond import Limit
+    from rotor.requests.plan import larger_ones
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     sizes = (
@@ -77,7 +64,7 @@ def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     facts = [("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
-    larger, others = _larger_limits(content["limits"])
+    larger, others = larger_ones(content["limits"], lambda one: one["size_mhz"], lambda one: str(one["name"]))
     limits = [with_option(Limit(**limit).sentence, content["command"]) for limit in larger]
     limits += [others] if others else []
     unknown = (

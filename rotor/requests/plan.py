@@ -8,12 +8,15 @@ of what Python and NumPy have in use in the same short runs, and grows with what
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
+T = TypeVar("T")
+MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
+SMALL = 0.1  # of the largest: effects below it are counted together
 ENOUGH_SECONDS, LARGER = 0.05, 3  # of a call that is extrapolated; by how much its size grows until it takes so long
 
 
@@ -30,6 +33,19 @@ class LeftOut:
 def largest_first(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
     """By size; what is not estimated comes last."""
     return tuple(sorted(found, key=lambda one: (one.size is None, -(one.size or 0.0))))
+
+
+def larger_ones(items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str]) -> tuple[list[T], str]:
+    """The items of a report on what is left out, and a sentence that names the others: below a tenth of the largest, or beyond the fourth.
+
+    >>> larger_ones([5.0, 4.0, 0.1], lambda one: one, str)
+    ([5.0, 4.0], 'and smaller or not estimated: 0.1')
+    """
+    least = SMALL * max((known for one in items if (known := size(one)) is not None), default=0.0)
+    larger = [one for one in items if (known := size(one)) is None or known >= least]
+    shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
+    others = [name(one) for one in items if one not in shown]
+    return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
 
 
 @dataclass(frozen=True)

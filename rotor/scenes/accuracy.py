@@ -135,7 +135,8 @@ def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
             f"{name} {term.text(unit)}" + (f" ({term.remedy} would lower it)" if term.remedy else "")
             for name, term in unknown
         ]
-        raise ValueError(f"{requested} cannot be given: {'; '.join(texts)}; {alone}")
+        larger = filter(None, (budget.shortfall(accuracy), *texts))
+        raise ValueError(f"{requested} cannot be given: {'; '.join(larger)}; {alone}")
     total = budget.total
     if total is not None and total > accuracy:
         largest = budget.shortfall(accuracy) or budget.line()

@@ -12,7 +12,6 @@ from rotor.cli.shared.command import refuse_overwriting
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
 from rotor.reports.progress import elapsed_time
-from rotor.reports.screen import show_facts
 from rotor.requests.fill import Given
 from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
 
@@ -70,12 +69,10 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
     """The report of a verb, with the table of errors where it is requested."""
     verb.show(answer, report)
-    if getattr(report.shown, "errors", False) and "errors" in report.content:
-        from rotor.reports.error_table import error_rows
+    if getattr(report.shown, "errors", False):
+        from rotor.reports.error_table import show_errors
 
-        print()
-        print(f"errors of {report.content['errors']['of']}")
-        show_facts(error_rows(report.content["errors"]))
+        show_errors(report.content)
 
 
 def answer_of(verb: Verb, request: Any, work: Work) -> Any:
