@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
+from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
 from rotor.quantum.connected import coloured_components
 from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.operators import Contraction
@@ -194,8 +194,8 @@ def test_functions_of_an_axis_over_an_asymmetric_top(representation, axis):
     for m in (0, 2):
         for block in space.blocks(m):
             exact = block.matrix(square)
-            assert np.abs(of_asymmetric(block, axis, lambda x: x**2) - exact).max() < 1e-12  # round-off
-            absolute = of_asymmetric(block, axis)
+            assert np.abs(asymmetric_elements(block, axis, lambda x: x**2) - exact).max() < 1e-12  # round-off
+            absolute = asymmetric_elements(block, axis)
             low = block.j <= 2
             assert np.allclose(
                 (absolute @ absolute)[np.ix_(low, low)], exact[np.ix_(low, low)], atol=2e-3

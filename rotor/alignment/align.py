@@ -98,7 +98,7 @@ class AlignmentTrace(Table):
     @cached_property
     def permanent(self) -> dict[str, float]:
         """The mean over time of each cosine after the last pulse."""
-        return {name: one.constant for name, one in self.harmonics.items()}
+        return {name: harmonics_of_cosine.constant for name, harmonics_of_cosine in self.harmonics.items()}
 
     @property
     def moved(self) -> float:
@@ -197,13 +197,13 @@ def align(
     followed = tuple(observe.observable(name, top) for name in observables)
     windows = timeline(pulses)
     problem = Problem(top, pulses, windows, times, ensemble, followed, tolerance, contractions_of(top, windows))
-    given = jmax
-    jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if given is None else given
+    jmax_option = jmax
+    jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if jmax_option is None else jmax_option
     if jmax < ensemble.jmax + EDGE:
         raise ValueError(
             f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
         )
-    if given is None and jmax > HIGHEST_J:
+    if jmax_option is None and jmax > HIGHEST_J:
         raise ValueError(
             f"the pulses need J up to about {jmax}; states up to J = {HIGHEST_J} are propagated: lower the intensity, the duration or the "
             "temperature"
@@ -215,7 +215,7 @@ def align(
             if trace.edge_population <= tolerance:
                 return trace
             pilot = replace(pilot, edge=trace.edge_population)
-        if given is not None:
+        if jmax_option is not None:
             raise BasisTooSmallError(
                 f"J max {jmax} is too small for a tolerance of {tolerance:g}: the two highest J hold {pilot.edge:.2g} of the "
                 "population; give a higher J max, or none and it is chosen"
@@ -301,8 +301,8 @@ def _trace(
     for task, outcome in zip(tasks, outcomes, strict=True):
         np.add.at(populations, task.rows, outcome.populations)
     cosines, last = {}, {}
-    for place, one in enumerate(problem.observables):
-        cosines[one.name], last[one.name] = _signal(problem, energies, outcomes, place, before)
+    for place, observable in enumerate(problem.observables):
+        cosines[observable.name], last[observable.name] = _signal(problem, energies, outcomes, place, before)
     return AlignmentTrace(
         top=problem.top,
         pulses=problem.pulses,
@@ -335,14 +335,14 @@ def _signal(
     remainder = problem.ensemble.left_out * problem.observables[place].isotropic
     out = np.full(len(problem.times), np.nan)
     stretches = range(-1 if before else 0, len(problem.windows))
-    found = Harmonics(remainder, np.zeros(0, dtype=np.complex128), np.zeros(0))
+    harmonics = Harmonics(remainder, np.zeros(0, dtype=np.complex128), np.zeros(0))
     for index, after in enumerate(stretches):
-        found = observe.harmonics([outcome.free[index][place] for outcome in outcomes], energies, remainder)
+        harmonics = observe.harmonics([outcome.free[index][place] for outcome in outcomes], energies, remainder)
         here = problem.free_times(after)
         start = problem.windows[after].stop_ps if after >= 0 else problem.windows[0].start_ps
-        out[here] = found.at(problem.times[here] - start)
+        out[here] = harmonics.at(problem.times[here] - start)
     for index, window in enumerate(problem.windows):
         here = problem.times_in(window)
         if here.stop > here.start:
             out[here] = remainder + sum(outcome.samples[index][place] for outcome in outcomes)
-    return out, found
+    return out, harmonics

@@ -82,7 +82,7 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
     return out
 
 
-def of_asymmetric(block: SolvedFieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
+def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
     """⟨a|f(cosθ)|b⟩ over a block (n, n) of an asymmetric top, θ between the axis a (0), b (1) or c (2) and Z, f even.
 
     Raises ValueError where the block is not one of a field along Z that leaves real phases.
@@ -101,10 +101,10 @@ def of_asymmetric(block: SolvedFieldBlock, axis: int, function: EvenFunction = n
         start += solved.basis.size
     total = np.zeros((start, start), dtype=np.complex128)
     for k, rows in by_k.items():
-        j = np.unique([one[0] for one in rows])
+        j = np.unique([entry[0] for entry in rows])
         amplitudes = np.zeros((len(j), start), dtype=np.complex128)
-        for own, first, row in rows:
-            amplitudes[np.searchsorted(j, own), first : first + len(row)] = row
+        for degree, first, row in rows:
+            amplitudes[np.searchsorted(j, degree), first : first + len(row)] = row
         total += amplitudes.conj().T @ (_between_functions(j, k, int(block.m), function) @ amplitudes)
     if np.abs(total.imag).max() > ROUND_OFF * max(float(np.abs(total.real).max()), 1.0):
         raise ValueError("a function of an axis has complex elements: it is not even")

@@ -54,9 +54,11 @@ def least_jmax(trace: AlignmentTrace, allowed: float) -> tuple[int, float]:
     while reaches > misses + 1:
         tried = (misses + reaches) // 2
         signals, edge = _signals(problem, tried, pilot.plan)
-        found = max(edge, max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(signals, true, strict=True)))
-        if found <= allowed:
-            reaches, error = tried, found
+        largest_error = max(
+            edge, max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(signals, true, strict=True))
+        )
+        if largest_error <= allowed:
+            reaches, error = tried, largest_error
         else:
             misses = tried
     return reaches, error
@@ -91,7 +93,7 @@ def _signals(problem: Problem, jmax: int, plan: Plan) -> tuple[list[Floats], flo
     energies, share = RAD_PER_PS_MHZ * space.levels.energy_mhz, float(task.weights.sum())
     period = max(float(problem.times[-1]) - problem.windows[-1].stop_ps, 0.0)
     times = np.linspace(0.0, period, PILOT_TIMES)
-    after = [observe.harmonics([one], energies, 0.0).at(times) / share for one in outcome.free[-1]]
+    after = [observe.harmonics([free], energies, 0.0).at(times) / share for free in outcome.free[-1]]
     return [*after, *_within(outcome, share)], relative_edge(outcome, task)
 
 

@@ -47,7 +47,9 @@ class Problem:
     def space(self, jmax: int) -> FieldSpace:
         """The states up to J max and their blocks."""
         return field_space(
-            one_state(self.top, "alignment"), jmax, [one for of_window in self.contractions for one in of_window]
+            one_state(self.top, "alignment"),
+            jmax,
+            [contraction for of_window in self.contractions for contraction in of_window],
         )
 
     def m_values(self, space: FieldSpace) -> Sequence[int]:
@@ -146,9 +148,9 @@ def run(task: Task) -> Outcome:
     for window, passage, operators in zip(task.plan.windows, task.plan.passages, task.operators, strict=True):
         if window.start_ps > now:
             states = np.exp(-1j * task.energies * (window.start_ps - now))[:, None] * states
-        states, leaked, found = _through(task, window, passage, operators, states)
+        states, leaked, sample = _through(task, window, passage, operators, states)
         now = window.stop_ps
-        samples.append(found)
+        samples.append(sample)
         free.append(_all_coherences(task, states))
         edges.append(float(task.weights @ leaked))
     here = np.abs(states) ** 2
@@ -188,9 +190,9 @@ def _through(
 
 
 def _decomposed(task: Task, window: Window, matrix: NDArray[Any]) -> propagate.Decomposed:
-    found = propagate.decompose(matrix)
+    decomposed = propagate.decompose(matrix)
     gradient = task.gradients[task.plan.windows.index(window)] if task.gradients is not None else None
-    return found if gradient is None else replace(found, gradient=gradient.at(found.values))
+    return decomposed if gradient is None else replace(decomposed, gradient=gradient.at(decomposed.values))
 
 
 class _Snapshots(list[Complexes]):
@@ -203,7 +205,7 @@ class _Snapshots(list[Complexes]):
     def append(self, states: Complexes) -> None:
         """Of states (times, n, m) only the cosines stay."""
         self._made.append(
-            np.array([observe.expectation(states, self._task.weights, one) for one in self._task.cosines])
+            np.array([observe.expectation(states, self._task.weights, cosine) for cosine in self._task.cosines])
         )
 
     @property
@@ -239,18 +241,20 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
     if not len(columns):
         return None
     made: dict[int, NDArray[Any]] = {}
-    operators = tuple(tuple(_made(block, one, made) for one in of_window) for of_window in problem.contractions)
+    operators = tuple(
+        tuple(_made(block, contraction, made) for contraction in of_window) for of_window in problem.contractions
+    )
     return Task(
         energies=RAD_PER_PS_MHZ * block.energies_mhz,
         operators=operators,
-        cosines=tuple(one.matrix(block) for one in problem.observables),
+        cosines=tuple(observable.matrix(block) for observable in problem.observables),
         rows=block.rows,
         columns=columns,
         weights=population[columns],
         edge=block.j > block.levels.j.max() - EDGE,
         plan=plan,
         before=before,
-        gradients=tuple(_gradient(problem.top, one[0]) for one in problem.contractions)
+        gradients=tuple(_gradient(problem.top, per_window[0]) for per_window in problem.contractions)
         if isinstance(block, AxialBlock)
         else None,
     )

@@ -46,12 +46,12 @@ class Ensemble:
     def populations(self, levels: FreeLevels) -> Floats:
         """Population of one state |level, M⟩ of each level (n,), zero for what is left out."""
         if self.chosen is not None:
-            return self._of_one(levels)
+            return self._chosen_state(levels)
         kelvin = (levels.energy_mhz - self.ground_mhz) / units.MHZ_PER_K
         population = levels.weight * np.exp(-np.maximum(kelvin / self.temperature_k, -1.0)) / self.q
         return np.where((population >= self.least) & (levels.j <= self.jmax), population, 0.0)
 
-    def _of_one(self, levels: FreeLevels) -> Floats:
+    def _chosen_state(self, levels: FreeLevels) -> Floats:
         here = np.ones(len(levels), dtype=bool)
         for name, value in (self.chosen or {}).items():
             column = levels.j if name == "j" else np.abs(levels.quanta[name]) if name == "k" else levels.quanta[name]

@@ -26,12 +26,12 @@ LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried,
 
 def sweeps_of_align(request: Any) -> Sweeps:
     """J max of the basis, and the number of classical molecules."""
-    found = answer_align(replace(request, classical_molecules=0)).trace
-    shares = {round(share * found.jmax) for share in SHARES_OF_J} | {found.jmax - 1}
-    values = sorted(j for j in shares if j >= found.ensemble.jmax)
-    basis = tuple(Setting(str(j), j, j == found.jmax) for j in values)
-    beyond, measure = found.jmax + MORE_J, Measure("cosine", "", cosine_error)
-    knobs = [Sweep("numerics.jmax", (measure,), basis, beyond, f"J max {beyond}", partial(trace_with, found))]
+    trace = answer_align(replace(request, classical_molecules=0)).trace
+    shares = {round(share * trace.jmax) for share in SHARES_OF_J} | {trace.jmax - 1}
+    values = sorted(j for j in shares if j >= trace.ensemble.jmax)
+    basis = tuple(Setting(str(j), j, j == trace.jmax) for j in values)
+    beyond, measure = trace.jmax + MORE_J, Measure("cosine", "", cosine_error)
+    knobs = [Sweep("numerics.jmax", (measure,), basis, beyond, f"J max {beyond}", partial(trace_with, trace))]
     if request.classical_molecules:
         knobs.append(_classical(request))
     return Sweeps(tuple(knobs))
@@ -40,54 +40,54 @@ def sweeps_of_align(request: Any) -> Sweeps:
 def _classical(request: Any) -> Sweep:
     """The number of classical molecules, whose error is that of a mean."""
 
-    def error(found: Any, reference: Any) -> float:
-        return max(largest_difference(found.classical[name], true) for name, true in reference.classical.items())
+    def error(answer: Any, reference: Any) -> float:
+        return max(largest_difference(answer.classical[name], true) for name, true in reference.classical.items())
 
     coarse = replace(request, tolerance=max(request.tolerance, 1e-2))  # the quantum gas beside it does not matter here
-    own = request.classical_molecules
+    molecules = request.classical_molecules
     counts = ladder(
-        (own / 64, own / 16, own / 4),
-        own,
+        (molecules / 64, molecules / 16, molecules / 4),
+        molecules,
         lambda n: replace(coarse, classical_molecules=max(int(n), 2)),
         "{:.0f}".format,
     )
-    most = replace(coarse, classical_molecules=16 * own, seed=request.seed + 1)
+    most = replace(coarse, classical_molecules=16 * molecules, seed=request.seed + 1)
     measure = Measure("cosine of the classical gas", "", error)
     return Sweep(
-        "observables.classical_molecules", (measure,), counts, most, f"{16 * own} other molecules", answer_align
+        "observables.classical_molecules", (measure,), counts, most, f"{16 * molecules} other molecules", answer_align
     )
 
 
-def choose_basis(scene: Any, request: Any, asked: float) -> Choice:
+def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
     """The loosest tolerance of those tried whose error as it is found by a run is what was asked for, and then the smallest J max.
 
     A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """
     structure: Any = AlignRequest
     field = own_fields(structure)["tolerance"]
-    found: Choice = field.knob.choose(field, request, asked, answer_align)
+    choice: Choice = field.knob.choose(field, request, allowed, answer_align)
     for looser in LOOSER:
-        tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
+        tried = replace(request, tolerance=min(looser * allowed, LOOSEST_COSINE), classical_molecules=0)
         trace = answer_align(tried).trace
-        if trace.error_estimate > asked:
+        if trace.error_estimate > allowed:
             continue
         if request.jmax is not None:
             return Choice(replace(request, tolerance=tried.tolerance), f"tolerance {tried.tolerance:g}")
-        return _least_basis(request, tried.tolerance, trace, asked)
-    return found
+        return _least_basis(request, tried.tolerance, trace, allowed)
+    return choice
 
 
-def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Choice:
+def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> Choice:
     """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
-    first, truncation = least_jmax(trace, asked - truncation_apart(trace))
+    first, truncation = least_jmax(trace, allowed - truncation_apart(trace))
     for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
         smaller = replace(request, tolerance=tolerance, jmax=jmax)
         try:
-            found = answer_align(replace(smaller, classical_molecules=0)).trace
+            confirmed = answer_align(replace(smaller, classical_molecules=0)).trace
         except BasisTooSmallError:
             continue
-        error = truncation_apart(found) + max(found.edge_population, truncation)
-        if error <= asked:
+        error = truncation_apart(confirmed) + max(confirmed.edge_population, truncation)
+        if error <= allowed:
             return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
     return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
 
@@ -102,8 +102,8 @@ def plan_of_align(request: Any) -> Plan:
     method = f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree"
     return Plan(
         kind="align",
-        effects=(*described["effects"], *(f"pulse on the {one.acts_on}" for one in request.pulses)),
-        good=("M",) if all(one.axis == (0, 0, 1) for one in request.pulses) else (),
+        effects=(*described["effects"], *(f"pulse on the {pulse.acts_on}" for pulse in request.pulses)),
+        good=("M",) if all(pulse.axis == (0, 0, 1) for pulse in request.pulses) else (),
         parts=(("basis", f"J to {request.jmax}" if request.jmax else basis), ("method", method)),
         counts={"initial states": trace.states, "times": request.points},
         seconds=seconds,

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
+from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.blocks import FieldBlock
@@ -54,7 +54,7 @@ class Observable:
         if isinstance(block, AxialBlock):
             return absolute_cosine(block)
         if isinstance(block, SolvedFieldBlock):
-            return of_asymmetric(block, self.axis)
+            return asymmetric_elements(block, self.axis)
         raise ValueError(f"{self.name} is made for fields with the symmetry of Z; use cos2theta")
 
 
@@ -185,13 +185,19 @@ def pattern(matrix: Any, rows: Ints) -> Pattern:
 def coherences(states: Complexes, weights: Floats, patterns: Sequence[Pattern]) -> tuple[Coherences, ...]:
     """Of states in columns (n, m) over the free states with weights (m,), for each observable."""
     weighted = states.conj() * weights
-    few = len(states) * 8 > sum(len(one.i) for one in patterns)
+    few = len(states) * 8 > sum(len(pattern.i) for pattern in patterns)
     density = None if few else weighted @ states.T  # Σ w c_i* c_j
     population = (weighted * states).real.sum(axis=1)
     out = []
-    for one in patterns:
-        pairs = density[one.i, one.j] if density is not None else (weighted[one.i] * states[one.j]).sum(axis=1)
-        out.append(Coherences(one.first, one.second, pairs * one.elements, float(population @ one.diagonal)))
+    for pattern in patterns:
+        pairs = (
+            density[pattern.i, pattern.j]
+            if density is not None
+            else (weighted[pattern.i] * states[pattern.j]).sum(axis=1)
+        )
+        out.append(
+            Coherences(pattern.first, pattern.second, pairs * pattern.elements, float(population @ pattern.diagonal))
+        )
     return tuple(out)
 
 
@@ -215,5 +221,5 @@ def expectation(states: Complexes, weights: Floats, matrix: Any) -> Floats:
     if isinstance(matrix, np.ndarray):
         moved = matrix @ states
     else:
-        moved = np.array([matrix @ one for one in states])
+        moved = np.array([matrix @ snapshot for snapshot in states])
     return np.asarray((states.conj() * moved).real.sum(axis=1) @ weights)

@@ -46,14 +46,14 @@ FIELD_REACH = 3.0  # of a field, not an intensity: exp(-4 ln2 · 9) = 1.5e-11
 _AXES = {"z": (0, 0, 1), "x": (1, 0, 0), "y": (0, 1, 0), "circular": (1, 1j, 0)}
 
 
-def read_axis(given: Any) -> Axis:
+def read_axis(axis_text: Any) -> Axis:
     """The unit vector of polarization that a word, or real and imaginary parts of its components, mean.
 
     >>> round(float(read_axis("circular")[0].real), 12) == round(2**-0.5, 12)
     True
     """
-    if isinstance(given, str):
-        word, _, ratio = given.strip().lower().partition(":")
+    if isinstance(axis_text, str):
+        word, _, ratio = axis_text.strip().lower().partition(":")
         if word in _AXES and not ratio:
             return polarization(_AXES[word])
         if word == "elliptical":
@@ -61,12 +61,12 @@ def read_axis(given: Any) -> Axis:
                 return elliptical(float(ratio))
             except ValueError:
                 pass
-        raise ValueError(f"{given!r}: expected z, x, y, circular, or elliptical:R with R of 0 or more")
-    if len(given) != 3 or any(len(parts) != 2 for parts in given):
-        raise ValueError(f"{given}: expected real and imaginary parts of three components")
-    x, y, z = (complex(*parts) for parts in given)
+        raise ValueError(f"{axis_text!r}: expected z, x, y, circular, or elliptical:R with R of 0 or more")
+    if len(axis_text) != 3 or any(len(parts) != 2 for parts in axis_text):
+        raise ValueError(f"{axis_text}: expected real and imaginary parts of three components")
+    x, y, z = (complex(*parts) for parts in axis_text)
     if abs(abs(x) ** 2 + abs(y) ** 2 + abs(z) ** 2 - 1.0) > 1e-12:
-        raise ValueError(f"{given}: expected a unit vector")
+        raise ValueError(f"{axis_text}: expected a unit vector")
     return x, y, z
 
 

@@ -63,11 +63,11 @@ class BlockObjects:
 
 
 def _operator(objects: BlockObjects, channel: Channel) -> Any:
-    return next(one for known, one in objects.interactions if _same(known, channel))
+    return next(operator for known, operator in objects.interactions if _same(known, channel))
 
 
-def _same(one: Channel, other: Channel) -> bool:
-    return one.acts_on == other.acts_on and bool(np.abs(one.space - other.space).max() < 1e-12)
+def _same(channel: Channel, other: Channel) -> bool:
+    return channel.acts_on == other.acts_on and bool(np.abs(channel.space - other.space).max() < 1e-12)
 
 
 def _coefficient(channel: Channel) -> Callable[[float], float]:
@@ -114,10 +114,10 @@ def block_objects(
 
     windows = timeline(pulses)
     channels: list[Channel] = []
-    for channel in (one for window in windows for one in window.channels):
+    for channel in (each for window in windows for each in window.channels):
         if not any(_same(known, channel) for known in channels):
             channels.append(channel)
-    contractions = [Contraction(acted_on(top, one.acts_on), one.space) for one in channels]
+    contractions = [Contraction(acted_on(top, each.acts_on), each.space) for each in channels]
     space = field_space(
         one_state(top, "alignment"), guessed_jmax(top, pulses, 0, 1e-10) if jmax is None else jmax, contractions
     )
@@ -132,7 +132,8 @@ def block_objects(
     return BlockObjects(
         free=qutip.qdiags(RAD_PER_PS_MHZ * chosen.energies_mhz, 0),
         interactions=tuple(
-            (channel, quantum_object(chosen.matrix(one))) for channel, one in zip(channels, contractions, strict=True)
+            (channel, quantum_object(chosen.matrix(contraction)))
+            for channel, contraction in zip(channels, contractions, strict=True)
         ),
         cosines={name: quantum_object(observable(name, top).matrix(chosen)) for name in cosines},
         j=chosen.j,
@@ -249,7 +250,7 @@ class LinearObjects:
         """Collapse operators √γ D^1_p0 for `qutip.mesolve`: γ is the rate at which collisions turn the axis."""
         if not (np.isfinite(rate_per_ps) and rate_per_ps >= 0):
             raise ValueError(f"rate {rate_per_ps} per ps: a finite number of 0 or more is expected")
-        return [np.sqrt(rate_per_ps) * one for one in self.turns]
+        return [np.sqrt(rate_per_ps) * turn for turn in self.turns]
 
 
 def linear_objects(top: Top, jmax: int) -> LinearObjects:

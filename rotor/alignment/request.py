@@ -41,7 +41,7 @@ FINEST_TOLERANCE = 1e-11
 def cosine_error(trace: AlignmentTrace, reference: AlignmentTrace) -> float:
     """The largest difference of a cosine."""
     pairs = [(trace.cosines[name], true) for name, true in reference.cosines.items()]
-    return max(float(np.max(np.abs(one - true), initial=0.0)) for one, true in pairs)
+    return max(float(np.max(np.abs(cosines - true), initial=0.0)) for cosines, true in pairs)
 
 
 TOLERANCE = Knob(

@@ -138,7 +138,7 @@ def _steps_of(plan: Plan) -> tuple[int, ...]:
 
 def _cost(plan: Plan) -> int:
     """Drifts or exponentials in all windows."""
-    return sum(0 if isinstance(one, float) else one.stages for one in plan.passages)
+    return sum(0 if isinstance(passage, float) else passage.stages for passage in plan.passages)
 
 
 def pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
@@ -149,7 +149,7 @@ def pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
     tasks = [task for block in space.blocks(m) if (task := task_of(problem, block, plan, before)) is not None]
     if not tasks:
         return None, False
-    task = max(tasks, key=lambda one: float(one.weights.sum()))
+    task = max(tasks, key=lambda task: float(task.weights.sum()))
     whole = len(tasks) == 1 and (len(problem.m_values(space)) == 1)
     if len(task.columns) > PILOT_COLUMNS:
         chosen = np.unique(np.linspace(0, len(task.columns) - 1, PILOT_COLUMNS).astype(int))

@@ -57,9 +57,9 @@ def channels_of(pulses: Sequence[Pulse]) -> tuple[Channel, ...]:
     out: list[Channel] = []
     for pulse in pulses:
         space = pulse.space_tensor
-        for place, one in enumerate(out):
-            if one.acts_on == pulse.acts_on and np.abs(one.space - space).max() <= SAME_AXIS:
-                out[place] = Channel(one.acts_on, one.space, (*one.pulses, pulse))
+        for place, channel in enumerate(out):
+            if channel.acts_on == pulse.acts_on and np.abs(channel.space - space).max() <= SAME_AXIS:
+                out[place] = Channel(channel.acts_on, channel.space, (*channel.pulses, pulse))
                 break
         else:
             out.append(Channel(pulse.acts_on, space, (pulse,)))
@@ -73,8 +73,8 @@ def timeline(pulses: Sequence[Pulse]) -> tuple[Window, ...]:
     >>> [window.start_ps for window in timeline([GaussianPulse(1e12, 1.0, 20.0), GaussianPulse(1e12, 1.0)])]
     [-3.5, 16.5]
     """
-    lasting = sorted((one for one in pulses if not isinstance(one, Kick)), key=lambda one: one.window_ps)
-    kicks = sorted((one for one in pulses if isinstance(one, Kick)), key=lambda one: one.time_ps)
+    lasting = sorted((pulse for pulse in pulses if not isinstance(pulse, Kick)), key=lambda pulse: pulse.window_ps)
+    kicks = sorted((pulse for pulse in pulses if isinstance(pulse, Kick)), key=lambda pulse: pulse.time_ps)
     merged: list[list[Pulse]] = []
     end = -np.inf
     for pulse in lasting:
@@ -87,17 +87,17 @@ def timeline(pulses: Sequence[Pulse]) -> tuple[Window, ...]:
 
     windows = [piece for group in merged for piece in _cut(group, [kick.time_ps for kick in kicks])]
     windows += [Window(kick.time_ps, kick.time_ps, channels_of([kick])) for kick in kicks]
-    return tuple(sorted(windows, key=lambda one: (one.start_ps, one.stop_ps)))
+    return tuple(sorted(windows, key=lambda window: (window.start_ps, window.stop_ps)))
 
 
 def _cut(group: Sequence[Pulse], kicks: Sequence[float]) -> list[Window]:
     """One window of pulses that overlap, cut at the kicks inside it."""
-    start, stop = min(one.window_ps[0] for one in group), max(one.window_ps[1] for one in group)
-    edges = {time for one in group for time in (*one.window_ps, *one.breaks_ps)}
+    start, stop = min(pulse.window_ps[0] for pulse in group), max(pulse.window_ps[1] for pulse in group)
+    edges = {time for pulse in group for time in (*pulse.window_ps, *pulse.breaks_ps)}
     times = [start, *sorted({time for time in kicks if start < time < stop}), stop]
     out = []
     for first, last in itertools.pairwise(times):
-        here = [one for one in group if one.window_ps[0] < last and one.window_ps[1] > first]
+        here = [pulse for pulse in group if pulse.window_ps[0] < last and pulse.window_ps[1] > first]
         breaks = tuple(sorted(time for time in edges if first < time < last))
         out.append(Window(first, last, channels_of(here), breaks))
     return out

@@ -100,18 +100,18 @@ def strongest_lines(
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         constants[:3] = tops[t]
-        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
-        height = np.empty(found)
-        for n in range(found):
+        line_count = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
+        height = np.empty(line_count)
+        for n in range(line_count):
             height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_K * temperatures[t])
         for q in range(4):
             taken = np.empty(count)
             at = 0
             if q == MIXED:
-                of_type = np.arange(found)
-                height += log_dipoles[t][kind[row[:found]]]
+                of_type = np.arange(line_count)
+                height += log_dipoles[t][kind[row[:line_count]]]
             else:
-                of_type = np.flatnonzero(kind[row[:found]] == q)
+                of_type = np.flatnonzero(kind[row[:line_count]] == q)
             for n in of_type[np.argsort(-height[of_type])]:
                 near = False
                 for m in range(at):
@@ -211,7 +211,7 @@ def sweep(
     `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : points of κ between two looks for a crossing.
     out (m, 5) : hits, misses, A, B, C
     """
-    n, points, found, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
+    n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
     linear = _linear(difference, jj)
     mean_a, mean_b, inverse, third_a, third_b = linear
     rises, falls = bool((inverse > 0).all()), bool((inverse < 0).all())
@@ -249,12 +249,12 @@ def sweep(
                         continue
                     reach = min(max(tolerance, softness * top_b) * fifths, 255.0)
                     hits, misses = _hits(companion_jj, companions, i, w, s, d, near, low, high, per_mhz, reach)
-                    if hits >= need and hits >= misses and found < len(out):
-                        out[found, 0], out[found, 1] = hits, misses
-                        out[found, 2], out[found, 3], out[found, 4] = s + d, top_b, s - d
-                        found += 1
+                    if hits >= need and hits >= misses and roots < len(out):
+                        out[roots, 0], out[roots, 1] = hits, misses
+                        out[roots, 2], out[roots, 3], out[roots, 4] = s + d, top_b, s - d
+                        roots += 1
                 before, at = third, k
-    return found
+    return roots
 
 
 @njit(cache=True, nogil=True)
@@ -378,9 +378,9 @@ def quick_ratios(
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         constants[:3] = tops[t]
-        found = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
+        count = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
         mixed = kinds[t] == MIXED
-        of_type = np.arange(found) if mixed else np.flatnonzero(kind[row[:found]] == kinds[t])
+        of_type = np.arange(count) if mixed else np.flatnonzero(kind[row[:count]] == kinds[t])
         if len(of_type) == 0:
             continue
         strength_at, below = np.log(s_nu[of_type]), energy[lower[row[of_type]]] / MHZ_PER_K

@@ -163,10 +163,10 @@ class AssignAnswer(TextOf):
         size = len(peaks)
         species, calculated = np.zeros(size, dtype=np.int64), np.full(size, np.nan)
         upper, lower = np.full((size, 3), -1), np.full((size, 3), -1)
-        for number, one in reversed(list(enumerate(self.species, 1))):
-            fit = one.refined.fit
+        for number, member in reversed(list(enumerate(self.species, 1))):
+            fit = member.refined.fit
             for side in (1, 0):
-                at = one.peak[:, side]
+                at = member.peak[:, side]
                 species[at], calculated[at] = number, fit.blended_mhz
                 upper[at], lower[at] = fit.lines.upper, fit.lines.lower
         return AssignedPeaks(
@@ -178,14 +178,14 @@ class AssignAnswer(TextOf):
         """How far the frequencies of the first species can be trusted, given that its assignment is right."""
         from rotor.fitting.budgets import predictions_budget
 
-        of = "frequencies of the first species"
+        quantity = "frequencies of the first species"
         if not self.species:
             unknown = ErrorTerm(None, "no species was found")
-            return ErrorBudget(of, "MHz", *(unknown,) * 5)
+            return ErrorBudget(quantity, "MHz", *(unknown,) * 5)
         first = self.species[0]
         budget = predictions_budget(first.refined.fit)
         right = f"{budget.model.source}; the assignment is right with a probability of {first.probability:.4f}"
-        return replace(budget, of=of, model=replace(budget.model, source=right))
+        return replace(budget, of=quantity, model=replace(budget.model, source=right))
 
     def facts(self) -> dict[str, Any]:
         """Everything but the table of peaks."""
@@ -197,5 +197,5 @@ class AssignAnswer(TextOf):
             "spurs": int(self.spurs.sum()),
             "unexplained": int(self.unexplained.sum()),
             "ended_by_time": self.ended,
-            "species": [one.facts() for one in self.species],
+            "species": [species.facts() for species in self.species],
         }

@@ -170,26 +170,26 @@ def _grown(
 ) -> Grown | None:
     """Rounds of matching and refitting until no line is added."""
     temperature, last, before = start.temperature_k, -1, -1
-    found: Grown | None = None
+    grown: Grown | None = None
     for turn in range(rounds):
         if turn == 1 or (turn and turn % 3 == 0):
             temperature = best_temperature(field, constants, covariance, sigma0)
         chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else CHANCE_OF_FEW
-        matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
+        matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
         while chance < CHANCE_OF_FEW and (matched is None or len(np.unique(matched.peak)) < FEW):
             chance = min(3 * chance, CHANCE_OF_FEW)
-            matched = _matched(field, constants, covariance, temperature, sigma0, chance, found)
+            matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
         if matched is None or len(matched.peak) < 5:
             return None
-        constants, covariance, sigma0, found = _refitted(field, constants, prior, temperature, matched, sigma0, start)
+        constants, covariance, sigma0, grown = _refitted(field, constants, prior, temperature, matched, sigma0, start)
         if not (constants[0] > constants[1] > constants[2] > 0):
             return None
-        if turn > 7 and turn % 3 == 2 and found.lines <= before:
+        if turn > 7 and turn % 3 == 2 and grown.lines <= before:
             break
         if turn % 3 == 2:
-            before = found.lines
-        last = found.lines
-    return None if found is None else with_evidence(field, found)
+            before = grown.lines
+        last = grown.lines
+    return None if grown is None else with_evidence(field, grown)
 
 
 @dataclass(frozen=True, eq=False)

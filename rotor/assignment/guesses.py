@@ -10,13 +10,13 @@ PREFIX = "SMILES:"
 WORST = 0.03  # median relative error of the constants of a geometry up to which it is a guess
 
 
-def guess_values(given: Any) -> tuple[float, ...]:
+def guess_values(guess: Any) -> tuple[float, ...]:
     """A, B, C (MHz) of a guess, of several behind each other: numbers, or `SMILES:...` with the constants of its conformers."""
-    if isinstance(given, str) and given.startswith(PREFIX):
-        return constants_of_smiles(given.removeprefix(PREFIX))
-    values = Numbers("MHz", (), "2458,490,409").read(given)
+    if isinstance(guess, str) and guess.startswith(PREFIX):
+        return constants_of_smiles(guess.removeprefix(PREFIX))
+    values = Numbers("MHz", (), "2458,490,409").read(guess)
     if len(values) % 3:
-        raise ValueError(f"{given!r}: expected three numbers for each guess, such as 2458,490,409, or SMILES:...")
+        raise ValueError(f"{guess!r}: expected three numbers for each guess, such as 2458,490,409, or SMILES:...")
     return values
 
 
@@ -29,15 +29,15 @@ def constants_of_smiles(text: str) -> tuple[float, ...]:
     from rotor.tops.top import Top
 
     values = list[float]()
-    for one in conformers(text):
-        if one.energy_kj_per_mol > NEAR_KJ_PER_MOL:
+    for conformer in conformers(text):
+        if conformer.energy_kj_per_mol > NEAR_KJ_PER_MOL:
             continue
-        if one.molecule.uncertainty is None or one.molecule.uncertainty > WORST:
+        if conformer.molecule.uncertainty is None or conformer.molecule.uncertainty > WORST:
             raise ValueError(
                 f"{PREFIX}{text}: the force field knows the geometry of this molecule to no better than "
-                f"{one.molecule.uncertainty or 1:.0%}, and a guess is to be right within 3 %; give A, B, C as numbers"
+                f"{conformer.molecule.uncertainty or 1:.0%}, and a guess is to be right within 3 %; give A, B, C as numbers"
             )
-        top = Top.from_molecule(one.molecule)
+        top = Top.from_molecule(conformer.molecule)
         if top.kind != "asymmetric":
             raise ValueError(f"{PREFIX}{text}: its top is {top.kind}; only asymmetric tops can be looked for")
         values += [float(top.constants[name]) for name in "ABC"]

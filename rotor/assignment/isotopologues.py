@@ -53,21 +53,21 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
     Raises ValueError where the geometry's constants are more than a fifth away from those of the parent.
     """
     top = Top.from_molecule(molecule)
-    own = np.array([top.constants[name] for name in "ABC"]) if top.kind == "asymmetric" else np.zeros(3)
-    if not own.all() or np.abs(own / parent[:3] - 1).max() > 0.2:
+    computed = np.array([top.constants[name] for name in "ABC"]) if top.kind == "asymmetric" else np.zeros(3)
+    if not computed.all() or np.abs(computed / parent[:3] - 1).max() > 0.2:
         raise ValueError(
-            f"molecule: A, B, C of its geometry are {', '.join(f'{x:.1f}' for x in own)} MHz, those of the species "
+            f"molecule: A, B, C of its geometry are {', '.join(f'{x:.1f}' for x in computed)} MHz, those of the species "
             f"{', '.join(f'{x:.1f}' for x in parent[:3])} MHz; a geometry of this molecule is needed"
         )
     out = []
-    found = isotopologues(top, min_abundance=LEAST_ABUNDANCE)
-    for one in found[1:]:
-        if len(one.substituted) != 1:
+    abundant = isotopologues(top, min_abundance=LEAST_ABUNDANCE)
+    for isotopologue in abundant[1:]:
+        if len(isotopologue.substituted) != 1:
             continue
-        ratio = np.array([one.top.constants[name] for name in "ABC"]) / own
+        ratio = np.array([isotopologue.top.constants[name] for name in "ABC"]) / computed
         constants = parent[:3] * ratio
         errors = SHIFT_ERROR * np.abs(constants - parent[:3]) + constants**2 / ROTATIONAL_MHZ_U_ANGSTROM2 * MOMENT_ERROR
-        out.append(Expected(one.label, constants, errors, one.abundance / found[0].abundance))
+        out.append(Expected(isotopologue.label, constants, errors, isotopologue.abundance / abundant[0].abundance))
     return out
 
 
@@ -82,10 +82,10 @@ def find_isotopologues(
     from scipy.optimize import linear_sum_assignment
 
     species = list[Grown]()
-    for one in expected:
+    for isotopologue in expected:
         if over():
             break
-        for grown in candidates(peaks, parent, one, table):
+        for grown in candidates(peaks, parent, isotopologue, table):
             same = [
                 n for n, other in enumerate(species) if alike(grown.constants[:3], other.constants[:3], SAME_SPECIES)
             ]
@@ -95,25 +95,29 @@ def find_isotopologues(
                 species[same[0]] = grown
     if not species:
         return []
-    score = np.array([[_score(one, each, parent) for each in species] for one in expected])
+    score = np.array([[_score(isotopologue, each, parent) for each in species] for isotopologue in expected])
     pairs = [(expected[row], species[n], score[row, n]) for row, n in zip(*linear_sum_assignment(-score), strict=True)]
-    return [(one, grown) for one, grown, value in sorted(pairs, key=lambda pair: -pair[1].evidence) if value > ENOUGH]
+    return [
+        (isotopologue, grown)
+        for isotopologue, grown, value in sorted(pairs, key=lambda pair: -pair[1].evidence)
+        if value > ENOUGH
+    ]
 
 
-def _score(one: Expected, grown: Grown, parent: Grown) -> float:
+def _score(expected: Expected, grown: Grown, parent: Grown) -> float:
     """Evidence less half the squared deviation from the expected constants; 0 for a species that cannot be this isotopologue."""
-    off = (grown.constants[:3] - one.constants) / one.errors
-    if np.abs(off).max() > 4 or not _like(grown, parent.scales + np.log(one.abundance)):
+    off = (grown.constants[:3] - expected.constants) / expected.errors
+    if np.abs(off).max() > 4 or not _like(grown, parent.scales + np.log(expected.abundance)):
         return 0.0
     return float(grown.evidence - 0.5 * np.sum((off / TYPICAL) ** 2))
 
 
-def candidates(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable) -> list[Grown]:
+def candidates(peaks: PeakList, parent: Grown, expected: Expected, table: RigidTable) -> list[Grown]:
     """Species near the expected constants of an isotopologue that stand above chance."""
-    bounds = Bounds(one.constants - 3 * one.errors, one.constants + 3 * one.errors)
-    seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants, one.errors)
-    scales = parent.scales + np.log(one.abundance)
-    start = np.concatenate([one.constants, parent.constants[3:]])
+    bounds = Bounds(expected.constants - 3 * expected.errors, expected.constants + 3 * expected.errors)
+    seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants, expected.errors)
+    scales = parent.scales + np.log(expected.abundance)
+    start = np.concatenate([expected.constants, parent.constants[3:]])
     lines = merged_lines(seen, start, parent.temperature_k, scales)
     visible = np.argsort(-lines.height, kind="stable")[:MOST_LINES]
     visible = visible[lines.height[visible] > peaks.log_threshold - 0.5]
@@ -121,14 +125,14 @@ def candidates(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable)
         return []
     shifts = [
         (shift, three)
-        for three in _triples(lines.slope[:, :3] * one.errors, visible)
-        for shift in _shifts(peaks, lines, three, one)
+        for three in _triples(lines.slope[:, :3] * expected.errors, visible)
+        for shift in _shifts(peaks, lines, three, expected)
     ]
     ratios = np.array([_ratio(peaks, lines, visible, shift) for shift, _ in shifts])
-    found, tried = list[Grown](), list[Floats]()
+    grown, tried = list[Grown](), list[Floats]()
     for best in np.argsort(-ratios).tolist():
         shift, three = shifts[best]
-        constants = one.constants + shift
+        constants = expected.constants + shift
         if len(tried) >= GROWN or ratios[best] < LEAST_OF_SHIFT:
             break
         if any(alike(constants, other, SAME_SPECIES) for other in tried):
@@ -137,8 +141,8 @@ def candidates(peaks: PeakList, parent: Grown, one: Expected, table: RigidTable)
         family = Family(int(table.kind[lines.main[visible[0]]]), lines.main[three], lines.main[:0], 0.0)
         species = grow(seen, Candidate(constants, family, float(ratios[best]), parent.temperature_k))
         if species is not None and species.evidence > ENOUGH and _like(species, scales) and _within(species, bounds):
-            found.append(species)
-    return found
+            grown.append(species)
+    return grown
 
 
 def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
@@ -152,10 +156,10 @@ def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
     return [three for _, three in chosen[:TRIPLES]]
 
 
-def _shifts(peaks: PeakList, lines: Merged, three: Ints, one: Expected) -> list[Floats]:
+def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> list[Floats]:
     """Shifts of A, B, C that put three lines on peaks of their height."""
     slopes = lines.slope[three, :3]
-    reach = 3 * np.sqrt(((slopes * one.errors) ** 2).sum(axis=1)) + 0.05
+    reach = 3 * np.sqrt(((slopes * expected.errors) ** 2).sum(axis=1)) + 0.05
     near = []
     for n, line in enumerate(three.tolist()):
         first, last = np.searchsorted(peaks.frequency_mhz, lines.centre[line] + reach[n] * np.array([-1, 1]))
@@ -166,7 +170,7 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, one: Expected) -> list[
         return []
     moved = np.stack(np.meshgrid(*near, indexing="ij"), axis=-1).reshape(-1, 3)
     shift = np.linalg.solve(slopes, moved.T).T if abs(np.linalg.det(slopes)) > 1e-9 else np.zeros((0, 3))
-    return list(shift[(np.abs(shift) < 3 * one.errors).all(axis=1)])
+    return list(shift[(np.abs(shift) < 3 * expected.errors).all(axis=1)])
 
 
 def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:

@@ -207,8 +207,8 @@ class _Search:
     def __post_init__(self) -> None:
         self.left = ~self.of_clock
         self.table = rigid_table(JMAX)
-        for one in self.request.each_guess:
-            families_of(one)
+        for guess in self.request.each_guess:
+            families_of(guess)
         compiled(self.table)
         self.clock = Clock(self.request.seconds)
 
@@ -259,9 +259,11 @@ class _Search:
 
     def _rivals(self, peaks: PeakList, stages: Sequence[Stage]) -> list[Grown]:
         rivals = list[Grown]()
-        for one in self.request.each_guess:
-            seen = Field(peaks, self.table, one.root_bounds, one.temperatures)
-            rivals += [grown for grown in next_species(seen, families_of(one), stages, self.clock) if one.allows(grown)]
+        for guess in self.request.each_guess:
+            seen = Field(peaks, self.table, guess.root_bounds, guess.temperatures)
+            rivals += [
+                grown for grown in next_species(seen, families_of(guess), stages, self.clock) if guess.allows(grown)
+            ]
         rivals.sort(key=lambda grown: -grown.evidence)
         return rivals if rivals and word(probability(rivals[0])) != "not found" else []
 
@@ -289,14 +291,16 @@ class _Search:
         """Whether the peaks that are left may hold a stronger species: several strong ones are left, or the strongest of all."""
         if self._strong_left() >= MANY or not self.species:
             return True
-        high = np.sort(self.request.peaks.intensity[self.left])[-FEW_HIGH:] / max(one.strength for one in self.species)
+        high = np.sort(self.request.peaks.intensity[self.left])[-FEW_HIGH:] / max(
+            species.strength for species in self.species
+        )
         return bool(len(high) == FEW_HIGH and (high[0] > HIGH or high[-1] > 1.0))
 
     def isotopologues(self) -> None:
         """Isotopologues of the strongest species."""
         if not self.species or self.request.molecule is None:
             return
-        parent = max(self.species, key=lambda one: one.strength)
+        parent = max(self.species, key=lambda species: species.strength)
         constants = replace(parent.grown, constants=parent.refined.values)
         waiting = expected_isotopologues(parent.refined.values, self.request.molecule)
         for _ in range(ROUNDS_OF_ISOTOPOLOGUES):
@@ -305,14 +309,14 @@ class _Search:
                 break
             peaks = self.request.peaks.where(self.left)
             pairs = find_isotopologues(peaks, constants, waiting, self.table, self.clock.over)
-            for one, grown in pairs:
+            for isotopologue, grown in pairs:
                 if self.left[rows[grown.peak]].mean() > LEAST_LEFT:
-                    self._add(peaks, np.column_stack([rows, rows]), [grown], one.label)
-                    waiting.remove(one)
+                    self._add(peaks, np.column_stack([rows, rows]), [grown], isotopologue.label)
+                    waiting.remove(isotopologue)
             if not pairs:
                 break
 
     def answer(self) -> AssignAnswer:
         """Species by falling strength, isotopologues behind them."""
-        order = sorted(self.species, key=lambda one: (bool(one.isotopologue), -one.strength))
+        order = sorted(self.species, key=lambda species: (bool(species.isotopologue), -species.strength))
         return AssignAnswer(self.request, tuple(order), self.left, self.of_clock, self.clock.over())

@@ -99,13 +99,13 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     energies = table.reduced[points]
     out = np.empty((4000, 5))
     low, high = field.peaks.band_mhz
-    found = _kernels.sweep(
+    count = _kernels.sweep(
         np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa[points],
         energies[:, further] - energies[:, below], field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
         field.bounds.array, need, STRIDE, out,
     )  # fmt: skip
-    return out[:found]
+    return out[:count]
 
 
 def alike(constants: Floats, others: Floats, share: float) -> bool:
@@ -136,9 +136,9 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
 def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Floats]:
     """ln likelihood ratios of rigid tops (n, 3), each by lines of one type, and the best temperatures."""
     table, peaks = field.table, field.peaks
-    found: tuple[Floats, Floats] = _kernels.quick_ratios(
+    ratios: tuple[Floats, Floats] = _kernels.quick_ratios(
         table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
         field.temperatures, peaks.windows, ROUGH_MHZ, SOFTNESS, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
         peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ,
     )  # fmt: skip
-    return found
+    return ratios

@@ -92,7 +92,7 @@ def next_species(
                 candidates += ranked(seen, family, roots_of(seen, family, seeds, need), FAINT)[:PER_FAMILY]
             grown += _grown(seen, candidates, tried, PER_CHUNK)
             chunks += 1
-            best = max(grown, key=lambda one: one.evidence, default=None)
+            best = max(grown, key=lambda species: species.evidence, default=None)
             if best is not None and best.evidence > highest:
                 highest, last = best.evidence, chunks
             if best is None or highest < clear / 8:
@@ -112,7 +112,7 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
     if not best or best[0].evidence < 0:
         return best
     first = best[0]
-    near = [one for one in candidates if alike(one.constants, first.constants[:3], AROUND)]
+    near = [candidate for candidate in candidates if alike(candidate.constants, first.constants[:3], AROUND)]
     again = [
         regrown(seen, first),
         *_grown(seen, near, [], 2),
@@ -141,7 +141,7 @@ def compiled(table: RigidTable) -> bool:
 def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, float]], most: int) -> list[Grown]:
     """The best of the candidates grown, without those near to what was tried."""
     out = list[Grown]()
-    for candidate in sorted(candidates, key=lambda one: -one.ratio):
+    for candidate in sorted(candidates, key=lambda candidate: -candidate.ratio):
         if len(out) >= most:
             break
         if any(alike(candidate.constants, other, near) for other, near in tried):
@@ -158,9 +158,9 @@ def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, f
 def _best(grown: Sequence[Grown]) -> list[Grown]:
     """Each species once, by falling evidence."""
     out = list[Grown]()
-    for one in sorted(grown, key=lambda one: -one.evidence):
-        if not any(alike(one.constants[:3], other.constants[:3], 1e-4) for other in out):
-            out.append(one)
+    for species in sorted(grown, key=lambda species: -species.evidence):
+        if not any(alike(species.constants[:3], other.constants[:3], 1e-4) for other in out):
+            out.append(species)
     return out
 
 
@@ -190,7 +190,7 @@ def multiples(seen: Field, grown: Grown) -> list[Candidate]:
             family = _lowest_a_lines(seen, j)
             if family is not None:
                 out += ranked(narrow, family, roots_of(narrow, family, seeds, 0), FAINT)[:2]
-    return sorted(out, key=lambda one: -one.ratio)[:MOST_ALIASES]
+    return sorted(out, key=lambda candidate: -candidate.ratio)[:MOST_ALIASES]
 
 
 def shifts(seen: Field, grown: Grown) -> list[Candidate]:
@@ -220,7 +220,7 @@ def shifts(seen: Field, grown: Grown) -> list[Candidate]:
     slow = grown.rows[change[grown.rows] == 0][:2]
     out = list[Candidate]()
     for n in np.argsort(-ratios)[: 5 * MOST_ALIASES].tolist():
-        if ratios[n] > FAINT and not any(alike(tops[n], one.constants, NEAR) for one in out):
+        if ratios[n] > FAINT and not any(alike(tops[n], candidate.constants, NEAR) for candidate in out):
             family = Family(_kernels.MIXED, np.concatenate([which[n : n + 1], slow]), slow[:0], 0.0)
             out.append(Candidate(tops[n], family, float(ratios[n]), float(temperatures[n])))
     return out[:MOST_ALIASES]

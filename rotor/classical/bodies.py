@@ -50,8 +50,8 @@ def _wing_nut() -> Body:
 
 
 BODIES: dict[str, NamedBody] = {
-    one.name: one
-    for one in (
+    body.name: body
+    for body in (
         NamedBody(
             "book",
             box(0.8, [240 * _MM, 160 * _MM, 30 * _MM]),

@@ -108,9 +108,9 @@ class DrivenTable(Table):
     @cached_property
     def columns(self) -> dict[str, Floats]:
         """t, m1, m2, m3, qw, qx, qy, qz, energy, w1, w2, w3."""
-        one = self.motion
+        motion = self.motion
         names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy", "w1", "w2", "w3")
-        values = (one.times, *one.momentum.T, *continuous(one.attitude).T, one.energy, *one.omega.T)
+        values = (motion.times, *motion.momentum.T, *continuous(motion.attitude).T, motion.energy, *motion.omega.T)
         return dict(zip(names, values, strict=True))
 
 

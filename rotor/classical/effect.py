@@ -128,6 +128,6 @@ def named_effects() -> dict[str, type[ClassicalEffect]]:
 
 
 def _subclasses(base: type[ClassicalEffect]) -> Iterator[type[ClassicalEffect]]:
-    for one in base.__subclasses__():
-        yield one
-        yield from _subclasses(one)
+    for subclass in base.__subclasses__():
+        yield subclass
+        yield from _subclasses(subclass)

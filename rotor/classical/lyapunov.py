@@ -111,17 +111,17 @@ def body_flow(
     still = np.asarray(IDENTITY)
     timed = any(effect.depends_on_time for effect in effects)
 
-    def of_momentum(time: float, y: Floats) -> Floats:
+    def momentum_alone(time: float, y: Floats) -> Floats:
         return system.momentum_rate(time, y, np.broadcast_to(still, (len(y), 4)))
 
-    def of_both(time: float, y: Floats) -> Floats:
+    def momentum_and_attitude(time: float, y: Floats) -> Floats:
         momentum, attitude = y[:, :3], y[:, 3:]
         turning = attitude_rate(attitude, system.omega(time, momentum, attitude))
         return np.concatenate([system.momentum_rate(time, momentum, attitude), turning], axis=-1)
 
     if system.needs_attitude:
-        return Flow(of_both, np.concatenate([momentum0, normalised(attitude0)]), timed=timed)
-    return Flow(of_momentum, momentum0, timed=timed)
+        return Flow(momentum_and_attitude, np.concatenate([momentum0, normalised(attitude0)]), timed=timed)
+    return Flow(momentum_alone, momentum0, timed=timed)
 
 
 def lyapunov_exponents(
@@ -210,8 +210,8 @@ def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     quadratic = np.moveaxis(mixed, -1, 0)
     y = np.random.default_rng(0).normal(size=(16, d)) * (1.0 + np.max(np.abs(flow.start)))
     expected = flow.rate(0.0, y)
-    found = constant + y @ linear + np.einsum("ijk,nj,nk->ni", quadratic, y, y)
-    if np.max(np.abs(found - expected)) > 1e-12 * np.max(np.abs(expected)):
+    predicted = constant + y @ linear + np.einsum("ijk,nj,nk->ni", quadratic, y, y)
+    if np.max(np.abs(predicted - expected)) > 1e-12 * np.max(np.abs(expected)):
         return None
     return constant, np.ascontiguousarray(linear.T), np.ascontiguousarray(quadratic)
 

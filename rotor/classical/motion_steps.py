@@ -44,8 +44,8 @@ def is_compiled(request: DrivenRequest) -> bool:
 
 def some_steps(request: DrivenRequest) -> tuple[int, int]:
     """How many steps are timed first, and how many times as many after it."""
-    some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
-    return some, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
+    first_steps = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
+    return first_steps, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
 
 
 def steps_of(request: DrivenRequest, share: float) -> int:
@@ -84,9 +84,9 @@ def _fastest_rate(request: DrivenRequest) -> float:
 
 def expected_steps(request: DrivenRequest) -> int:
     """How many steps a motion will take: counted where they are few, else by its first part; see the head of this module."""
-    part, (some, more) = first_share(request), some_steps(request)
+    part, (first_steps, more) = first_share(request), some_steps(request)
     whole = steps_of(request, part)
-    if whole / part < some * more:
+    if whole / part < first_steps * more:
         return steps_of(request, 1.0)
     first = steps_of(request, part / 2)
     second = whole - first

@@ -25,10 +25,10 @@ DIVISIONS = (8, 16, 32, 64, 128)  # of the duration: steps of a splitting, times
 ORDERS = (2, 4, 6, 8)
 
 
-def choose(scene: Any, request: Any, asked: float) -> Choice:
+def choose(scene: Any, request: Any, allowed: float) -> Choice:
     """The settings of a motion: nothing of a free one, else the tolerance."""
     free = isinstance(request, TumbleRequest)
-    return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, asked)
+    return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, allowed)
 
 
 def error_of_motion(answer: Any) -> float:
@@ -43,8 +43,8 @@ def sweeps_of_tumble(request: Any) -> Sweeps:
     measure = Measure("attitude", "rad", lambda answer, reference: apart(answer.motion, reference.motion))
     finest = replace(request, step=None, tolerance=min(FINEST_TOLERANCE, 1e-2 * request.tolerance))
     against = f"steps to {finest.tolerance:g}"
-    own = request.tolerance if request.step is None else None
-    settings = ladder(TOLERANCES, own, lambda one: replace(request, step=None, tolerance=one))
+    tolerance = request.tolerance if request.step is None else None
+    settings = ladder(TOLERANCES, tolerance, lambda each: replace(request, step=None, tolerance=each))
     knobs = [Sweep("numerics.tolerance", (measure,), settings, finest, against, answer_driven)]
     remark = _refusal(request)
     if remark is None:
@@ -64,9 +64,9 @@ def _refusal(request: Any) -> str | None:
 
 def _splitting(request: Any, order: int, finest: Any, measure: Measure, against: str) -> Sweep:
     span = abs(request.times[-1] - request.times[0])
-    own = request.step if request.step is not None and request.order == order else None
+    length = request.step if request.step is not None and request.order == order else None
     steps = [span / (16 * number) for number in DIVISIONS]
-    settings = ladder(steps, own, lambda one: replace(request, step=one, order=order), "{:.3g}".format)
+    settings = ladder(steps, length, lambda each: replace(request, step=each, order=order), "{:.3g}".format)
     return Sweep(f"numerics.step, order {order}", (measure,), settings, finest, against, answer_driven)
 
 
@@ -96,23 +96,23 @@ def plan_of_motion(request: Any) -> Plan:
     )
 
 
-def planned(scene: Any, request: Any, asked: float) -> tuple[Plan, Choice | None]:
+def planned(scene: Any, request: Any, allowed: float) -> tuple[Plan, Choice | None]:
     """The plan of a motion with the tolerance that its run takes, and that choice where the whole motion was searched.
 
     Of a long motion that is found by its first part; the run then makes a motion a hundred times finer beside it, for the error.
     """
     if isinstance(request, TumbleRequest):
-        choice = choose(scene, request, asked)
+        choice = choose(scene, request, allowed)
         plan = plan_of_motion(request)
         return replace(plan, parts=(*plan.parts, ("accuracy", choice.how))), choice
     searched: list[Planned] = []
-    search = timed(lambda: searched.append(planned_tolerance(request, asked)), LONG_SEARCH)
-    found = searched[-1]
-    chosen = replace(request, tolerance=found.tolerance)
-    plan = _driven(chosen, found.steps, found.error)
-    parts = (*plan.parts, ("accuracy", found.how))
-    if found.steps is not None:
-        choice = Choice(chosen, found.how, found.error or 0.0)
+    search = timed(lambda: searched.append(planned_tolerance(request, allowed)), LONG_SEARCH)
+    search_result = searched[-1]
+    chosen = replace(request, tolerance=search_result.tolerance)
+    plan = _driven(chosen, search_result.steps, search_result.error)
+    parts = (*plan.parts, ("accuracy", search_result.how))
+    if search_result.steps is not None:
+        choice = Choice(chosen, search_result.how, search_result.error or 0.0)
         return replace(plan, parts=parts, seconds=search + plan.seconds), choice
     finer = 10.0 ** (FINER / ORDER)  # times as many steps
     return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds), None
@@ -145,11 +145,11 @@ def _stepping(request: DrivenRequest, steps: int) -> str:
 
 def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
     """Processor time of a driven motion: its first steps are made one by one and the further ones compiled, so two parts are timed."""
-    some, more = some_steps(request)
-    if steps < more * some:
+    first_steps, more = some_steps(request)
+    if steps < more * first_steps:
         return timed(lambda: steps_of(request, 1.0))
     counts, seconds = [], []
-    for share in (some / steps, more * some / steps):
+    for share in (first_steps / steps, more * first_steps / steps):
         seconds.append(timed(lambda share=share: counts.append(steps_of(request, share))))  # type: ignore[misc]
     near, far = counts[0], counts[-1]
     rate = max(seconds[1] - seconds[0], 0.0) / max(far - near, 1)

@@ -61,11 +61,11 @@ def error_by_finer(coarse: Motion, finer: Sequence[float], at: Callable[[float],
     return finest.steps * finer[-1] + OF_REFERENCE * apart(coarse, finest), False
 
 
-def apart(one: Motion, other: Motion) -> float:
+def apart(motion: Motion, other: Motion) -> float:
     """The largest angle between the attitudes of two motions at the same times."""
     from rotor.geometry.rotations import distance
 
-    return float(distance(one.attitude, other.attitude).max())
+    return float(distance(motion.attitude, other.attitude).max())
 
 
 def rounding_of_steps(motion: Motion) -> float:

@@ -51,7 +51,7 @@ class System:
         """All effects but those that add inertia, for compiled integrators; None where one effect has to be called at every step."""
         if self.inertia or (self.added and self.rolling is None):
             return None
-        return system_form([one for one in self.torques if not isinstance(one, AddedInertia)], self.inner)
+        return system_form([torque for torque in self.torques if not isinstance(torque, AddedInertia)], self.inner)
 
     @cached_property
     def rolling(self) -> Floats | None:

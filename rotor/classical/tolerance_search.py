@@ -44,17 +44,17 @@ class _Motions:
         from rotor.classical.driven import answer_driven
 
         if decade not in self.made:
-            looser = [one for one in self.made if one < decade]
-            finer = [one for one in self.made if one > decade]
+            looser = [each for each in self.made if each < decade]
+            finer = [each for each in self.made if each > decade]
             alike = looser and finer and self.made[max(looser)].steps == self.made[min(finer)].steps
-            asked = replace(self.request, tolerance=tolerance_of(decade))
-            self.made[decade] = self.made[max(looser)] if alike else answer_driven(asked).motion
+            request = replace(self.request, tolerance=tolerance_of(decade))
+            self.made[decade] = self.made[max(looser)] if alike else answer_driven(request).motion
         return self.made[decade]
 
     def error(self, decade: int) -> float:
         """The largest error of an attitude in radians, of the steps (`error_by_finer`) and of rounding."""
         finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
-        decades = {tolerance_of(one): one for one in finer}
+        decades = {tolerance_of(each): each for each in finer}
         of_steps = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
         return of_steps + rounding_of_steps(self.at(decade))
 
@@ -68,9 +68,9 @@ def tolerance_of(decade: int) -> float:
     return float(f"1e-{decade}")
 
 
-def likely_decade(asked: float) -> int:
+def likely_decade(allowed: float) -> int:
     """A decade of tolerances amid those that a search for an accuracy tries."""
-    return min(max(round(-math.log10(asked)), LOOSEST) + FINER, FINEST)
+    return min(max(round(-math.log10(allowed)), LOOSEST) + FINER, FINEST)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Planned:
         return tolerance_of(self.decade)
 
 
-def planned_tolerance(request: DrivenRequest, asked: float) -> Planned:
+def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
     """The loosest tolerance, in decades, that reaches an accuracy in radians, by the whole motion or, of a long one, by its first part.
 
     The same for a plan and for a run. Raises ValueError where a knob is given too, and where double precision does not reach it.
@@ -100,11 +100,11 @@ def planned_tolerance(request: DrivenRequest, asked: float) -> Planned:
 
     if request.tolerance != DEFAULT_TOLERANCE or request.step is not None:
         raise ValueError("accuracy and numerics: give one of them")
-    if _is_long(request, asked):
-        _refuse_endless(request, asked)
-        return Planned(*_of_beginning(request, asked))
+    if _is_long(request, allowed):
+        _refuse_endless(request, allowed)
+        return Planned(*_decade_of_beginning(request, allowed))
     motions = _Motions(request)
-    decade, error = _loosest(motions, asked)
+    decade, error = _loosest(motions, allowed)
     return Planned(decade, _words(decade), error, motions.at(decade).steps)
 
 
@@ -114,19 +114,19 @@ def _words(decade: int) -> str:
     )
 
 
-def _is_long(request: DrivenRequest, asked: float) -> bool:
+def _is_long(request: DrivenRequest, allowed: float) -> bool:
     """Whether a motion takes so many steps that a search by whole motions would not be short, by those of its beginning."""
-    steps = _likely_steps(request, asked)
+    steps = _likely_steps(request, allowed)
     return steps > (LONG_STEPS if is_compiled(request) else LONG_PLAIN_STEPS)
 
 
-def _likely_steps(request: DrivenRequest, asked: float) -> int:
-    return expected_steps(replace(request, tolerance=tolerance_of(likely_decade(asked))))
+def _likely_steps(request: DrivenRequest, allowed: float) -> int:
+    return expected_steps(replace(request, tolerance=tolerance_of(likely_decade(allowed))))
 
 
-def _refuse_endless(request: DrivenRequest, asked: float) -> None:
+def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
     """Refuse a motion of more steps than can be made."""
-    steps = _likely_steps(request, asked)
+    steps = _likely_steps(request, allowed)
     if steps > MOST_STEPS:
         raise ValueError(
             f"accuracy: this motion takes about {steps:.2g} steps, and {MOST_STEPS:.0g} take hours; give a shorter time, or a body "
@@ -134,17 +134,17 @@ def _refuse_endless(request: DrivenRequest, asked: float) -> None:
         )
 
 
-def _of_beginning(request: DrivenRequest, asked: float) -> tuple[int, str]:
+def _decade_of_beginning(request: DrivenRequest, allowed: float) -> tuple[int, str]:
     """The decade that the first part of a motion asks for, and how it was found."""
     from rotor.geometry.rotations import distance
 
     motions = _Motions(beginning(request, 1 / BEGINNINGS, 0.5))
-    likely = likely_decade(asked)
+    likely = likely_decade(allowed)
     apart = distance(motions.at(likely).attitude, motions.at(min(likely + FINER, FINEST_REFERENCE)).attitude)
     middle = int(np.searchsorted(np.abs(np.array(motions.request.times) - request.times[0]), 0.5 * _span(motions)))
     grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
     part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
-    needed = math.log10(asked) - grown
+    needed = math.log10(allowed) - grown
     try:
         decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
     except ValueError:  # the part cannot be that exact
@@ -168,46 +168,46 @@ def _growth(middle: float, end: float) -> float:
     return float(BEGINNINGS**REGULAR)
 
 
-def choose_tolerance(request: DrivenRequest, asked: float) -> Choice:
+def choose_tolerance(request: DrivenRequest, allowed: float) -> Choice:
     """The request with the tolerance that a plan names, or a finer one where that misses, and the error that is found with it.
 
     Raises ValueError where a knob is given too, and where double precision does not reach it.
     """
-    planned = planned_tolerance(request, asked)
+    planned = planned_tolerance(request, allowed)
     if planned.error is not None:
         return Choice(replace(request, tolerance=planned.tolerance), planned.how, planned.error)
     motions = _Motions(request)
     error, decade = motions.error(planned.decade), planned.decade
-    if error > asked and decade < FINEST:
-        decade, error = _loosest(motions, asked, misses=decade)
+    if error > allowed and decade < FINEST:
+        decade, error = _loosest(motions, allowed, misses=decade)
         how = f"tolerance {tolerance_of(decade):g} of a step, finer than the plan's {planned.tolerance:g}, which missed"
         return Choice(replace(request, tolerance=tolerance_of(decade)), how, error)
-    if error > asked:
-        raise ValueError(_refusal(asked, error))
+    if error > allowed:
+        raise ValueError(_refusal(allowed, error))
     return Choice(replace(request, tolerance=planned.tolerance), planned.how, error)
 
 
-def _loosest(motions: _Motions, asked: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
+def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
     """The lowest decade whose error is what was asked for at the most, and that error; the one below it, or `misses`, has more."""
-    decade = min(max(round(-math.log10(asked)), misses + 1), FINEST)
+    decade = min(max(round(-math.log10(allowed)), misses + 1), FINEST)
     errors: dict[int, float] = {}
     reaches = FINEST + 1
     while reaches > misses + 1:
         error = errors[decade] = motions.error(decade)
         apart = max(
-            math.floor(abs(math.log10(max(error, 1e-30) / asked))), 1
+            math.floor(abs(math.log10(max(error, 1e-30) / allowed))), 1
         )  # decades, if the error goes with the tolerance
-        if error <= asked:
+        if error <= allowed:
             reaches, decade = decade, max(decade - apart, misses + 1)
         else:
             misses, decade = decade, min(decade + apart, reaches - 1)
     if reaches > FINEST:
-        raise ValueError(_refusal(asked, errors[FINEST]))
+        raise ValueError(_refusal(allowed, errors[FINEST]))
     return reaches, errors[reaches]
 
 
-def _refusal(asked: float, error: float) -> str:
+def _refusal(allowed: float, error: float) -> str:
     return (
-        f"accuracy: {asked:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
+        f"accuracy: {allowed:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
         "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
     )

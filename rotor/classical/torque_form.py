@@ -72,7 +72,7 @@ def own_form(effect: Any, plain: str) -> Any:
 def rolling_forms(added: Iterable[Any]) -> Floats | None:
     """Parameters (k, 17) of bodies that roll, from effects that add inertia; None where one of them adds another one."""
     effects = list(added)
-    forms = [(own_form(one, "inertia"), own_form(one, "torque")) for one in effects]
+    forms = [(own_form(effect, "inertia"), own_form(effect, "torque")) for effect in effects]
     if any(form is None or form.code != ROLLING for pair in forms for form in pair):
         return None
     return np.array([form.parameters for form, _ in forms])

@@ -161,7 +161,7 @@ def _slope(values: Floats, interval: float) -> float:
 
 
 def yeh_hummer_correction(
-    found: Diffusion, temperature_k: float, viscosity_pa_s: float, edge_angstrom: float
+    diffusion: Diffusion, temperature_k: float, viscosity_pa_s: float, edge_angstrom: float
 ) -> Diffusion:
     """D with the drag of the periodic images taken out, D + ξ kT/(6π η L) of a cubic cell (Yeh and Hummer 2004, eq. 12).
 
@@ -189,7 +189,7 @@ def yeh_hummer_correction(
     2.956
     """
     drag = units.BOLTZMANN_J_PER_K * temperature_k / (6 * math.pi * viscosity_pa_s * edge_angstrom * 1e-10)
-    return Diffusion(found.value, found.error, found.value + YEH_HUMMER_XI * drag)
+    return Diffusion(diffusion.value, diffusion.error, diffusion.value + YEH_HUMMER_XI * drag)
 
 
 def block_errors(series: ArrayLike) -> Floats:

@@ -51,14 +51,14 @@ def temperature_budget(
         of="temperature",
         unit="K",
         rounding=ErrorTerm(bodies * sys.float_info.epsilon * abs(temperature.mean), "sum over the molecules"),
-        truncation=_of_steps(record, settings, degrees),
+        truncation=_step_error(record, settings, degrees),
         model=ErrorTerm(None, f"rigid molecules of the model {settings.model}", "another model"),
         data=ErrorTerm(None, "the parameters of the model have no stated uncertainty"),
-        statistics=_of_rows(temperature),
+        statistics=_statistical_error(temperature),
     )
 
 
-def _of_steps(record: FluidRecord, settings: Settings, degrees: float) -> ErrorTerm:
+def _step_error(record: FluidRecord, settings: Settings, degrees: float) -> ErrorTerm:
     """The largest departure of the conserved energy from its mean."""
     if len(record) < 2 or not np.isfinite(record.total_ev).all():
         return ErrorTerm(None, "a run of fewer than two rows has no departure of its conserved energy")
@@ -70,7 +70,7 @@ def _of_steps(record: FluidRecord, settings: Settings, degrees: float) -> ErrorT
     return ErrorTerm(2.0 * away / (units.EV_PER_K * degrees), source, "a shorter step")
 
 
-def _of_rows(temperature: Mean) -> ErrorTerm:
+def _statistical_error(temperature: Mean) -> ErrorTerm:
     """The standard error of the mean over correlated rows."""
     if not math.isfinite(temperature.error):
         return ErrorTerm(None, "too few rows for a standard error", "a longer run")

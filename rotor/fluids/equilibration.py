@@ -140,12 +140,12 @@ def _advance(
     """Step on to a time, with a row every `ROW_FS`: potential energy, both temperatures, total energy."""
     import time
 
-    every = max(round(ROW_FS / settings.step_fs), 1)
+    steps_per_row = max(round(ROW_FS / settings.step_fs), 1)
     steps, started, before = round(time_ps * 1e3 / settings.step_fs), time.perf_counter(), dynamics.nsteps
     while dynamics.nsteps < steps:
         dynamics.step()
         dynamics.nsteps += 1
-        if dynamics.nsteps % every == 0:
+        if dynamics.nsteps % steps_per_row == 0:
             heat, energy = dynamics.temperatures(), float(dynamics.atoms.get_potential_energy())
             rows.append([energy, heat.translation_k, heat.rotation_k, energy + dynamics.kinetic().total_ev])
             seconds = time.perf_counter() - started

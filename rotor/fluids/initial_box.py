@@ -108,9 +108,9 @@ def check_apart(atoms: Atoms, bodies: Bodies) -> None:
     between = np.flatnonzero(body[first] != body[second])
     if len(between):
         pair = between[np.argmin(distances[between])]
-        one, other = (bodies.name_of(int(body[k])) for k in (first[pair], second[pair]))
+        name, other = (bodies.name_of(int(body[k])) for k in (first[pair], second[pair]))
         raise ValueError(
-            f"{one} and {other} are on top of each other: two of their atoms are {distances[pair]:.3g} Å apart"
+            f"{name} and {other} are on top of each other: two of their atoms are {distances[pair]:.3g} Å apart"
         )
 
 

@@ -77,7 +77,7 @@ def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
         members = np.flatnonzero(bodies.species == species)
         rows = slice(bodies.starts[members[0]], bodies.starts[members[0] + 1])
         sites = bodies.sites[rows]
-        model = next((one for one in models if len(one.symbols) == len(sites)), None)
+        model = next((model for model in models if len(model.symbols) == len(sites)), None)
         axis = None if model is None else axis_of(model, sites)
         if axis is None:
             return None
@@ -114,13 +114,13 @@ def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) 
             else:
                 table.append(_mean(f"τ{order} of reorientation", "ps", values))
     window = (DIFFUSION_FROM_PS, WINDOW * length / BLOCKS)
-    found = diffusion(np.array(frames.centres), step, window, BLOCKS)
+    coefficient = diffusion(np.array(frames.centres), step, window, BLOCKS)
     table.append(
         Mean(
             "self-diffusion, in this box",
             "1e-5 cm²/s",
-            found.value * CM2_PER_S * 1e5,
-            found.error * CM2_PER_S * 1e5,
+            coefficient.value * CM2_PER_S * 1e5,
+            coefficient.error * CM2_PER_S * 1e5,
             BLOCKS,
         )
     )

@@ -310,15 +310,15 @@ class _Run:
 
     def _write(self) -> None:
         """A row and frames, where it is their turn."""
-        dynamics, every = self.dynamics, self.settings.every
+        dynamics, steps_per_row = self.dynamics, self.settings.every
         time_ps = dynamics.nsteps * self.settings.step_fs * 1e-3
-        if dynamics.nsteps % every == 0:
+        if dynamics.nsteps % steps_per_row == 0:
             self.rows.append(self._row(time_ps))
             if self._csv is not None:
                 self._csv.add(csv_line(self.rows[-1]))
             if self._motion is not None:
                 self._motion.add(dynamics.state.centres, dynamics.state.attitude)
-        if dynamics.nsteps % (self.outputs.frames_every or every) == 0:
+        if dynamics.nsteps % (self.outputs.frames_every or steps_per_row) == 0:
             for file in self._frames:
                 file.add(dynamics.atoms, time_ps)
 

@@ -13,12 +13,12 @@ ENSEMBLES = ("nve", "langevin", "nose-hoover")
 ELECTROSTATICS = ("reaction-field", "ewald", "shifted")
 
 
-def _read_model(given: Any) -> str:
+def _read_model(text: Any) -> str:
     from rotor.fluids.forces.models import model_of
 
-    for name in str(given).split(","):
+    for name in str(text).split(","):
         model_of(name.strip())
-    return str(given)
+    return str(text)
 
 
 LARGEST = 1e30  # of any number here: its powers are formed

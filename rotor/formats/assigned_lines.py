@@ -88,10 +88,10 @@ def read_assigned_lines(
     if not text.endswith(SUFFIXES):
         raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
     if text.endswith(".csv"):
-        found, notes = _of_csv(path, names, halves)
+        found, notes = _from_csv(path, names, halves)
     else:
         plain = "v" not in names and names[0] != "n"
-        read = _of_lin if text.endswith(".lin") else _of_catalogue if plain else _of_full_catalogue
+        read = _from_lin if text.endswith(".lin") else _from_catalogue if plain else _from_full_catalogue
         found, notes = read(path, names)
         found = with_halves(found, halves)
     if not len(found):
@@ -124,7 +124,7 @@ def names_field(path: str | os.PathLike[str]) -> bool:
     return os.fspath(path).lower().endswith(".csv") and bool(set(_FIELD) & set(_table_of(path)[0]))
 
 
-def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     read = read_lin(path, len(names))
     lines = with_defaults(read if {"v", "f"} & set(names) else without_v(read, len(names)), names)
     blends = lines.blends()
@@ -150,7 +150,7 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
     return with_excluded_lines(listed, lines), notes
 
 
-def _of_csv(
+def _from_csv(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
 ) -> tuple[Assignments, list[str]]:
     columns, rows = _table_of(path)
@@ -360,7 +360,7 @@ def _blends(texts: Sequence[str]) -> list[int]:
     return [places.setdefault(text or f"\0{i}", len(places)) for i, text in enumerate(texts)]
 
 
-def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+def _from_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     from rotor.formats.spcat.compare import in_mhz
     from rotor.formats.spcat.text.cat import read_cat
 
@@ -393,7 +393,7 @@ def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[A
     ), notes  # fmt: skip
 
 
-def _of_full_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+def _from_full_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     """The measured lines of a catalogue that has all of the quantum numbers, v and F among them."""
     from rotor.formats.spcat.compare import in_mhz
     from rotor.formats.spcat.text.cat import read_cat

@@ -48,7 +48,7 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
 
         spectrum = read_spectrum(path)
         return _in_band(peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, name), band_mhz)
-    columns = _of_npy(name) if name.lower().endswith(".npy") else _of_csv(Path(path))
+    columns = _from_npy(name) if name.lower().endswith(".npy") else _from_csv(Path(path))
     return peaks_of_columns(columns, band_mhz, name)
 
 
@@ -73,7 +73,7 @@ def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
     )  # fmt: skip
 
 
-def _of_npy(name: str) -> Floats:
+def _from_npy(name: str) -> Floats:
     try:
         values = np.load(name, allow_pickle=False)
     except (ValueError, OSError, EOFError) as error:
@@ -85,7 +85,7 @@ def _of_npy(name: str) -> Floats:
     return np.asarray(values if values.shape[1] in (2, 3) else values.T, dtype=np.float64)
 
 
-def _of_csv(path: Path) -> Floats:
+def _from_csv(path: Path) -> Floats:
     text, name = load(path)
     rows, heading = list[list[float]](), True
     lines = text.decode("utf-8", "replace").splitlines()

@@ -29,13 +29,13 @@ def step_pose(parameters: ArrayLike) -> tuple[Floats, Floats]:
     >>> position.tolist(), float((2 * np.degrees(np.arccos(q[0]))).round(12))
     ([0.0, 0.0, 3.4], 36.0)
     """
-    given = _six(parameters)
-    bend, half_twist = np.radians(given[..., 3:5]), 0.5 * np.radians(given[..., 5])
+    values = _six(parameters)
+    bend, half_twist = np.radians(values[..., 3:5]), 0.5 * np.radians(values[..., 5])
     flat = np.concatenate([bend, np.zeros_like(bend[..., :1])], axis=-1)
     upright = np.stack([np.zeros_like(half_twist), np.zeros_like(half_twist), half_twist], axis=-1)
     turn = exp(upright)
     q = multiply(multiply(turn, exp(flat)), turn)
-    return q, rotate(multiply(turn, exp(0.5 * flat)), given[..., :3])
+    return q, rotate(multiply(turn, exp(0.5 * flat)), values[..., :3])
 
 
 def step_parameters(q: ArrayLike, position: ArrayLike) -> Floats:

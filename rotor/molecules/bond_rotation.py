@@ -104,7 +104,7 @@ class BondRotation:
         x, axis = self.molecule.positions_angstrom, _axis(self.molecule.positions_angstrom, self.first, self.last)
         arms = x[atoms] - x[self.last]
         kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
-        alike = np.array([[one == other for other in kinds] for one in kinds])
+        alike = np.array([[kind == other for other in kinds] for kind in kinds])
         along = np.outer(arms @ axis, axis)
         for n in range(MOST_FOLD, 1, -1):
             angle = 2 * math.pi / n
@@ -130,7 +130,7 @@ class BondRotation:
         across = _across(x, self, atoms.tolist(), unit=False)
         along = (x[atoms] - x[self.last]) @ axis
         kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
-        alike = np.array([[one == other for other in kinds] for one in kinds])
+        alike = np.array([[kind == other for other in kinds] for kind in kinds])
         outermost = int(np.argmax(np.abs(across)))
         planes = []
         for other in np.flatnonzero(alike[outermost]).tolist():

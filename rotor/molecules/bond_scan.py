@@ -105,7 +105,7 @@ def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, 
     library: Any = constraints  # ASE has no types
     atoms = ase_atoms(rotation.molecule)
     atoms.set_positions(positions)
-    quartets = [list(one) for one in (rotation.dihedral_atoms(), rotation.opposite_atoms()) if one is not None]
+    quartets = [list(atoms) for atoms in (rotation.dihedral_atoms(), rotation.opposite_atoms()) if atoms is not None]
     fixed = [[atoms.get_dihedral(*quartet), quartet] for quartet in quartets]
     atoms.set_constraint(library.FixInternals(dihedrals_deg=fixed, epsilon=1e-9))
     atoms.calc = engine

@@ -95,14 +95,14 @@ class Molecule:
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
 
-        _refuse_multiplicity(self.multiplicity, sum(one.element_number for one in nuclei) - int(charge))
+        _refuse_multiplicity(self.multiplicity, sum(nucleus.element_number for nucleus in nuclei) - int(charge))
         if self.electron_spin_mhz is not None and not 0 < self.electron_spin_mhz < np.inf:
             raise ValueError(f"electron_spin_mhz {self.electron_spin_mhz!r}: expected a finite number above 0")
         if self.electronic not in ELECTRONIC:
             raise ValueError(f"electronic {self.electronic!r}: expected 'even' (a closed shell) or 'odd' (such as Σg-)")
 
-        object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
-        object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))
+        object.__setattr__(self, "symbols", tuple(nucleus.symbol for nucleus in nuclei))
+        object.__setattr__(self, "mass_numbers", tuple(nucleus.mass_number for nucleus in nuclei))
         object.__setattr__(self, "positions_angstrom", positions)
         object.__setattr__(self, "charge", int(charge))
         object.__setattr__(self, "notes", tuple(self.notes))
@@ -115,7 +115,7 @@ class Molecule:
     @property
     def masses_u(self) -> Floats:
         """Masses (n,) of the atoms in u."""
-        return np.array([one.mass_u for one in self.nuclei])
+        return np.array([nucleus.mass_u for nucleus in self.nuclei])
 
     @property
     def mass_u(self) -> float:
@@ -217,13 +217,13 @@ def _nuclei(symbols: Iterable[str], mass_numbers: Iterable[int]) -> tuple[Isotop
         raise ValueError("a molecule without atoms: give one atom or more")
     if len(numbers) != len(names):
         raise ValueError(f"{len(names)} symbols but {len(numbers)} mass numbers; give one each, or none")
-    found = []
+    isotopes = []
     for i, (name, number) in enumerate(zip(names, numbers, strict=True), start=1):
         try:
-            found.append(isotope(name, number))
+            isotopes.append(isotope(name, number))
         except ValueError as reason:
             raise ValueError(f"atom {i}: {reason}") from None
-    return tuple(found)
+    return tuple(isotopes)
 
 
 def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
@@ -244,16 +244,16 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
 
 def _checked_tensors(tensors: Mapping[int, Floats], atoms: int, key: str) -> dict[int, Floats]:
     """Symmetric traceless tensors by the number of the atom, as read-only arrays."""
-    found = {}
-    for atom, given in tensors.items():
+    checked = {}
+    for atom, value in tensors.items():
         if not 1 <= atom <= atoms:
             raise ValueError(f"{key} of atom {atom}: the atoms are numbered from 1 to {atoms}")
-        tensor = _checked(given, (3, 3), f"{key} of atom {atom}")
+        tensor = _checked(value, (3, 3), f"{key} of atom {atom}")
         least = 1e-6 * max(1.0, float(np.abs(tensor).max()))
         if abs(np.trace(tensor)) > least or np.abs(tensor - tensor.T).max() > least:
             raise ValueError(f"{key} of atom {atom}: {tensor.tolist()} is not symmetric and traceless; it must be")
-        found[atom] = tensor
-    return found
+        checked[atom] = tensor
+    return checked
 
 
 def couplings_mhz(gradients_au: Mapping[int, Floats], nuclei: Sequence[Isotope]) -> dict[int, Floats]:
@@ -266,24 +266,24 @@ def couplings_mhz(gradients_au: Mapping[int, Floats], nuclei: Sequence[Isotope])
     >>> couplings_mhz({1: np.diag([0.5, 0.5, -1.0])}, (isotope("14N"),))[1][2, 2].round(4)
     np.float64(-4.8027)
     """
-    found = {}
+    couplings = {}
     for atom, gradient in gradients_au.items():
         nucleus = nuclei[atom - 1]
         if nucleus.quadrupole_barn and nucleus.spin >= 1:
-            found[atom] = QUADRUPOLE_MHZ_PER_BARN_AU * nucleus.quadrupole_barn * gradient
-    return found
+            couplings[atom] = QUADRUPOLE_MHZ_PER_BARN_AU * nucleus.quadrupole_barn * gradient
+    return couplings
 
 
 def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int, Floats]:
     """χ Q'/Q for other isotopes, or that of the gradient, which stays. Nuclei without a known Q have none."""
-    found = couplings_mhz(molecule.field_gradients_au, nuclei)
+    couplings = couplings_mhz(molecule.field_gradients_au, nuclei)
     for atom, chi in molecule.quadrupole_mhz.items():
         old, new = molecule.nuclei[atom - 1], nuclei[atom - 1]
         if old == new:
-            found[atom] = chi
-        elif atom not in found and old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
-            found[atom] = chi * (new.quadrupole_barn / old.quadrupole_barn)
-    return found
+            couplings[atom] = chi
+        elif atom not in couplings and old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
+            couplings[atom] = chi * (new.quadrupole_barn / old.quadrupole_barn)
+    return couplings
 
 
 def _refuse_multiplicity(multiplicity: int | None, electrons: int) -> None:
@@ -325,8 +325,8 @@ def nearest_others(positions: Floats) -> tuple[Floats, Ints]:
         from scipy.spatial import cKDTree
 
         distances, indices = cKDTree(positions).query(positions, k=2)
-        own = indices[:, 0] == np.arange(len(positions))  # two points in one place come in either order
-        return distances[:, 1], np.where(own, indices[:, 1], indices[:, 0])
+        is_itself = indices[:, 0] == np.arange(len(positions))  # two points in one place come in either order
+        return distances[:, 1], np.where(is_itself, indices[:, 1], indices[:, 0])
     distances = np.linalg.norm(positions[:, None] - positions, axis=2)
     np.fill_diagonal(distances, np.inf)
     nearest = np.argmin(distances, axis=1)
@@ -345,15 +345,17 @@ def _parse_changes(text: str) -> dict[int | str, str]:
 
 
 def _same_element(symbol: str, name: str, atom: int) -> Isotope:
-    one = isotope(name)
-    if one.symbol != symbol:
-        raise ValueError(f"atom {atom + 1} is {symbol}: {name!r} is an isotope of {one.symbol}, not of {symbol}")
-    return one
+    nucleus = isotope(name)
+    if nucleus.symbol != symbol:
+        raise ValueError(f"atom {atom + 1} is {symbol}: {name!r} is an isotope of {nucleus.symbol}, not of {symbol}")
+    return nucleus
 
 
 def _hill(nuclei: tuple[Isotope, ...]) -> str:
     """Carbon first, then hydrogen, then the alphabet; without carbon the alphabet alone (Hill 1900)."""
-    counts = Counter((one.symbol, 0 if one == isotope(one.symbol) else one.mass_number) for one in nuclei)
+    counts = Counter(
+        (nucleus.symbol, 0 if nucleus == isotope(nucleus.symbol) else nucleus.mass_number) for nucleus in nuclei
+    )
     first = ("C", "H") if any(symbol == "C" for symbol, _ in counts) else ()
 
     def place(key: tuple[str, int]) -> tuple[int, str, int]:

@@ -62,20 +62,20 @@ def data_folder() -> Path:
 def _lines() -> dict[str, list[str]]:
     """The lines of the table by symbol; numbers are made of those that are asked for."""
     text = (data_folder() / "isotopes.csv").read_text(encoding="utf-8")
-    found: dict[str, list[str]] = {}
+    by_symbol: dict[str, list[str]] = {}
     for line in [line for line in text.splitlines() if not line.startswith("#")][1:]:
-        found.setdefault(line.partition(",")[0], []).append(line)
-    return found
+        by_symbol.setdefault(line.partition(",")[0], []).append(line)
+    return by_symbol
 
 
 @cache
 def _isotopes(element: str) -> dict[int, Isotope]:
     """Every isotope of an element by mass number."""
-    found = {}
+    isotopes = {}
     for line in _lines()[element]:
         symbol, number, mass_number, *numbers, g_factor, quadrupole = line.split(",")
         mass_u, abundance, half_life, spin = map(float, numbers)
-        found[int(mass_number)] = Isotope(
+        isotopes[int(mass_number)] = Isotope(
             symbol=symbol,
             element_number=int(number),
             mass_number=int(mass_number),
@@ -86,7 +86,7 @@ def _isotopes(element: str) -> dict[int, Isotope]:
             g_factor=float(g_factor) if g_factor else None,
             quadrupole_barn=float(quadrupole) if quadrupole else None,
         )
-    return found
+    return isotopes
 
 
 def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
@@ -123,7 +123,7 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     expected = own_number if own_number is not None else mass_number
     isotopes = _isotopes(element)
     if expected is None:
-        return max(isotopes.values(), key=lambda one: (one.abundance, one.half_life_s))
+        return max(isotopes.values(), key=lambda candidate: (candidate.abundance, candidate.half_life_s))
     if expected not in isotopes:
         near = sorted(isotopes, key=lambda number: (abs(number - expected), number))[:3]
         names = ", ".join(f"{number}{element}" for number in sorted(near))
@@ -174,8 +174,8 @@ def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
     ['16O', '18O', '17O']
     """
     element, _ = _split(symbol)
-    natural = [one for one in _isotopes(element).values() if one.abundance > 0]
-    return tuple(sorted(natural, key=lambda one: -one.abundance))
+    natural = [nuclide for nuclide in _isotopes(element).values() if nuclide.abundance > 0]
+    return tuple(sorted(natural, key=lambda nuclide: -nuclide.abundance))
 
 
 def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
@@ -185,7 +185,7 @@ def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isoto
     '37Cl'
     """
     element, _ = _split(symbol)
-    nearest = min(_isotopes(element).values(), key=lambda one: abs(one.mass_u - mass_u))
+    nearest = min(_isotopes(element).values(), key=lambda nuclide: abs(nuclide.mass_u - mass_u))
     if not abs(nearest.mass_u - mass_u) <= within_u:
         raise ValueError(
             f"a mass of {mass_u:g} u is not that of an isotope of {element}; the nearest is {nearest.label} with "

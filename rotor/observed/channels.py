@@ -24,9 +24,9 @@ def near_lines(
 ) -> NDArray[np.bool_]:
     """Channels (n,) within some widths of a line of any component."""
     near = np.zeros(len(spectrum), dtype=np.bool_)
-    for one in components:
-        centre = one.species.frequency_mhz * (1 - one.velocity_km_s / KM_PER_S) / (1 + sight.redshift)
-        reach = widths * one.fwhm_km_s / KM_PER_S * centre
+    for component in components:
+        centre = component.species.frequency_mhz * (1 - component.velocity_km_s / KM_PER_S) / (1 + sight.redshift)
+        reach = widths * component.fwhm_km_s / KM_PER_S * centre
         first, last = (np.searchsorted(spectrum.frequency_mhz, centre + side * reach) for side in (-1, 1))
         for a, b in zip(first.tolist(), last.tolist(), strict=True):
             near[a:b] = True

@@ -120,8 +120,8 @@ def _fit_row(row: _Row) -> tuple[Floats, Floats, Floats, Floats]:
             fit = fit_source(spectrum, start, row.sight, row.choices)
             if not fit.minimum.converged and start is not row.components:
                 fit = fit_source(spectrum, row.components, row.sight, row.choices)
-            values[:, x] = [one["value"] for one in fit.parameters]
-            errors[:, x] = [one["error"] if one["determined"] else np.nan for one in fit.parameters]
+            values[:, x] = [parameter["value"] for parameter in fit.parameters]
+            errors[:, x] = [parameter["error"] if parameter["determined"] else np.nan for parameter in fit.parameters]
             chi[x], converged[x] = fit.reduced_chi_squared, float(fit.minimum.converged)
             start = fit.components if fit.minimum.converged else row.components
     return values, errors, chi, converged

@@ -137,7 +137,7 @@ class SourceFit(Table):
     def facts(self) -> dict[str, Any]:
         """Everything but the arrays, as plain numbers, texts, lists and dictionaries."""
         return {
-            "components": [component_facts(one) for one in self.components],
+            "components": [component_facts(component) for component in self.components],
             "parameters": [
                 {
                     "name": row["name"],
@@ -154,7 +154,7 @@ class SourceFit(Table):
             "rms_k": float(np.sqrt(np.mean(self.residuals_k**2))),
             "noise_k": float(np.median(self.spectrum.noise)),
             "status": self.minimum.status,
-            "undetermined": [one.text for one in self.statistics.undetermined],
+            "undetermined": [combination.text for combination in self.statistics.undetermined],
         }
 
 
@@ -253,8 +253,11 @@ def minimum_of(
 
 def prior_widths(components: Sequence[Component], free: Variables) -> Floats:
     """Standard deviations (m,) of the priors of what a search moves."""
-    scale = [components[one.components[0]].fwhm_km_s if one.name == "velocity_km_s" else 1.0 for one in free.items]
-    return np.array([PRIORS[one.name] for one in free.items]) * scale
+    scale = [
+        components[variable.components[0]].fwhm_km_s if variable.name == "velocity_km_s" else 1.0
+        for variable in free.items
+    ]
+    return np.array([PRIORS[variable.name] for variable in free.items]) * scale
 
 
 def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> None:
@@ -265,10 +268,10 @@ def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: 
     if not components:
         raise ValueError("a fit needs a component")
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
-    for one in components:
-        if not len(one.species.between(first, last)):
+    for component in components:
+        if not len(component.species.between(first, last)):
             raise ValueError(
-                f"{one.species.name}: no lines from {first:.10g} to {last:.10g} MHz in {one.species.source or 'its list'}"
+                f"{component.species.name}: no lines from {first:.10g} to {last:.10g} MHz in {component.species.source or 'its list'}"
             )
 
 
@@ -287,9 +290,9 @@ def catalogue_noise(components: Sequence[Component], grid_mhz: Floats, sight: Si
 
     Every line is shifted by its own error; where lines overlap the shifted spectra differ by the sum, an upper bound.
     """
-    if not any((one.species.error_mhz > 0).any() for one in components):
+    if not any((component.species.error_mhz > 0).any() for component in components):
         return np.zeros(len(grid_mhz))
-    shifted = [replace(one, species=_moved(one)) for one in components]
+    shifted = [replace(component, species=_moved(component)) for component in components]
     return np.asarray(
         np.abs(model(shifted, grid_mhz, sight).brightness_k - model(components, grid_mhz, sight).brightness_k)
     )
@@ -325,8 +328,8 @@ def contributions(fit: SourceFit) -> list[Contribution]:
         others = _without(fit, k)
         residuals = (fit.spectrum.intensity - others) / fit.noise
         signal = (float(residuals @ residuals) - fit.chi_squared) / fit.scale**2
-        own = sum(variable.components == (k,) for variable in fit.variables.items)
-        needed = signal > NEEDED + 2 * own
+        parameters = sum(variable.components == (k,) for variable in fit.variables.items)
+        needed = signal > NEEDED + 2 * parameters
         out.append(
             Contribution(component.species.name, signal, needed, None if needed else upper_limit(fit, k, others))
         )
@@ -335,7 +338,7 @@ def contributions(fit: SourceFit) -> list[Contribution]:
 
 def _without(fit: SourceFit, k: int) -> Floats:
     """Brightness of the other components, fitted without component k."""
-    rest = [one for i, one in enumerate(fit.components) if i != k]
+    rest = [component for i, component in enumerate(fit.components) if i != k]
     if not rest:
         return np.zeros(len(fit.spectrum))
     fixed = tuple((i - (i > k), name) for i, name in fit.choices.fixed if i != k)
@@ -352,7 +355,7 @@ def upper_limit(fit: SourceFit, k: int, others_k: Floats | None = None, deviatio
     others_k: brightness (n,) of the other components, by default as they are in the fit.
     """
     if others_k is None:
-        others = [one for i, one in enumerate(fit.components) if i != k]
+        others = [component for i, component in enumerate(fit.components) if i != k]
         others_k = model(others, fit.spectrum.frequency_mhz, fit.sight).brightness_k if others else None
     component = replace(fit.components[k], excitation_k=fit.start[k].excitation_k)
     if not fit.parameters_of(k).get("velocity_km_s", {"determined": True})["determined"]:

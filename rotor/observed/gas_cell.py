@@ -30,7 +30,9 @@ def absorbance(components: Sequence[Component], grid_mhz: Floats) -> Floats:
     [0.0, 0.0]
     """
     grid = np.asarray(grid_mhz, dtype=np.float64)
-    return np.asarray(sum((component_depth(one, grid)[0] for one in components), np.zeros(len(grid))) / _LN10)
+    return np.asarray(
+        sum((component_depth(component, grid)[0] for component in components), np.zeros(len(grid))) / _LN10
+    )
 
 
 @dataclass(frozen=True)
@@ -72,35 +74,35 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
     if spectrum.unit != ABSORBANCE:
         raise ValueError(f"{spectrum.source or 'spectrum'}: in {spectrum.unit}; a gas cell is fitted in absorbance")
     grid = spectrum.frequency_mhz
-    for one in start:
-        if not len(one.species.between(grid[0], grid[-1])):
-            raise ValueError(f"{one.species.name}: no lines from {grid[0]:.10g} to {grid[-1]:.10g} MHz")
+    for component in start:
+        if not len(component.species.between(grid[0], grid[-1])):
+            raise ValueError(f"{component.species.name}: no lines from {grid[0]:.10g} to {grid[-1]:.10g} MHz")
 
     def components(values: Floats) -> list[Component]:
         *columns, kelvin, width = np.exp(np.clip(values, -300, 300)).tolist()
         return [
-            replace(one, column_per_cm2=n, excitation_k=kelvin, fwhm_km_s=width)
-            for one, n in zip(start, columns, strict=True)
+            replace(component, column_per_cm2=n, excitation_k=kelvin, fwhm_km_s=width)
+            for component, n in zip(start, columns, strict=True)
         ]
 
     def evaluate(values: Floats) -> tuple[Floats, Floats]:
         parts = components(values)
-        depths = [component_depth(one, grid, slopes=True) / _LN10 for one in parts]
+        depths = [component_depth(component, grid, slopes=True) / _LN10 for component in parts]
         kelvin, width = parts[0].excitation_k, parts[0].fwhm_km_s
-        slopes = [one[0] for one in depths]
-        slopes += [kelvin * sum(one[2] for one in depths), width * sum(one[4] for one in depths)]
-        seen = sum(one[0] for one in depths)
+        slopes = [depth[0] for depth in depths]
+        slopes += [kelvin * sum(depth[2] for depth in depths), width * sum(depth[4] for depth in depths)]
+        seen = sum(depth[0] for depth in depths)
         return (spectrum.intensity - seen) / spectrum.noise, np.stack(slopes, axis=1) / spectrum.noise[:, None]
 
-    first = np.log([*(one.column_per_cm2 for one in start), start[0].excitation_k, start[0].fwhm_km_s])
+    first = np.log([*(component.column_per_cm2 for component in start), start[0].excitation_k, start[0].fwhm_km_s])
     minimum = minimise(evaluate, first, tolerance=1e-3)
-    names = [*(one.species.name for one in start), "temperature", "width"]
+    names = [*(component.species.name for component in start), "temperature", "width"]
     statistics = regression(minimum.jacobian, names)
     errors = statistics.errors * max(1.0, minimum.rms)
     best = components(minimum.parameters)
     return CellFit(
         tuple(best),
-        tuple(float(error * one.column_per_cm2) for error, one in zip(errors, best, strict=False)),
+        tuple(float(error * component.column_per_cm2) for error, component in zip(errors, best, strict=False)),
         float(errors[-2] * best[0].excitation_k),
         float(errors[-1] * best[0].fwhm_km_s),
         statistics,

@@ -98,18 +98,19 @@ class Identification(Table):
     @property
     def names(self) -> list[str]:
         """Of the species, the one with most evidence first."""
-        return [one.component.species.name for one in self.species]
+        return [evidence.component.species.name for evidence in self.species]
 
     @property
     def columns(self) -> dict[str, Any]:
         """species, signal, visible, expected, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
-        parts = [one.component for one in self.species]
+        parts = [evidence.component for evidence in self.species]
         numbers = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
         table: dict[str, Any] = {"species": np.array(self.names, dtype=np.str_)}
         table |= {
-            name: np.array([getattr(one, name) for one in self.species]) for name in ("signal", "visible", "expected")
+            name: np.array([getattr(evidence, name) for evidence in self.species])
+            for name in ("signal", "visible", "expected")
         }
-        return table | {name: np.array([getattr(one, name) for one in parts]) for name in numbers}
+        return table | {name: np.array([getattr(component, name) for component in parts]) for name in numbers}
 
     def facts(self) -> dict[str, Any]:
         """Everything as plain numbers, texts, lists and dictionaries."""
@@ -118,15 +119,17 @@ class Identification(Table):
             for row in zip(*(c.tolist() for c in self.columns.values()), strict=True)
         ]
         return {
-            "species": [row | {"rivals": list(one.rivals)} for row, one in zip(rows, self.species, strict=True)],
+            "species": [
+                row | {"rivals": list(evidence.rivals)} for row, evidence in zip(rows, self.species, strict=True)
+            ],
             "unidentified": [
                 {
-                    "frequency_mhz": one.frequency_mhz,
-                    "peak_k": one.peak_k,
-                    "deviations": one.deviations,
-                    "candidates": list(one.candidates),
+                    "frequency_mhz": line.frequency_mhz,
+                    "peak_k": line.peak_k,
+                    "deviations": line.deviations,
+                    "candidates": list(line.candidates),
                 }
-                for one in self.unidentified
+                for line in self.unidentified
             ],
             "candidates": self.candidates,
             "velocity_km_s": self.velocity_km_s,
@@ -174,7 +177,7 @@ def identify(
     """
     sight, choices = sight or Sight(), choices or IdentifyChoices()
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
-    known = [one for one in candidates if len(one.between(first, last))]
+    known = [candidate for candidate in candidates if len(candidate.between(first, last))]
     if not known:
         raise ValueError(f"none of {len(candidates)} candidates has a line from {first:.10g} to {last:.10g} MHz")
     velocity, width = velocity_and_width(spectrum, known, choices.velocity_km_s, choices.fwhm_km_s, sight)
@@ -186,7 +189,7 @@ def identify(
         tuple(
             sorted(
                 (_evidence(fit, k, signal, bank, search) for k, signal in enumerate(selected.tolist())),
-                key=lambda one: -one.signal,
+                key=lambda evidence: -evidence.signal,
             )
         )
         if fit
@@ -210,15 +213,15 @@ class _Bank:
         from scipy.sparse import csr_matrix, vstack
 
         grid = spectrum.frequency_mhz * (1 + sight.redshift)
-        self.start = [Component(one, 1.0, 80.0, velocity, width, choices.size_arcsec) for one in known]
+        self.start = [Component(species, 1.0, 80.0, velocity, width, choices.size_arcsec) for species in known]
         self.temperatures = choices.temperatures_k
         rows = []
-        for one in self.start:
+        for component in self.start:
             for t in self.temperatures:
-                low, high = one.species.partition.range_k
+                low, high = component.species.partition.range_k
                 depth = np.zeros(len(grid))
                 if low <= t <= high or low == high:
-                    depth = component_depth(replace(one, excitation_k=t), grid)[0]
+                    depth = component_depth(replace(component, excitation_k=t), grid)[0]
                     depth = depth * (planck_k(grid, t) - planck_k(grid, sight.background_k * (1 + sight.redshift)))
                 rows.append(csr_matrix(depth))
         self.templates = vstack(rows).tocsr()
@@ -240,8 +243,8 @@ class _Bank:
         at = gain.argmax(axis=1)
         rows = np.arange(len(at))
         parts = [
-            replace(one, column_per_cm2=max(float(column[k, at[k]]), 1.0), excitation_k=self.temperatures[at[k]])
-            for k, one in enumerate(self.start)
+            replace(component, column_per_cm2=max(float(column[k, at[k]]), 1.0), excitation_k=self.temperatures[at[k]])
+            for k, component in enumerate(self.start)
         ]
         return gain[rows, at], parts
 
@@ -305,7 +308,7 @@ class _Search:
         tried = [(self._gain(parts[k], residual, sigma), int(k)) for k in order if gain[k] > self.threshold / 2]
         if not tried:
             return False
-        (best, component), k = max(tried, key=lambda one: one[0][0])
+        (best, component), k = max(tried, key=lambda candidate: candidate[0][0])
         if best < self.threshold:
             self.refused |= {number for _, number in tried}
             return (
@@ -353,19 +356,19 @@ class _Search:
             if signals.min() >= self.threshold:
                 return fit, signals
             lost = (signals < self.threshold / 4) | (signals == signals.min())
-            self.components = [one for one, gone in zip(fit.components, lost, strict=True) if not gone]
-            self.numbers = [one for one, gone in zip(self.numbers, lost, strict=True) if not gone]
+            self.components = [component for component, gone in zip(fit.components, lost, strict=True) if not gone]
+            self.numbers = [number for number, gone in zip(self.numbers, lost, strict=True) if not gone]
         return None, np.zeros(0)
 
     def signals(self, fit: SourceFit) -> Floats:
         """For every species the χ² that is lost without it, those that share its channels fitted again."""
         grid = fit.spectrum.frequency_mhz
-        alone = np.array([model([one], grid, self.sight).brightness_k for one in fit.components])
+        alone = np.array([model([component], grid, self.sight).brightness_k for component in fit.components])
         shines = np.abs(alone) > _SHARED * fit.noise
         out = np.zeros(len(alone))
         for k in range(len(alone)):
             near = [i for i in range(len(alone)) if i != k and (shines[i] & shines[k]).any()]
-            rest = [one for i, one in enumerate(fit.components) if i != k and i not in near]
+            rest = [component for i, component in enumerate(fit.components) if i != k and i not in near]
             left = fit.spectrum.intensity - self.model_k(rest) if rest else fit.spectrum.intensity
             out[k] = self._misfit(fit, left, [fit.components[i] for i in near]) - fit.chi_squared
         return out / _local_scatter(fit, shines)
@@ -393,10 +396,10 @@ def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Searc
     expected, visible = _lines_seen(search.spectrum, alone)
     rest = fit.spectrum.intensity - (fit.model_k - alone)
     gain, _ = bank.best(rest, fit.noise)
-    own = gain[search.numbers[k]]
+    gain_of_species = gain[search.numbers[k]]
     gain[search.numbers] = 0.0
     order = np.argsort(-gain)[:_RIVALS]
-    rivals = tuple(search.known[i].name for i in order if gain[i] > _RIVAL * own)
+    rivals = tuple(search.known[i].name for i in order if gain[i] > _RIVAL * gain_of_species)
     return Evidence(component, signal, visible, expected, rivals)
 
 
@@ -431,6 +434,10 @@ def _unidentified(search: _Search, fit: SourceFit | None) -> tuple[Unidentified,
         at = float(spectrum.frequency_mhz[peak])
         taken |= np.abs(spectrum.frequency_mhz - at) < 1.5 * width * at
         rest = at * (1 + search.sight.redshift) / shift
-        near = [one.name for one in search.known if len(one.between(rest * (1 - width / 2), rest * (1 + width / 2)))]
+        near = [
+            species.name
+            for species in search.known
+            if len(species.between(rest * (1 - width / 2), rest * (1 + width / 2)))
+        ]
         out.append(Unidentified(at, float(spectrum.intensity[peak]), float(deviations[peak]), tuple(near[:5])))
     return tuple(out)

@@ -173,7 +173,7 @@ def model(
     if sight.channel_mhz is not None:
         return _averaged(components, np.asarray(grid_mhz, dtype=np.float64), sight, slopes)
     grid = np.asarray(grid_mhz, dtype=np.float64) * (1 + sight.redshift)
-    depths = [component_depth(one, grid, slopes) for one in components]
+    depths = [component_depth(component, grid, slopes) for component in components]
     total, τ = np.zeros_like(grid), np.zeros_like(grid)
     derivative = np.zeros((len(components), len(PARAMETERS), len(grid))) if slopes else None
     for members in layers(components):
@@ -208,7 +208,7 @@ def _averaged(components: Sequence[Component], grid: Floats, sight: Sight, slope
 
 def layers(components: Sequence[Component]) -> list[Ints]:
     """Numbers of the components of every layer."""
-    labels = np.array([one.layer for one in components])
+    labels = np.array([component.layer for component in components])
     return [np.flatnonzero(labels == label) for label in np.unique(labels)]
 
 

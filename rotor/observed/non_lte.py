@@ -124,7 +124,7 @@ def excited_lines(component: NonLteComponent, sight: Sight | None = None) -> Exc
         raise ValueError(
             f"{component.file}: pythonradex has no solution at {where}: {error or 'outside its rates'}"
         ) from None
-    frequency = np.array([one.nu0 for one in source.emitting_molecule.rad_transitions]) * 1e-6
+    frequency = np.array([transition.nu0 for transition in source.emitting_molecule.rad_transitions]) * 1e-6
     order = np.argsort(frequency)
     depth, kelvin = np.asarray(source.tau_nu0_individual_transitions), np.asarray(source.Tex)
     return ExcitedLines(frequency[order], kelvin[order], depth[order])

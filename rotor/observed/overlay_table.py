@@ -51,24 +51,26 @@ def line_table(spectrum: ObservedSpectrum, components: Sequence[Component], sigh
     """
     rows: list[tuple[Any, ...]] = []
     total = model(components, spectrum.frequency_mhz, sight).brightness_k
-    alone = [model([one], spectrum.frequency_mhz, sight).brightness_k for one in components]
+    alone = [model([component], spectrum.frequency_mhz, sight).brightness_k for component in components]
     for k, component in enumerate(components):
         species = component.species
         observed = species.frequency_mhz * (1 - component.velocity_km_s / KM_PER_S) / (1 + sight.redshift)
         inside = np.flatnonzero((observed > spectrum.frequency_mhz[0]) & (observed < spectrum.frequency_mhz[-1]))
         channels = np.minimum(np.searchsorted(spectrum.frequency_mhz, observed[inside]), len(spectrum) - 1)
         for i, channel in zip(inside.tolist(), channels.tolist(), strict=True):
-            own = alone[k][channel]
-            if abs(own) < VISIBLE * spectrum.noise[channel]:
+            brightness = alone[k][channel]
+            if abs(brightness) < VISIBLE * spectrum.noise[channel]:
                 continue
-            others = max((abs(one[channel]) for j, one in enumerate(alone) if j != k), default=0.0)
+            others = max(
+                (abs(spectrum_of_other[channel]) for j, spectrum_of_other in enumerate(alone) if j != k), default=0.0
+            )
             texts = (species.name, species.frequency_mhz[i], observed[i], str(species.upper[i]), str(species.lower[i]))
             seen = (
                 species.energy_upper_k[i],
-                own,
+                brightness,
                 total[channel],
                 spectrum.intensity[channel],
-                others > BLEND * abs(own),
+                others > BLEND * abs(brightness),
             )
             rows.append((*texts, *seen))
     rows.sort(key=lambda row: row[2])

@@ -126,7 +126,7 @@ def partition_of_top(top: Top, temperatures_k: Sequence[float] = SUMMED_K) -> Pa
     from rotor.thermodynamics.partition import partition_functions
 
     sums = partition_functions(top, list(temperatures_k), refuse=False)
-    selected = [(one.temperature_k, one.q) for one in sums if one.relative_error < 1e-3]
+    selected = [(value.temperature_k, value.q) for value in sums if value.relative_error < 1e-3]
     if not selected:
         raise ValueError(f"{top.name or 'a top'}: Q(T) cannot be summed at any temperature of the table")
     temperatures, q = np.array(selected).T

@@ -99,7 +99,9 @@ def sample_source(fit: SourceFit, steps: int, *, walkers: int | None = None, see
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     time = time if np.isfinite(time) else steps / 10
     draws = sampler.get_chain(discard=min(int(_BURN * time), steps // 2), flat=True)
-    values = np.array([[one.back(value) for one, value in zip(fit.variables.items, row, strict=True)] for row in draws])
+    values = np.array(
+        [[variable.back(value) for variable, value in zip(fit.variables.items, row, strict=True)] for row in draws]
+    )
     return SourceSample(
         fit.variables.names(fit.components), values, time, float(np.mean(sampler.acceptance_fraction)), walkers
     )

@@ -129,10 +129,10 @@ def species_lines(
     blank = np.full(len(frequency), "")
 
     def column(values: ArrayLike | None, otherwise: NDArray[Any]) -> NDArray[Any]:
-        given = otherwise if values is None else np.asarray(values)
-        if given.shape != frequency.shape:
-            raise ValueError(f"{name}: a column of shape {given.shape} for {len(frequency)} lines")
-        return given[order]
+        filled = otherwise if values is None else np.asarray(values)
+        if filled.shape != frequency.shape:
+            raise ValueError(f"{name}: a column of shape {filled.shape} for {len(frequency)} lines")
+        return filled[order]
 
     return SpeciesLines(
         name=name,

@@ -59,18 +59,18 @@ def start_components(
     """
     sight = sight or Sight()
     velocity, width = velocity_and_width(spectrum, species, velocity_km_s, fwhm_km_s, sight)
-    kelvin = [one for one in TEMPERATURES_K if excitation_k is None] or [float(excitation_k or 0.0)]
-    templates = [thin_templates(spectrum, one, kelvin, velocity, width, sight) for one in species]
+    kelvin = [temperature for temperature in TEMPERATURES_K if excitation_k is None] or [float(excitation_k or 0.0)]
+    templates = [thin_templates(spectrum, lines, kelvin, velocity, width, sight) for lines in species]
     chosen, columns = best_temperatures(spectrum, templates)
     out = []
-    for one, bank, t, column in zip(species, templates, chosen, columns, strict=True):
+    for lines, bank, t, column in zip(species, templates, chosen, columns, strict=True):
         t = min(range(len(kelvin)), key=lambda i: abs(kelvin[i] - _MIDDLE_K)) if column == 0 else t
         peak = float(
             np.max(np.abs(bank[t] * spectrum.noise))
         )  # templates are over the noise; peak in K per column density
         floor = float(np.median(spectrum.noise)) / 3 / peak if peak > 0 else 1e12
-        temperature = float(np.clip(kelvin[t], *one.partition.range_k))
-        out.append(Component(one, max(float(column), floor), temperature, velocity, width, size_arcsec))
+        temperature = float(np.clip(kelvin[t], *lines.partition.range_k))
+        out.append(Component(lines, max(float(column), floor), temperature, velocity, width, size_arcsec))
     return out
 
 
@@ -140,7 +140,7 @@ def velocity_and_width(
         return velocity_km_s, fwhm_km_s
     sight = sight or Sight()
     step, grid, data = _even_in_log(spectrum)
-    widths = [one for one in WIDTHS_KM_S if one > 1.5 * step * KM_PER_S] or [3 * step * KM_PER_S]
+    widths = [candidate for candidate in WIDTHS_KM_S if candidate > 1.5 * step * KM_PER_S] or [3 * step * KM_PER_S]
     widths = widths if fwhm_km_s is None else [fwhm_km_s]
     reach = min(int(WIDEST_SHIFT_KM_S / (step * KM_PER_S)), len(grid) // 2)
     shifts = np.arange(-reach, reach + 1)
@@ -148,14 +148,14 @@ def velocity_and_width(
     allowed = np.arange(len(shifts))
     if velocity_km_s is not None:
         allowed = np.array([int(np.argmin(np.abs(velocities - velocity_km_s)))])
-    found: list[tuple[float, float, float, float]] = []  # how far it stands out, score, velocity, width
+    peaks: list[tuple[float, float, float, float]] = []  # how far it stands out, score, velocity, width
     for width in widths:
         score = _score(data, grid * (1 + sight.redshift), species, width, shifts)
         place = int(allowed[np.argmax(score[allowed])])
         elsewhere = score[np.abs(velocities - velocities[place]) > _APART * width].max(initial=1e-300)
-        found.append((float(score[place] / elsewhere), float(score[place]), float(velocities[place]), width))
-    clear = _CLEAR * max(one[0] for one in found)
-    _, _, velocity, width = max((one for one in found if one[0] >= clear), key=lambda one: one[1])
+        peaks.append((float(score[place] / elsewhere), float(score[place]), float(velocities[place]), width))
+    clear = _CLEAR * max(peak[0] for peak in peaks)
+    _, _, velocity, width = max((peak for peak in peaks if peak[0] >= clear), key=lambda peak: peak[1])
     return (velocity if velocity_km_s is None else velocity_km_s), width
 
 
@@ -168,11 +168,11 @@ def _score(data: Floats, grid: Floats, species: Sequence[SpeciesLines], width: f
     clipped = np.minimum(data, _CLIPPED)
     spectrum = np.fft.rfft(clipped - clipped.mean(), length).conj()
     score = np.zeros(len(shifts))
-    for one in species:
+    for lines in species:
         best = np.zeros(len(shifts))
         for kelvin in _CORRELATED_K:
-            t = float(np.clip(kelvin, *one.partition.range_k))
-            template = component_depth(Component(one, 1.0, t, 0.0, width), grid)[0]
+            t = float(np.clip(kelvin, *lines.partition.range_k))
+            template = component_depth(Component(lines, 1.0, t, 0.0, width), grid)[0]
             if (norm := float(np.linalg.norm(template))) > 0:
                 best = np.maximum(best, np.fft.irfft(spectrum * np.fft.rfft(template, length), length)[shifts] / norm)
         score += best**4

@@ -53,11 +53,13 @@ class Variables:
 
     def names(self, components: Sequence[Component]) -> tuple[str, ...]:
         """Such as `CO column_per_cm2`; a number follows where a species has several components."""
-        return tuple(f"{_who(one, components)} {one.name}" for one in self.items)
+        return tuple(f"{_who(variable, components)} {variable.name}" for variable in self.items)
 
     def values(self, components: Sequence[Component]) -> Floats:
         """What the search moves (m,), at the values of components; of shared ones the first counts."""
-        return np.array([one.forward(getattr(components[one.components[0]], one.name)) for one in self.items])
+        return np.array(
+            [variable.forward(getattr(components[variable.components[0]], variable.name)) for variable in self.items]
+        )
 
     def applied(self, components: Sequence[Component], values: Floats) -> list[Component]:
         """The components with the values (m,) of a search; ValueError where one is out of bounds."""
@@ -65,7 +67,10 @@ class Variables:
         for variable, value in zip(self.items, values.tolist(), strict=True):
             for k in variable.components:
                 changes[k][variable.name] = variable.back(value)
-        return [replace(one, **change) if change else one for one, change in zip(components, changes, strict=True)]  # type: ignore[arg-type]
+        return [
+            replace(component, **change) if change else component
+            for component, change in zip(components, changes, strict=True)
+        ]  # type: ignore[arg-type]
 
     def jacobian(self, components: Sequence[Component], slopes: Floats) -> Floats:
         """Derivatives (n, m) of the brightness by what the search moves, from the slopes (k, 5, n) of `model`."""
@@ -90,7 +95,7 @@ def _who(variable: Variable, components: Sequence[Component]) -> str:
     texts = []
     for k in variable.components:
         name = components[k].species.name
-        alike = [i for i, one in enumerate(components) if one.species.name == name]
+        alike = [i for i, component in enumerate(components) if component.species.name == name]
         texts.append(name if len(alike) == 1 else f"{name} ({alike.index(k) + 1})")
     return ", ".join(texts)
 

@@ -51,11 +51,11 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         peaks = answer.request.peaks
         upper.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
-        for number, one in enumerate(answer.species):
+        for number, species in enumerate(answer.species):
             colour = COLOURS[number % len(COLOURS)]
-            f, height = predicted_sticks(one, peaks.band_mhz)
-            upper.vlines(f, -height, 0, color=colour, lw=0.7, label=_label(one))
-            rows = np.unique(one.peak)
+            f, height = predicted_sticks(species, peaks.band_mhz)
+            upper.vlines(f, -height, 0, color=colour, lw=0.7, label=_label(species))
+            rows = np.unique(species.peak)
             upper.vlines(peaks.frequency_mhz[rows], 0, peaks.intensity[rows], color=colour, lw=0.7)
         left = answer.unexplained
         lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
@@ -71,18 +71,20 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         return figure
 
 
-def predicted_sticks(one: AssignedSpecies, band_mhz: tuple[float, float]) -> tuple[Any, Any]:
+def predicted_sticks(species: AssignedSpecies, band_mhz: tuple[float, float]) -> tuple[Any, Any]:
     """Frequencies and heights of the lines of a species in a band, the strongest as high as was fitted."""
     from rotor.spectra.lines import line_list
 
-    lines = line_list(one.top, temperature_k=one.grown.temperature_k, jmax=40, range_mhz=band_mhz, untrusted=True)
+    lines = line_list(
+        species.top, temperature_k=species.grown.temperature_k, jmax=40, range_mhz=band_mhz, untrusted=True
+    )
     intensity = 10 ** lines.columns["lgint"]
-    height = one.strength * intensity / intensity.max(initial=1e-300)
-    seen = height > 0.003 * one.strength
+    height = species.strength * intensity / intensity.max(initial=1e-300)
+    seen = height > 0.003 * species.strength
     return lines.frequency_mhz[seen], height[seen]
 
 
-def _label(one: AssignedSpecies) -> str:
-    a, b, c = one.refined.values[:3]
-    name = one.isotopologue or f"{one.kind}-type"
-    return f"{a:.1f}, {b:.1f}, {c:.1f} MHz, {name}, {one.word}"
+def _label(species: AssignedSpecies) -> str:
+    a, b, c = species.refined.values[:3]
+    name = species.isotopologue or f"{species.kind}-type"
+    return f"{a:.1f}, {b:.1f}, {c:.1f} MHz, {name}, {species.word}"

@@ -28,7 +28,7 @@ _DIFFERENCES = ((1e-1, 1e3, "kHz"), (1e2, 1.0, "MHz"), (np.inf, 1e-3, "GHz"))  #
 
 
 def plot_comparison(
-    found: Comparison,
+    comparison: Comparison,
     path: str | os.PathLike[str],
     *,
     names: tuple[str, str] = ("", ""),
@@ -56,14 +56,14 @@ def plot_comparison(
         For another suffix.
     """
     checked_suffix(path)
-    figure = comparison_figure(found, names=names)
+    figure = comparison_figure(comparison, names=names)
     show_part(figure.axes[0], View(horizontal=view.horizontal), scale=1e-3)
     if view.title is not None:
         figure.axes[0].set_title(view.title, loc="left")
     save(figure, path, view.title or " and ".join(filter(None, names)), {"command": command})
 
 
-def comparison_figure(found: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:
+def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:
     """A matplotlib figure of two lists and the differences of their matched lines.
 
     Parameters
@@ -79,24 +79,24 @@ def comparison_figure(found: Comparison, *, names: tuple[str, str] = ("", "")) -
     ValueError
         Without lines on either side.
     """
-    if not len(found.reference) and not len(found.ours):
+    if not len(comparison.reference) and not len(comparison.ours):
         raise ValueError("neither list has a line to draw; widen the range or lower the cut")
     with styled():
         figure = new_figure((7.2, 5.0))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-        _draw_mirror(above, found, names)
-        _draw_differences(below, found)
+        _draw_mirror(above, comparison, names)
+        _draw_differences(below, comparison)
         below.set_xlabel("Frequency (GHz)")
         figure.align_ylabels()
     return figure
 
 
-def _draw_mirror(axes: Any, found: Comparison, names: tuple[str, str]) -> None:
-    both = np.concatenate([found.reference.lgint, found.ours.lgint])
+def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> None:
+    both = np.concatenate([comparison.reference.lgint, comparison.ours.lgint])
     bottom = float(np.floor(both[np.isfinite(both)].min())) - 0.3
     sides = (
-        (found.reference, found.of_reference, found.missing, 1.0, name_text(names[0]) or "first list"),
-        (found.ours, found.of_ours, found.extra, -1.0, name_text(names[1]) or "second list"),
+        (comparison.reference, comparison.of_reference, comparison.missing, 1.0, name_text(names[0]) or "first list"),
+        (comparison.ours, comparison.of_ours, comparison.extra, -1.0, name_text(names[1]) or "second list"),
     )
     for lines, matched, alone, sign, name in sides:
         label = f"{name}: {len(matched)} matched" if len(matched) else name
@@ -126,14 +126,14 @@ def _sticks(axes: Any, lines: Catalogue, rows: Ints, drawn: tuple[float, float, 
     )  # fmt: skip
 
 
-def _draw_differences(axes: Any, found: Comparison) -> None:
+def _draw_differences(axes: Any, comparison: Comparison) -> None:
     """Other minus reference of matched lines, with the errors of the reference where it was measured."""
     axes.axhline(0.0, color=GREY, linewidth=0.7)
-    off = found.differences("frequency_mhz")
+    off = comparison.differences("frequency_mhz")
     factor, unit = next((f, name) for most, f, name in _DIFFERENCES if np.abs(off).max(initial=0.0) <= most)
-    ghz = found.reference.frequency_mhz[found.of_reference] / 1e3
-    seen = found.measured
-    errors: Floats = found.reference.error_mhz[found.of_reference]
+    ghz = comparison.reference.frequency_mhz[comparison.of_reference] / 1e3
+    seen = comparison.measured
+    errors: Floats = comparison.reference.error_mhz[comparison.of_reference]
     if (~seen).any():
         axes.plot(
             ghz[~seen], factor * off[~seen], ".", color=BLUE, markersize=3, rasterized=len(off) > MOST_VECTOR_STICKS

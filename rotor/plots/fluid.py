@@ -47,7 +47,7 @@ def plot_fluid(
     checked_suffix(path)
     title = title if view.title is None else view.title
     figure = fluid_figure(record, shells, molecules, title=title)
-    warm, deep = (one for one in figure.axes if one.get_xlabel() == TIME)
+    warm, deep = (panel for panel in figure.axes if panel.get_xlabel() == TIME)
     show_part(warm, view)
     show_part(deep, View(horizontal=view.horizontal))
     save(figure, path, title, provenance or {})

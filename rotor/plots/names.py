@@ -40,7 +40,7 @@ def name_peaks(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) 
     (first, last), (low, high) = sorted(axes.get_xlim()), axes.get_ylim()
     pixels = axes.transData.transform(drawn)
     taken: list[Any] = []
-    for peak in sorted(peaks, key=lambda one: -one.y):
+    for peak in sorted(peaks, key=lambda each: -each.y):
         if len(taken) == most or not (first <= peak.x <= last and low < peak.y <= high):
             continue
         leave_or_remove(_written(axes, peak), axes, taken, pixels)

@@ -93,7 +93,7 @@ def overlay_figure(
         model(components, spectrum.frequency_mhz, sight).brightness_k if components else np.zeros(len(spectrum))
     )
     lines = line_table(spectrum, components, sight).columns
-    names = list(dict.fromkeys(one.species.name for one in components))
+    names = list(dict.fromkeys(component.species.name for component in components))
     with styled():
         size = (
             PAGE_INCHES[0],
@@ -152,7 +152,7 @@ def _name(
     axes: Any, lines: Mapping[str, Any], names: Sequence[str], spectrum: ObservedSpectrum, brightness: Floats
 ) -> None:
     """Names above modelled lines in the colour of their species; a star marks a blend."""
-    first, last = (1e3 * one for one in axes.get_xlim())
+    first, last = (1e3 * edge for edge in axes.get_xlim())
     rows = np.flatnonzero([first <= at <= last for at in lines["observed_mhz"].tolist()])
     peaks = [
         Peak(

@@ -120,8 +120,8 @@ def joined(*facts: Mapping[str, Any] | None) -> str:
     >>> joined({"command": "a", "jmax": 1}, {"jmax": 2}, None)
     'command: a; jmax: 2'
     """
-    every = {name: value for some in facts for name, value in (some or {}).items()}
-    return "; ".join(f"{name}: {value}" for name, value in every.items())
+    merged = {name: value for mapping in facts for name, value in (mapping or {}).items()}
+    return "; ".join(f"{name}: {value}" for name, value in merged.items())
 
 
 def formula_text(formula: str) -> str:

@@ -76,7 +76,7 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
 
 def _spacing(energies: Any, v: Any) -> float:
     """Smallest mean distance between the levels of neighbouring v, cm⁻¹."""
-    means = np.array([energies[v == one].mean() for one in np.unique(v)])
+    means = np.array([energies[v == state].mean() for state in np.unique(v)])
     apart = np.abs(np.diff(means))
     wide = apart[apart > 0.1 * apart.max(initial=0.0)]
     return float(wide.min()) if len(wide) else max(float(energies.max()), 1.0)

@@ -62,14 +62,14 @@ def work_precision_figure(panels: Sequence[Panel], title: str = "") -> Any:
         figure = new_figure(
             (2 * wide if across == 1 else across * wide, (1.3 if across == 1 else 1.0) * high * down + 0.3)
         )
-        every = figure.subplots(down, across, squeeze=False).ravel()
-        drawn = [_draw(axes, panel) for axes, panel in zip(every, panels, strict=False)]
-        for axes in every[len(panels) :]:
+        all_axes = figure.subplots(down, across, squeeze=False).ravel()
+        drawn = [_draw(axes, panel) for axes, panel in zip(all_axes, panels, strict=False)]
+        for axes in all_axes[len(panels) :]:
             axes.set_axis_off()
         if title:
             figure.suptitle(title, x=0.01, ha="left")
         figure.canvas.draw()  # places the axes, so that names can be placed in pixels
-        for axes, curves in zip(every, drawn, strict=False):
+        for axes, curves in zip(all_axes, drawn, strict=False):
             _name_settings(axes, curves)
     return figure
 
@@ -105,7 +105,7 @@ Places = list[tuple[Point, float]]  # settings of a curve, with the errors as th
 def _draw(axes: Any, panel: Panel) -> list[Places]:
     """Draw the curves of a panel."""
     points = [point for curve in panel.curves.values() for point in curve]
-    floor = max(min((one.error for one in points if one.error > 0.0), default=0.0) / 10.0, LEAST_DRAWN)
+    floor = max(min((point.error for point in points if point.error > 0.0), default=0.0) / 10.0, LEAST_DRAWN)
     few = len(panel.curves) == 1
     drawn: list[Places] = []
     for number, (name, curve) in enumerate(panel.curves.items()):
@@ -115,7 +115,7 @@ def _draw(axes: Any, panel: Panel) -> list[Places]:
     axes.set(xscale="log", yscale="log", xlabel="processor time (s)", ylabel=f"error of {panel.of}")
     axes.margins(x=0.25, y=0.15)
     _at_least_a_decade(axes)
-    if any(one.error == 0.0 for one in points):
+    if any(point.error == 0.0 for point in points):
         axes.text(0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=6.5, color=GREY)
     axes.set_title(panel.title, loc="left")
     axes.grid(alpha=0.25)
@@ -149,30 +149,35 @@ def _at_least_a_decade(axes: Any) -> None:
 def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str, str], joined: bool) -> list[float]:
     """Draw one curve; the errors as they are drawn."""
     colour, marker, name = look
-    times, errors = [one.seconds for one in curve], [max(one.error, floor) for one in curve]
+    times, errors = [point.seconds for point in curve], [max(point.error, floor) for point in curve]
     if joined and len(curve) >= LEAST_JOINED:
         axes.plot(times, errors, color=colour, linewidth=0.8, alpha=0.6)
-    for one, error in zip(curve, errors, strict=True):
+    for point, error in zip(curve, errors, strict=True):
         axes.plot(
-            one.seconds, error, marker, color=colour, markersize=4.5, fillstyle="full" if one.error > 0.0 else "none"
+            point.seconds,
+            error,
+            marker,
+            color=colour,
+            markersize=4.5,
+            fillstyle="full" if point.error > 0.0 else "none",
         )
-        if one.own:
-            axes.plot(one.seconds, error, "o", color=ORANGE, markersize=10, fillstyle="none")
+        if point.own:
+            axes.plot(point.seconds, error, "o", color=ORANGE, markersize=10, fillstyle="none")
     axes.plot([], [], marker, color=colour, markersize=4.5, label=name)
     return errors
 
 
 def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
     """The setting beside each point, the ends of curves first, where it lies on no other name and on no mark."""
-    marks = axes.transData.transform([(one.seconds, error) for curve in curves for one, error in curve])
+    marks = axes.transData.transform([(point.seconds, error) for curve in curves for point, error in curve])
     taken: list[Any] = []
     ends = [place for curve in curves for place in (curve[0], curve[-1])[: len(curve)]]
     inner = [place for curve in curves for place in curve[1:-1]]
-    for one, error in ends + inner:
-        if not one.setting:
+    for point, error in ends + inner:
+        if not point.setting:
             continue
         text = axes.annotate(
-            one.setting, (one.seconds, error), xytext=(0, 0), textcoords="offset points", fontsize=6.5, color=GREY
+            point.setting, (point.seconds, error), xytext=(0, 0), textcoords="offset points", fontsize=6.5, color=GREY
         )
         text.set_in_layout(False)
         if not any(_fits_at(text, axes, offset, taken, marks) for offset in PLACES):

@@ -98,12 +98,12 @@ def plot_zeeman(
 
 def _levels(field_map: FieldMap, spins: int) -> dict[str, list[slice]]:
     """The first levels, in order of energy, with their curves."""
-    found: dict[str, list[slice]] = {}
+    by_level: dict[str, list[slice]] = {}
     curves = sorted(field_map.curves(), key=lambda rows: float(field_map.free_mhz[rows.start]))
     for rows in curves:
         words = str(field_map.label[rows.start]).split()
-        found.setdefault(" ".join(words[: len(words) - spins]), []).append(rows)
-    return dict(list(found.items())[:PANELS])
+        by_level.setdefault(" ".join(words[: len(words) - spins]), []).append(rows)
+    return dict(list(by_level.items())[:PANELS])
 
 
 def _panel(axes: Any, field_map: FieldMap, label: str, curves: list[slice]) -> None:

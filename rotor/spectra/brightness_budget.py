@@ -56,7 +56,7 @@ def brightness_budget(answer: Any) -> ErrorBudget:
     brightness, depth = (0.0, 0.0) if peak is None else (abs(peak.brightness_k), peak.optical_depth)
     per_mhz = opaque * steepness(depth) / (float(observed) * source.fwhm_km_s / KM_PER_S)
     rounding_mhz = 2 * ROUNDING * units.MHZ_PER_K * float(lines.energy_upper_k.max(initial=0.0))
-    left_out = math.fsum(one.left_out_depth for one in answer.emitted)
+    left_out = math.fsum(species.left_out_depth for species in answer.emitted)
     return ErrorBudget(
         of="brightness",
         unit="K",

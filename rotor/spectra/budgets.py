@@ -58,12 +58,12 @@ def frequencies_budget(
         rounding=replace(energy, value=2 * energy.value, source="difference of two eigenvalues in double precision"),
         truncation=truncation,
         model=model_term(limits),
-        data=_of_strong_lines(intensities, errors_mhz, source),
+        data=_strong_line_error(intensities, errors_mhz, source),
         statistics=NO_SAMPLES,
     )
 
 
-def _of_strong_lines(intensities: Floats, errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
+def _strong_line_error(intensities: Floats, errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
     if errors_mhz is None or not len(intensities):
         return data_term(None, source)
     strong = np.abs(intensities) >= STRONG * np.abs(intensities).max()

@@ -194,10 +194,10 @@ def emission(
     lists = list(lines) if isinstance(lines, Sequence) else [lines]
     sources = (source,) * len(lists) if isinstance(source, Source) else tuple(source)
     require_layer(sources, len(lists))
-    return together([_of_molecule(each, one, grid) for each, one in zip(lists, sources, strict=True)])
+    return together([_molecule_emission(each, source, grid) for each, source in zip(lists, sources, strict=True)])
 
 
-def _of_molecule(lines: LinesAtRest, source: Source, grid: Floats) -> Emission:
+def _molecule_emission(lines: LinesAtRest, source: Source, grid: Floats) -> Emission:
     _refuse_other_temperature(lines, source)
     depth = _optical_depth(grid, lines, source)
     brightness = source.filling * contrast_k(grid, source) * -np.expm1(-depth)

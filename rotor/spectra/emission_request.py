@@ -84,7 +84,7 @@ _OF_EACH = ("column_per_cm2", "excitation_k", "fwhm_km_s", "velocity_km_s")
 
 def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
     """The source of each molecule of a subject, which has what some of them have otherwise in `values`."""
-    count, own = len(subject.values["molecules"]), subject.own
+    count, of_molecule = len(subject.values["molecules"]), subject.own
     for name in _OF_EACH:
         values = getattr(layer, name)
         if len(values) not in (1, count):
@@ -95,7 +95,7 @@ def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
 
     def value(name: str, number: int) -> float:
         values = getattr(layer, name)
-        return float(own[number].get(name, values[number if len(values) > 1 else 0]))
+        return float(of_molecule[number].get(name, values[number if len(values) > 1 else 0]))
 
     shared = {"background_k": layer.background_k, "filling": layer.filling, "redshift": layer.redshift}
     return tuple(Source(**{name: value(name, number) for name in _OF_EACH}, **shared) for number in range(count))
@@ -125,11 +125,11 @@ class WindowInput:
     )  # fmt: skip
 
 
-def _window(given: WindowInput, subject: Any) -> tuple[float, float]:
-    found = given.range_mhz or given.band
-    if found is None:
+def _window(window: WindowInput, subject: Any) -> tuple[float, float]:
+    band = window.range_mhz or window.band
+    if band is None:
         raise ValueError("range_mhz: expected a range or a band, such as 86:116GHz or ALMA3")
-    return found
+    return band
 
 
 def _brightness_error(answer: Any, reference: Any) -> float:
@@ -301,10 +301,10 @@ class EmissionAnswer(TextOf):
 
     def _molecule_facts(self, number: int) -> dict[str, Any]:
         source, lines, molecule = self.request.sources[number], self.emitted[number], self.request.molecules[number]
-        own = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+        columns = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
         return {
             "name": self.request.names[number],
-            **{name: value for name, value in asdict(source).items() if name in own},
+            **{name: value for name, value in asdict(source).items() if name in columns},
             "q": lines.q,
             "q_source": lines.q_source,
             "quantum_numbers": list(lines.quanta),
@@ -344,7 +344,7 @@ def _line_table(request: EmissionRequest, number: int, emitted: EmittedLines, so
     lines, observed = emitted.where(rows), centres[rows]
     depth = peak_depth(lines, source)
     contrast = source.filling * contrast_k(observed, source)
-    integral = np.array([_across(one) for one in depth]) * source.fwhm_km_s
+    integral = np.array([_across(optical_depth) for optical_depth in depth]) * source.fwhm_km_s
     return EmissionLines(
         names=request.names,
         molecule=np.full(len(depth), number, dtype=np.int64),

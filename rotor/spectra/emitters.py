@@ -162,11 +162,11 @@ def emitted_lines(
         ν / source.frequency_ratio * (1 + wing) for ν, wing in zip(range_mhz, (-widths, widths), strict=True)
     )
     if isinstance(molecule, CatalogueLines):
-        return _of_catalogue(molecule, source, (first, last), least_depth)
-    return _of_top(molecule, source, (first, last), least_depth, tuple(effects))
+        return _catalogue_lines(molecule, source, (first, last), least_depth)
+    return _top_lines(molecule, source, (first, last), least_depth, tuple(effects))
 
 
-def _of_top(
+def _top_lines(
     top: Top, source: Source, rest_mhz: tuple[float, float], least_depth: float, effects: tuple[QuantumEffect, ...]
 ) -> EmittedLines:
     """The optical depth of a Gaussian at its centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the first frequency, gives the cut."""
@@ -233,17 +233,17 @@ def depth_of_blends(frequency_mhz: Floats, depth: Floats, source: Source) -> flo
     first, last = np.searchsorted(places, places - 3 * width), np.searchsorted(places, places + 3 * width)
     near = [slice(*pair) for pair in zip(first.tolist(), last.tolist(), strict=True)]
     sums = [
-        float(depths[group] @ np.exp(-4 * math.log(2) * ((places[group] - place) / own) ** 2))
-        for group, place, own in zip(near, places.tolist(), width.tolist(), strict=True)
+        float(depths[group] @ np.exp(-4 * math.log(2) * ((places[group] - place) / line_width) ** 2))
+        for group, place, line_width in zip(near, places.tolist(), width.tolist(), strict=True)
     ]
     return BETWEEN * max(sums)
 
 
-def _of_catalogue(
+def _catalogue_lines(
     catalogue: CatalogueLines, source: Source, rest_mhz: tuple[float, float], least_depth: float
 ) -> EmittedLines:
     lines, temperature = catalogue.between(*rest_mhz), source.excitation_k
-    every = EmittedLines(
+    all_lines = EmittedLines(
         temperature_k=temperature,
         frequency_mhz=lines.frequency_mhz,
         intensity_nm2_mhz=lines.intensity_nm2_mhz(temperature),
@@ -255,7 +255,7 @@ def _of_catalogue(
         q=catalogue.partition.at(temperature),
         q_source=catalogue.partition.source,
     )
-    depth = peak_depth(every, source)
+    depth = peak_depth(all_lines, source)
     weak = depth < least_depth
-    left_out = depth_of_blends(every.frequency_mhz[weak], depth[weak], source)
-    return replace(every.where(np.flatnonzero(~weak)), left_out_depth=left_out)
+    left_out = depth_of_blends(all_lines.frequency_mhz[weak], depth[weak], source)
+    return replace(all_lines.where(np.flatnonzero(~weak)), left_out_depth=left_out)

@@ -107,9 +107,9 @@ class Lines(TransitionTable):
         beyond = (
             f"{counted(self.untrusted, 'line')} of levels beyond the reach of the distortion constants {verb} left out"
         )
-        found = () if self._tabulated else warnings_of(self.top, self.levels)
-        found += (beyond,) if self.untrusted else ()
-        return found + ((partly,) if known and exact else ())
+        limits = () if self._tabulated else warnings_of(self.top, self.levels)
+        limits += (beyond,) if self.untrusted else ()
+        return limits + ((partly,) if known and exact else ())
 
     @property
     def _tabulated(self) -> bool:
@@ -339,30 +339,30 @@ def line_list(
         raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
     dipole = _dipole_of(top)
     least = -math.inf if min_lgint is None else min_lgint
-    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)
-    if given is None and (jmax is None or math.isfinite(least)):
-        given = partition_function(top, temperature_k, effects=effects)
+    stated = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)
+    if stated is None and (jmax is None or math.isfinite(least)):
+        stated = partition_function(top, temperature_k, effects=effects)
     if jmax is None:
-        jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
+        jmax = jmax_for_cut(top, dipole, temperature_k, stated.q if stated else 1.0, least)
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
     ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))
-    cut = intensity_cut(levels, temperature_k, given.q, least, ground) if given and math.isfinite(ground) else None
+    cut = intensity_cut(levels, temperature_k, stated.q, least, ground) if stated and math.isfinite(ground) else None
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
-    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
-    inside = None if trusted.all() else trusted[found.upper] & trusted[found.lower]
+    transitions = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
+    inside = None if trusted.all() else trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         top=top,
         levels=levels if inside is None else replace(levels, weight=np.where(trusted, levels.weight, 0)),
-        frequency_mhz=found.frequency_mhz,
-        strength_debye2=found.strength_debye2,
-        upper=found.upper,
-        lower=found.lower,
+        frequency_mhz=transitions.frequency_mhz,
+        strength_debye2=transitions.strength_debye2,
+        upper=transitions.upper,
+        lower=transitions.lower,
         temperature_k=temperature_k,
         min_lgint=least,
         range_mhz=range_mhz,
-        given_partition=given,
+        given_partition=stated,
         covariance=covariance,
         untrusted=0 if inside is None else int(np.count_nonzero(~inside)),
     )

@@ -32,15 +32,15 @@ SHARES_OF_J = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)  # of the J max of the scene
 BEYOND = 1.3  # times that J max: the reference
 
 
-def line_error(found: Any, reference: Any) -> float:
+def line_error(answer: Any, reference: Any) -> float:
     """The largest difference in MHz of a frequency of the reference's lines, from the levels of another list."""
-    energies = energies_like(reference.levels, found.levels)
+    energies = energies_like(reference.levels, answer.levels)
     return largest(energies[reference.upper] - energies[reference.lower] - reference.frequency_mhz)
 
 
-def shift_error(found: Any, reference: Any) -> float:
+def shift_error(answer: Any, reference: Any) -> float:
     """The largest difference in MHz of a Raman shift of the reference's lines, from the levels of another list."""
-    energies = energies_like(reference.levels, found.levels)
+    energies = energies_like(reference.levels, answer.levels)
     return largest(energies[reference.final] - energies[reference.initial] - reference.shift_mhz)
 
 
@@ -59,10 +59,10 @@ def sweeps_of_lines(
     settings = tuple(Setting(str(j), replace(request, jmax=j), j == jmax) for j in values)
     reach = Sweep("numerics.jmax", (measure,), settings, replace(request, jmax=beyond), f"J max {beyond}", answer)
 
-    def of_lines(found: Any, reference: Any) -> float:
-        return error(found.lines, reference.lines)
+    def line_measure(answer: Any, reference: Any) -> float:
+        return error(answer.lines, reference.lines)
 
-    further = (*distortion(fixed, of_lines, of, answer), *hyperfine(fixed, of_lines, of, answer))
+    further = (*distortion(fixed, line_measure, of, answer), *hyperfine(fixed, line_measure, of, answer))
     return Sweeps((reach, *further), of_states(request.top))
 
 
@@ -127,7 +127,9 @@ def allowed_lines(top: Top, jmax: int) -> int:
 
 
 def _flipped(species: str, flip: tuple[bool, bool]) -> str:
-    return "".join({"e": "o", "o": "e"}[one] if change else one for one, change in zip(species, flip, strict=True))
+    return "".join(
+        {"e": "o", "o": "e"}[letter] if change else letter for letter, change in zip(species, flip, strict=True)
+    )
 
 
 def plan_of_spectrum(request: Any) -> Plan:
@@ -156,7 +158,7 @@ def plan_of_spectrum(request: Any) -> Plan:
         pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
     ]
     described = of_top(top, j, request.effects)
-    absent = largest_first([*described.pop("left_out"), *(one for one in widths if one is not None)])
+    absent = largest_first([*described.pop("left_out"), *(part for part in widths if part is not None)])
     return Plan(
         kind="spectrum",
         **described,
@@ -240,8 +242,8 @@ def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
             continue
         j, taken = populated_j(top, source.excitation_k), lines.effects
         effects += [f"{name}: {text}" for text in effect_texts(top, j, taken)]
-        largest = [one for one in left_out_of_levels(top, j, taken) if one.size is not None][:1]
-        absent += [replace(one, name=f"{name}: {one.name}") for one in largest]
+        largest = [part for part in left_out_of_levels(top, j, taken) if part.size is not None][:1]
+        absent += [replace(part, name=f"{name}: {part.name}") for part in largest]
     return {
         "effects": tuple(effects),
         "parts": (

@@ -208,11 +208,11 @@ def raman_lines(
         jmax = jmax_for_raman(top, temperature_k, min_relative or DEFAULT_MIN_RELATIVE)
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
-    found = raman_transitions(levels, tensor, top.spin_weights)
+    transitions = raman_transitions(levels, tensor, top.spin_weights)
     partition = partition_of(top, temperature_k, q, 1.0, vibrations, effects) or partition_function(
         top, temperature_k, effects=effects
     )
-    lines = _both_ways(top, levels, found, temperature_k, laser_nm, least, partition)
+    lines = _both_ways(top, levels, transitions, temperature_k, laser_nm, least, partition)
     lines = lines.where(lines.scattered_cm > 0)
     if len(lines) and least:
         section = lines.cross_section_cm2_per_sr
@@ -242,22 +242,22 @@ def _refuse_nonsense(temperature_k: float, laser_nm: float, min_relative: float 
 def _both_ways(
     top: Top,
     levels: Levels,
-    found: RamanTransitions,
+    transitions: RamanTransitions,
     temperature_k: float,
     laser_nm: float,
     least: float,
     partition: PartitionFunction,
 ) -> RamanLines:
     """A Stokes line from the lower state of each pair and an anti-Stokes line from the upper one."""
-    shift = levels.energy_mhz[found.upper] - levels.energy_mhz[found.lower]
+    shift = levels.energy_mhz[transitions.upper] - levels.energy_mhz[transitions.lower]
     return RamanLines(
         top=top,
         levels=levels,
         shift_mhz=np.concatenate([shift, -shift]),
-        strength_angstrom6=np.tile(found.strength_angstrom6, 2),
-        initial=np.concatenate([found.lower, found.upper]),
-        final=np.concatenate([found.upper, found.lower]),
-        weight=np.tile(found.weight, 2),
+        strength_angstrom6=np.tile(transitions.strength_angstrom6, 2),
+        initial=np.concatenate([transitions.lower, transitions.upper]),
+        final=np.concatenate([transitions.upper, transitions.lower]),
+        weight=np.tile(transitions.weight, 2),
         temperature_k=temperature_k,
         laser_nm=laser_nm,
         min_relative=least,

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 def section_left_out(answer: Any, reference: Any) -> float:
     """The part of the cross section in percent that a list leaves out."""
-    part, whole = (float(one.lines.cross_section_cm2_per_sr.sum()) for one in (answer, reference))
+    part, whole = (float(each.lines.cross_section_cm2_per_sr.sum()) for each in (answer, reference))
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 

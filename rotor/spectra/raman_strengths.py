@@ -83,7 +83,7 @@ def raman_transitions(
     if levels.representation is not None:
         if levels.blocks and _is_axial(levels.blocks[0]):
             _refuse_without_axis(levels, tensor)
-        return _inelastic(levels, _joined(list(_of_blocks(levels, tensor))))
+        return _inelastic(levels, _joined(list(_block_transitions(levels, tensor))))
     if levels.kind == "linear":
         return _linear(levels, tensor)
     return _symmetric(levels, tensor, spin_weights)
@@ -126,7 +126,7 @@ def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight
     return RamanTransitions(strength, np.where(falls, second, first), np.where(falls, first, second), weight[exists])
 
 
-def _of_both(levels: Levels, first: Ints, second: Ints) -> Floats:
+def _joint_weights(levels: Levels, first: Ints, second: Ints) -> Floats:
     """Weight of one component where both states have the same; 0 where one of them does not exist."""
     each = levels.weight_per_component
     return np.asarray(np.where(each[second] > 0, each[first], 0.0))
@@ -142,7 +142,7 @@ def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
     first = np.flatnonzero(all_j + 2 <= levels.jmax)
     j, second = all_j[first], levels.rows_of(j=all_j[first] + 2)
     strength = 1.5 * (j + 1) * (j + 2) / (2 * j + 3) * anisotropy**2
-    return _ordered(levels, strength, first, second, _of_both(levels, first, second))
+    return _ordered(levels, strength, first, second, _joint_weights(levels, first, second))
 
 
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
@@ -158,11 +158,11 @@ def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> Ram
         if spin_weights.rule == "K":
             raise ValueError("spin weights by K need an axis, and the polarizability has none; check the tensor")
         return _without_axis(levels, tensor, spin_weights, representation)
-    pieces = [_of_axial(levels, delta_j, float(along)) for delta_j in (1, 2)]
+    pieces = [_axial_transitions(levels, delta_j, float(along)) for delta_j in (1, 2)]
     return _joined([piece for piece in pieces if len(piece.lower)])
 
 
-def _of_axial(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
+def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
     """K → K, J → J + ΔJ, both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
     all_j, all_k = levels.quanta["j"], levels.quanta["k"]
     lower = all_j + delta_j <= levels.jmax
@@ -175,7 +175,7 @@ def _of_axial(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
     state = {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}  # no polarizability connects two states
     first, second = np.flatnonzero(lower), levels.rows_of(j=j + delta_j, k=k, **state)
     strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
-    return _ordered(levels, strength, first, second, _of_both(levels, first, second))
+    return _ordered(levels, strength, first, second, _joint_weights(levels, first, second))
 
 
 def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, representation: str) -> RamanTransitions:
@@ -201,19 +201,19 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, rep
     return _summed(levels, _joined(pieces))
 
 
-def _summed(levels: Levels, found: RamanTransitions) -> RamanTransitions:
+def _summed(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:
     """One line for every pair of rows, its weight the mean by strength."""
-    keys, place = np.unique(found.lower * len(levels) + found.upper, return_inverse=True)
+    keys, place = np.unique(transitions.lower * len(levels) + transitions.upper, return_inverse=True)
     strength, weighted = np.zeros(len(keys)), np.zeros(len(keys))
-    np.add.at(strength, place, found.strength_angstrom6)
-    np.add.at(weighted, place, found.strength_angstrom6 * found.weight)
+    np.add.at(strength, place, transitions.strength_angstrom6)
+    np.add.at(weighted, place, transitions.strength_angstrom6 * transitions.weight)
     return RamanTransitions(strength, keys // len(levels), keys % len(levels), weighted / strength)
 
 
 # Asymmetric tops
 
 
-def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
+def _block_transitions(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
     """Between solved blocks; several states have the polarizability of the first, and none connects two of them."""
     anisotropic = body_tensor(tensor, 2, str(levels.representation))
     tensors = {(v, v): anisotropic for v in np.unique(levels.quanta.get("v", np.zeros(1, dtype=np.int64))).tolist()}
@@ -226,16 +226,19 @@ def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
         yield _between(levels, up, low, 1.5 * reduced.amplitudes(up, low, tensors) ** 2)
 
 
-def _inelastic(levels: Levels, found: RamanTransitions) -> RamanTransitions:
+def _inelastic(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:
     """The lines without those between components that nuclear spins make of one level."""
     if "f" not in levels.quanta:
-        return found
+        return transitions
     spins = [name for name in levels.quanta if name in ("i_sym", "i_tot") or name.startswith("f")]
     numbers = np.column_stack([levels.quanta[name] for name in levels.quanta if name not in spins])
     _, level = np.unique(numbers, axis=0, return_inverse=True)
-    other = level[found.lower] != level[found.upper]
+    other = level[transitions.lower] != level[transitions.upper]
     return RamanTransitions(
-        found.strength_angstrom6[other], found.lower[other], found.upper[other], found.weight[other]
+        transitions.strength_angstrom6[other],
+        transitions.lower[other],
+        transitions.upper[other],
+        transitions.weight[other],
     )
 
 
@@ -249,4 +252,4 @@ def _between(levels: Levels, up: Block, low: Block, strength: Floats) -> RamanTr
     """All transitions between two blocks; none of a state with itself."""
     i, k = np.nonzero(_once(up, low))
     first, second = k + low.start, i + up.start
-    return _ordered(levels, strength[i, k], first, second, _of_both(levels, first, second))
+    return _ordered(levels, strength[i, k], first, second, _joint_weights(levels, first, second))

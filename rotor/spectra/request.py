@@ -75,7 +75,7 @@ FINER_CUT = 2.0  # decades below it: a hundred times finer
 
 def intensity_left_out(answer: Any, reference: Any) -> float:
     """The part of the intensity in percent that a list leaves out."""
-    part, whole = (float(one.lines.intensity_nm2_mhz.sum()) for one in (answer, reference))
+    part, whole = (float(each.lines.intensity_nm2_mhz.sum()) for each in (answer, reference))
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 
@@ -194,18 +194,18 @@ class SpectrumAnswer(TextOf):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """The limits of the lines, and a partition function that was given and is far from the sum over levels."""
-        given, lines = self.request.q, self.lines
-        if given is None or not lines.levels.of_named_constants:
+        stated, lines = self.request.q, self.lines
+        if stated is None or not lines.levels.of_named_constants:
             return tuple(lines.warnings)
         try:
             summed, of_states = _expected_q(lines)
         except ValueError:  # the sum does not converge: the value that was given stands alone
             return tuple(lines.warnings)
-        if Q_TOO_SMALL * summed <= given <= Q_TOO_LARGE * summed:
+        if Q_TOO_SMALL * summed <= stated <= Q_TOO_LARGE * summed:
             return tuple(lines.warnings)
-        factor = f"intensities differ by a factor of {summed / given:.3g}"
+        factor = f"intensities differ by a factor of {summed / stated:.3g}"
         sum_text = f"about {summed:.2g}" if of_states else f"{summed:.4g}"
-        text = f"Q = {given:g} is given where the sum over the levels is {sum_text}: {factor}"
+        text = f"Q = {stated:g} is given where the sum over the levels is {sum_text}: {factor}"
         return (*lines.warnings, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
 
     @property
@@ -296,7 +296,7 @@ class SpectrumAnswer(TextOf):
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table of lines, by the keys of docs/verbs."""
         lines, layer = self.lines, self.request.layer
-        found = {
+        facts = {
             **top_facts(lines.top),
             "constants_reason": None,
             "temperature_k": lines.temperature_k,
@@ -318,8 +318,8 @@ class SpectrumAnswer(TextOf):
             "errors": self.errors.as_json(),
         }
         if lines.levels.of_named_constants:
-            return found
-        return without_constants(found) | {"q": found["q"] | {"classical": None}, "limits": []}
+            return facts
+        return without_constants(facts) | {"q": facts["q"] | {"classical": None}, "limits": []}
 
 
 def _expected_q(lines: Lines) -> tuple[float, bool]:

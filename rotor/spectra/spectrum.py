@@ -266,12 +266,12 @@ def _shape(lines: Lines, profile: str, fwhm_mhz: float | None) -> _Shape:
         raise ValueError(f"profile {profile!r} is none of {', '.join(OUTSIDE)}")
     if fwhm_mhz is not None and not 0 < fwhm_mhz < float("inf"):
         raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: expected a finite number above 0")
-    given = None if fwhm_mhz is None else np.full(len(lines), float(fwhm_mhz))
+    fixed = None if fwhm_mhz is None else np.full(len(lines), float(fwhm_mhz))
     if profile == "gaussian":
-        return _Shape(_doppler(lines) if given is None else given, None)
-    if given is None:
+        return _Shape(_doppler(lines) if fixed is None else fixed, None)
+    if fixed is None:
         raise ValueError(f"profile {profile!r}: expected the width of the Lorentzian, fwhm_mhz")
-    return _Shape(_doppler(lines) if profile == "voigt" else None, given)
+    return _Shape(_doppler(lines) if profile == "voigt" else None, fixed)
 
 
 def _fraction(profile: str, outside: float | None) -> float:

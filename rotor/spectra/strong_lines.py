@@ -20,12 +20,12 @@ from rotor.quantum.tensors import BodyTensor
 SMALLEST_MHZ = 1e-30  # in place of 0 between states that all have one energy
 ROUND_OFF = 1e-9  # of a threshold, by which a line that is compared exactly later may miss it
 
-Found = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
+StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
 
 
 def strong_lines(
     levels: Levels, blocks: Sequence[SolvedBlock], dipole: BodyTensor, needed: Floats, highest_mhz: float
-) -> Iterator[Found]:
+) -> Iterator[StrongLines]:
     """Rows of both states and strengths of all lines that may reach a cut, and of some that do not, block by block.
 
     Parameters
@@ -60,7 +60,7 @@ def strong_lines(
                 of_up.setdefault(up.start, (up, []))[1].append(product)
         for up, products in of_up.values():
             for part in _parts(up, products, counts):
-                yield _found(*part, levels.energy_mhz, needed, highest_mhz, memory)
+                yield _strong_lines(*part, levels.energy_mhz, needed, highest_mhz, memory)
         below, before = stacks, j
 
 
@@ -90,13 +90,13 @@ def _parts(up: SolvedBlock, products: list[Product], counts: Mapping[int, int]) 
     """The parts of blocks between which a line may reach the cut: all with the lowest states of one side, or of the other."""
     of_up, all_up = counts[up.start], len(up.energies_mhz)
     if of_up == all_up:
-        yield up.start, all_up, [(one, 0, len(one.low.energies_mhz)) for one in products]
+        yield up.start, all_up, [(product, 0, len(product.low.energies_mhz)) for product in products]
         return
-    lowest = [(one, 0, split) for one in products if (split := counts[one.low.start])]
+    lowest = [(product, 0, split) for product in products if (split := counts[product.low.start])]
     if lowest:
         yield up.start, all_up, lowest
-    others = [(one, counts[one.low.start], len(one.low.energies_mhz)) for one in products]
-    others = [(one, first, last) for one, first, last in others if first < last]
+    others = [(product, counts[product.low.start], len(product.low.energies_mhz)) for product in products]
+    others = [(product, first, last) for product, first, last in others if first < last]
     if of_up and others:
         yield up.start, of_up, others
 
@@ -120,23 +120,25 @@ class _Memory:
         )
 
 
-def _found(
+def _strong_lines(
     start: int, count: int, products: list[tuple[Product, int, int]], energy: Floats, needed: Floats,
     highest_mhz: float, memory: _Memory,
-) -> Found:  # fmt: skip
+) -> StrongLines:  # fmt: skip
     """The lines of `count` states from `start` on with those of lower blocks whose strengths may suffice."""
     stop = start + count
-    others = np.concatenate([memory.rows[one.low.start + a : one.low.start + b] for one, a, b in products])
+    others = np.concatenate([memory.rows[product.low.start + a : product.low.start + b] for product, a, b in products])
     strength, keep, other = memory.of((count, len(others)))
 
     at = 0
-    for one, a, b in products:
-        np.matmul(one.moved[:, :count].T, one.low.vectors[:, a:b], out=strength[:, at : at + b - a])
+    for product, a, b in products:
+        np.matmul(product.moved[:, :count].T, product.low.vectors[:, a:b], out=strength[:, at : at + b - a])
         at += b - a
     np.multiply(strength, strength, out=strength)
 
-    lowest = min([energy[start], *(one.low.energies_mhz[a] for one, a, _ in products)])  # of each block, energies rise
-    highest = max([energy[stop - 1], *(one.low.energies_mhz[b - 1] for one, _, b in products)])
+    lowest = min(
+        [energy[start], *(product.low.energies_mhz[a] for product, a, _ in products)]
+    )  # of each block, energies rise
+    highest = max([energy[stop - 1], *(product.low.energies_mhz[b - 1] for product, _, b in products)])
     span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
     scale = (1 - ROUND_OFF) / span
     np.greater_equal(strength, scale * needed[start:stop, None], out=keep)

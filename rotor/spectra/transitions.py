@@ -86,16 +86,20 @@ def all_transitions(
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
-        found = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
-        return _rows(found, levels.weight[found.lower] > 0) if some_without else found
-    if cut is not None and not moments and (many := _of_groups(levels, blocks, dipoles, range_mhz, cut)) is not None:
+        transitions = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
+        return _rows(transitions, levels.weight[transitions.lower] > 0) if some_without else transitions
+    if (
+        cut is not None
+        and not moments
+        and (many := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
+    ):
         return _rows(many, levels.weight[many.lower] > 0) if some_without else many
     pairs, between = _acting(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
-        found = _every_pair(pairs, between)
+        transitions = _every_pair(pairs, between)
     else:
-        found = _chosen(levels, pairs, between, range_mhz, cut)
-    return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+        transitions = _chosen(levels, pairs, between, range_mhz, cut)
+    return _rows(transitions, levels.weight[transitions.lower] > 0) if some_without else transitions
 
 
 def _acting(
@@ -105,8 +109,8 @@ def _acting(
     if moments:
         from rotor.quantum.spins.moments import moments_of
 
-        found = moments_of(levels, dict(dipoles), moments)
-        return list(pairs_where(blocks, 1, found.connected)), _side_by_side(found.amplitudes)
+        acting = moments_of(levels, dict(dipoles), moments)
+        return list(pairs_where(blocks, 1, acting.connected)), _side_by_side(acting.amplitudes)
     representation = str(levels.representation)
     tensors = {states: body_tensor(mu, 1, representation) for states, mu in dipoles.items()}
     pairs = list(connected_pairs(blocks, tensors))
@@ -202,7 +206,7 @@ def _chosen(
     return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
 
 
-def _of_groups(
+def _many_f_transitions(
     levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
@@ -215,17 +219,17 @@ def _of_groups(
     needed = cut.needed
     if not can_be_stacked(blocks, tensors) or not (needed > 0).all():
         return None
-    found = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
+    groups = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
     space = Workspace()
-    return _joined([_of_many(energies, needed, of_f, range_mhz, cut, space) for of_f in found])
+    return _joined([_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups])
 
 
-def _of_many(
-    energies: Floats, needed: Floats, of_f: ManyF, range_mhz: tuple[float, float], cut: IntensityCut, space: Workspace
+def _group_transitions(
+    energies: Floats, needed: Floats, group: ManyF, range_mhz: tuple[float, float], cut: IntensityCut, space: Workspace
 ) -> Transitions:
     """The lines between blocks of many F in a range and above a cut, see `_chosen`; beyond the levels of an F amplitudes are 0."""
-    up, low, amplitude, alike = of_f
+    up, low, amplitude, alike = group
     strength = np.multiply(amplitude, amplitude, out=amplitude)
     difference = space.array("difference", *amplitude.shape)
     np.subtract(energies[up][:, :, None], energies[low][:, None, :], out=difference)
@@ -276,13 +280,13 @@ def _in_order_of_energy(
     """Lines with the energies of the first states less those of the second, those that are in the range and reach the cut."""
     falls = difference < 0
     upper, lower = np.where(falls, second, first), np.where(falls, first, second)
-    found = Transitions(np.abs(difference), strength, upper, lower)
+    transitions = Transitions(np.abs(difference), strength, upper, lower)
     if cut is None:
-        return found
-    keep = cut.keeps(found.frequency_mhz, strength, cut.population[lower])
+        return transitions
+    keep = cut.keeps(transitions.frequency_mhz, strength, cut.population[lower])
     if range_mhz != EVERYTHING:
-        keep &= (found.frequency_mhz >= range_mhz[0]) & (found.frequency_mhz <= range_mhz[1])
-    return _rows(found, keep)
+        keep &= (transitions.frequency_mhz >= range_mhz[0]) & (transitions.frequency_mhz <= range_mhz[1])
+    return _rows(transitions, keep)
 
 
 def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:

@@ -168,20 +168,20 @@ def kinetic_degrees(
     >>> {name: energies.tolist() for name, energies in gas.energies.items()}, gas.total
     ({'rotation b': [0.25, 1.0], 'rotation c': [1.0, 0.0]}, 4.0)
     """
-    found: list[tuple[str, Floats, float]] = []
+    degrees: list[tuple[str, Floats, float]] = []
     if masses is not None and velocities is not None:
         mass, v = np.asarray(masses, dtype=np.float64), np.asarray(velocities, dtype=np.float64)
         _check_shape("velocities", v, len(mass))
         if momentum_removed and len(mass) == 1:
             raise ValueError("one body whose momentum is removed has no translation left; leave its velocity out")
-        found += _translations(mass, v, _groups(species, len(mass)), momentum_removed)
+        degrees += _translations(mass, v, _groups(species, len(mass)), momentum_removed)
     if moments is not None and momenta is not None:
         inertia, m = np.asarray(moments, dtype=np.float64), np.asarray(momenta, dtype=np.float64)
         _check_shape("momenta", m, len(inertia))
-        found += _rotations(inertia, m, _groups(species, len(inertia)), linear_below)
-    if not found:
+        degrees += _rotations(inertia, m, _groups(species, len(inertia)), linear_below)
+    if not degrees:
         raise ValueError("no degree of freedom: expected masses with velocities, moments with momenta, or both")
-    return KineticDegrees({name: values for name, values, _ in found}, {name: count for name, _, count in found})
+    return KineticDegrees({name: values for name, values, _ in degrees}, {name: count for name, _, count in degrees})
 
 
 def _check_shape(name: str, vectors: Floats, bodies: int) -> None:
@@ -191,13 +191,13 @@ def _check_shape(name: str, vectors: Floats, bodies: int) -> None:
 
 def _translations(mass: Floats, v: Floats, groups: Groups, removed: bool) -> list[tuple[str, Floats, float]]:
     """Name, energies and count along x, y, z for each species."""
-    found = []
+    degrees = []
     for prefix, rows in groups:
         share = float(mass[rows].sum() / mass.sum()) if removed else 0.0
         for axis, name in enumerate("xyz"):
             energies = 0.5 * mass[rows] * v[..., rows, axis] ** 2
-            found.append((f"{prefix}translation {name}", energies, len(rows) - share))
-    return found
+            degrees.append((f"{prefix}translation {name}", energies, len(rows) - share))
+    return degrees
 
 
 def _rotations(inertia: Floats, m: Floats, groups: Groups, linear_below: float) -> list[tuple[str, Floats, float]]:
@@ -208,15 +208,15 @@ def _rotations(inertia: Floats, m: Floats, groups: Groups, linear_below: float) 
             f"a body turns about an axis that has no degree of freedom: its moment is below {linear_below:g} of the body's "
             "largest; set that component of L to 0, or lower linear_below"
         )
-    found = []
+    degrees = []
     for prefix, rows in groups:
         for axis, name in enumerate("abc"):
             here = rows[turns[rows, axis]]
             if len(here):
                 along = m[..., here, axis]
                 energies = kinetic_energy_by_axis(along, along / inertia[here, axis])
-                found.append((f"{prefix}rotation {name}", energies, float(len(here))))
-    return found
+                degrees.append((f"{prefix}rotation {name}", energies, float(len(here))))
+    return degrees
 
 
 def equipartition(
@@ -303,15 +303,19 @@ def _mean_of(name: str, ratios: Floats, count: float) -> _Mean:
     if len(ratios) == 1:
         return _Mean(name, count, float(ratios.sum()) / count, math.sqrt(2.0 / count), None, 1)
     series = ratios.sum(axis=1) / count
-    own = statistical_inefficiency(ratios[:, :MOST_FOLLOWED] * (ratios.shape[1] / count), mean=1.0, variance=2.0)
+    inefficiency = statistical_inefficiency(
+        ratios[:, :MOST_FOLLOWED] * (ratios.shape[1] / count), mean=1.0, variance=2.0
+    )
     g = statistical_inefficiency(series[:, None])
-    if len(series) < LEAST_INDEPENDENT * max(own, g):
+    if len(series) < LEAST_INDEPENDENT * max(inefficiency, g):
         raise ValueError(
-            f"{name}: {len(series)} frames are too few for energies that stay alike for {max(own, g):.3g} of them; "
-            f"{math.ceil(LEAST_INDEPENDENT * max(own, g))} would do, or one frame alone"
+            f"{name}: {len(series)} frames are too few for energies that stay alike for {max(inefficiency, g):.3g} of them; "
+            f"{math.ceil(LEAST_INDEPENDENT * max(inefficiency, g))} would do, or one frame alone"
         )
     spread = math.sqrt(float(series.var(ddof=1)) * g / len(series))
-    return _Mean(name, count, float(series.mean()), spread, len(series) / (WINDOW * g + 1.0), math.ceil(2.0 * own))
+    return _Mean(
+        name, count, float(series.mean()), spread, len(series) / (WINDOW * g + 1.0), math.ceil(2.0 * inefficiency)
+    )
 
 
 def statistical_inefficiency(series: ArrayLike, mean: float | None = None, variance: float | None = None) -> float:

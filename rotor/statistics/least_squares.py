@@ -189,7 +189,7 @@ def minimise(
                 continue
             damping = max(10.0 * damping, first)
             if damping > MOST_DAMPING or (damping > first and predicted < _NOTHING * state.chi_squared):
-                if all(one.damping > 0 for one in _refused(taken)):
+                if all(step.damping > 0 for step in _refused(taken)):
                     damping = 0.0  # of the last point only damped steps are known
                 elif linear.weakest < _FINER * first:
                     damping = first = linear.weakest
@@ -202,9 +202,9 @@ def minimise(
 def _judged(number: int, state: _State, trial: _State | None, damping: float, predicted: float) -> Iteration:
     """A step that was tried: taken where χ² falls, or where round-off hides whether it does and the linear model decides."""
     after = trial.rms if trial else math.inf
-    found = Iteration(number, state.rms, after, damping, predicted, False)
+    step = Iteration(number, state.rms, after, damping, predicted, False)
     small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
-    return replace(found, taken=math.isfinite(after) and (found.gain(len(state.residuals)) > 1e-4 or small))
+    return replace(step, taken=math.isfinite(after) and (step.gain(len(state.residuals)) > 1e-4 or small))
 
 
 def _is_enough(distance: float, before: float, tolerance: float, state: _State) -> bool:
@@ -215,7 +215,7 @@ def _is_enough(distance: float, before: float, tolerance: float, state: _State) 
 
 def _refused(taken: Sequence[Iteration]) -> list[Iteration]:
     """The steps that were refused at the last point, the last one first."""
-    return list(takewhile(lambda one: not one.taken, reversed(taken)))
+    return list(takewhile(lambda step: not step.taken, reversed(taken)))
 
 
 def _relaxed(damping: float, gain: float, first: float) -> float:
@@ -259,12 +259,12 @@ def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
     P may be left.
     """
     left = 0.0
-    for one in _refused(taken):
-        gain = (one.rms_before**2 - one.rms_after**2) * count
+    for step in _refused(taken):
+        gain = (step.rms_before**2 - step.rms_after**2) * count
         if not math.isfinite(gain):
-            left = max(left, one.predicted)
-        elif one.predicted > 0:
-            left = max(left, one.predicted**2 / max(2 * one.predicted - gain, one.predicted))
+            left = max(left, step.predicted)
+        elif step.predicted > 0:
+            left = max(left, step.predicted**2 / max(2 * step.predicted - gain, step.predicted))
     return left
 
 

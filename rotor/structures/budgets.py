@@ -46,13 +46,13 @@ def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure
     -------
     ErrorBudget
     """
-    known = [one.error for one in values if one.unit == "Å" and math.isfinite(one.error)]
-    of = f"bond lengths ({method})"
+    known = [value.error for value in values if value.unit == "Å" and math.isfinite(value.error)]
+    quantity = f"bond lengths ({method})"
     if not known:
-        return ErrorBudget(of, "Å", *(NO_LENGTH,) * 5)
+        return ErrorBudget(quantity, "Å", *(NO_LENGTH,) * 5)
     sigma = max(known)
     return ErrorBudget(
-        of=of,
+        of=quantity,
         unit="Å",
         **_numerical(sigma, fitted, weights),
         model=ErrorTerm(None, VIBRATION[method]),
@@ -71,8 +71,8 @@ def _numerical(sigma: float, fitted: FittedStructure | None, weights: str) -> di
         none = ErrorTerm(0.0, "the moments are met to the last digit")
         return {"rounding": none, "truncation": none}
     per_residual = sigma / scale
-    errors = np.array([1.0 if weights == "equal" else one.error for one in fitted.moments])
-    moments = np.array([one.observed for one in fitted.moments])
+    errors = np.array([1.0 if weights == "equal" else moment.error for moment in fitted.moments])
+    moments = np.array([moment.observed for moment in fitted.moments])
     rounded = ROUNDING * float(np.linalg.norm(moments / errors))
     left = REMAINING * fitted.minimum.distance
     return {

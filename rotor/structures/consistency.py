@@ -51,21 +51,28 @@ def moments_across_planes(family: Family) -> list[PlanarMoment]:
     if family.linear or not np.isfinite(parent.moments).all():
         return []
     places, out = family.frame_positions(parent), list[PlanarMoment]()
-    for one in family.species[1:]:
-        replaced = _replaced(parent, one)
-        if not np.isfinite(one.moments).all():
+    for species in family.species[1:]:
+        replaced = _replaced(parent, species)
+        if not np.isfinite(species.moments).all():
             continue
-        hydrogen = any(one.molecule.symbols[i] == "H" for i in replaced)
+        hydrogen = any(species.molecule.symbols[i] == "H" for i in replaced)
         for g, axis in enumerate(AXES):
             if (np.abs(places[replaced, g]) < IN_PLANE_ANGSTROM).all():
-                (before, own), (value, error) = _planar(parent, g), _planar(one, one.axes.index(axis))
+                (before, error_of_species), (value, error) = (
+                    _planar(parent, g),
+                    _planar(species, species.axes.index(axis)),
+                )
                 limit = (VIBRATION_OF_HYDROGEN if hydrogen else VIBRATION) + VIBRATION_PART * abs(before)
-                out.append(PlanarMoment(one.name, axis, value, value - before, float(np.hypot(own, error)), limit))
+                out.append(
+                    PlanarMoment(
+                        species.name, axis, value, value - before, float(np.hypot(error_of_species, error)), limit
+                    )
+                )
     return out
 
 
-def _replaced(parent: Species, one: Species) -> list[int]:
-    pairs = zip(parent.molecule.mass_numbers, one.molecule.mass_numbers, strict=True)
+def _replaced(parent: Species, species: Species) -> list[int]:
+    pairs = zip(parent.molecule.mass_numbers, species.molecule.mass_numbers, strict=True)
     return [i for i, (old, new) in enumerate(pairs) if old != new]
 
 
@@ -93,7 +100,7 @@ def without_each(family: Family, fitted: FittedStructure, refit: Callable[[Famil
     from scipy.special import fdtrc
 
     whole, out = float(fitted.minimum.residuals @ fitted.minimum.residuals), list[Without]()
-    for place, one in enumerate(family.species[1:], 1):
+    for place, species in enumerate(family.species[1:], 1):
         rest = replace(family, species=family.species[:place] + family.species[place + 1 :])
         try:
             less = refit(rest)
@@ -105,25 +112,25 @@ def without_each(family: Family, fitted: FittedStructure, refit: Callable[[Famil
         left = float(less.minimum.residuals @ less.minimum.residuals)
         ratio = (whole - left) / fewer / (left / free) if left > 0 else np.inf
         chance = float(fdtrc(fewer, free, max(ratio, 0.0))) * (len(family.species) - 1)
-        out.append(Without(one.name, less.rms_u_angstrom2, min(chance, 1.0)))
-    return sorted(out, key=lambda one: one.chance)
+        out.append(Without(species.name, less.rms_u_angstrom2, min(chance, 1.0)))
+    return sorted(out, key=lambda less: less.chance)
 
 
 def doubts(family: Family) -> list[str]:
     """What to say of planar moments that change by more than vibration does."""
     return [
-        f"{one.species}: P_{one.axis} = {one.value:.5f} u Å², {one.change:+.5f} from the parent, where its atoms lie in the plane and "
-        f"vibration changes it by less than {one.limit:.1g}: are its constants right?"
-        for one in moments_across_planes(family)
-        if one.doubtful
+        f"{moment.species}: P_{moment.axis} = {moment.value:.5f} u Å², {moment.change:+.5f} from the parent, where its atoms lie in "
+        f"the plane and vibration changes it by less than {moment.limit:.1g}: are its constants right?"
+        for moment in moments_across_planes(family)
+        if moment.doubtful
     ]
 
 
-def gains(method: str, found: list[Without], rms_u_angstrom2: float) -> list[str]:
+def gains(method: str, gained: list[Without], rms_u_angstrom2: float) -> list[str]:
     """What to say of an isotopologue without which the others fit far better."""
-    if not found or found[0].chance > _CHANCE:
+    if not gained or gained[0].chance > _CHANCE:
         return []
-    first = found[0]
+    first = gained[0]
     return [
         f"{method}: without {first.species} the rms of the moments falls from {rms_u_angstrom2:.3g} to {first.rms_u_angstrom2:.3g} u Å², "
         f"by chance with a probability of {first.chance:.1g}: are its constants right?"

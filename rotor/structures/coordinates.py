@@ -67,7 +67,7 @@ def _function(atoms: Atoms) -> Coordinate:
 def permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
     """The permutations of atoms under all operations of the nuclei, masses apart: isotopes count as alike."""
     symmetry = symmetry_of(_without_isotopes(molecule))
-    return [one.permutation for one in (*symmetry.rotations, *symmetry.improper)]
+    return [operation.permutation for operation in (*symmetry.rotations, *symmetry.improper)]
 
 
 def _without_isotopes(molecule: Molecule) -> Molecule:
@@ -87,12 +87,12 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
         )
     if not all(1 <= atom <= count for atom in chosen):
         raise ValueError(f"{name} = {list(atoms)}: the molecule has atoms 1 to {count}")
-    found = Named(name, chosen, (chosen,))
-    if len(chosen) == 3 and abs(found.value(molecule.positions_angstrom) - 180.0) < np.degrees(_STRAIGHT):
+    coordinate = Named(name, chosen, (chosen,))
+    if len(chosen) == 3 and abs(coordinate.value(molecule.positions_angstrom) - 180.0) < np.degrees(_STRAIGHT):
         raise ValueError(f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, it stays straight")
     images = dict.fromkeys(_one_way(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule))
     if len(chosen) == 4:  # a reflection turns the sign of a dihedral angle: such images are no equals
-        value = found.value(molecule.positions_angstrom)
+        value = coordinate.value(molecule.positions_angstrom)
         images = {
             image: None
             for image in images
@@ -143,7 +143,7 @@ def symmetric_displacements(molecule: Molecule) -> Floats:
         project = _along_axis(positions, symmetry.rotations[-1].permutation)
     else:
         operations = (*symmetry.rotations, *symmetry.improper)
-        project = np.mean([_acting(one.matrix, one.permutation) for one in operations], axis=0)
+        project = np.mean([_acting(operation.matrix, operation.permutation) for operation in operations], axis=0)
     rigid = np.linalg.qr(_rigid_motions(positions))[0] if n > 1 else np.zeros((3 * n, 0))
     rigid = project @ rigid @ rigid.T
     values, vectors = np.linalg.eigh((project + project.T) / 2 - (rigid + rigid.T) / 2)
@@ -202,18 +202,18 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], tar
         Where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
     """
     x = positions.copy()
-    factors = np.array([one.factor for one in coordinates])
+    factors = np.array([coordinate.factor for coordinate in coordinates])
     missing = np.inf
     for _ in range(50):
-        off = (targets - np.array([one.value(x) for one in coordinates])) / factors
+        off = (targets - np.array([coordinate.value(x) for coordinate in coordinates])) / factors
         missing = float(np.abs(off).max(initial=0.0))
         if missing < 1e-12:
             return x
-        b = np.array([one.gradient(x) for one in coordinates]) @ space
+        b = np.array([coordinate.gradient(x) for coordinate in coordinates]) @ space
         x = x + (space @ np.linalg.lstsq(b, off, rcond=1e-9)[0]).reshape(x.shape)
     if missing < 1e-9:
         return x
-    names = ", ".join(one.name for one in coordinates)
+    names = ", ".join(coordinate.name for coordinate in coordinates)
     raise ValueError(f"{names}: no symmetric geometry has these values; {missing:.1e} Å or radian are left")
 
 
@@ -231,31 +231,31 @@ def bonded(molecule: Molecule) -> list[Atoms]:
 def bonds_and_angles(molecule: Molecule) -> list[Named]:
     """Every bond and every angle between bonds that is not straight, one of each kind that symmetry makes equal."""
     pairs = bonded(molecule)
-    found = [(f"r({_label(molecule, pair)})", pair) for pair in pairs]
+    candidates = [(f"r({_label(molecule, pair)})", pair) for pair in pairs]
     near: dict[int, list[int]] = {}
     for i, j in pairs:
         near.setdefault(i, []).append(j)
         near.setdefault(j, []).append(i)
     for apex, ends in sorted(near.items()):
-        for one, other in ((a, b) for k, a in enumerate(sorted(ends)) for b in sorted(ends)[k + 1 :]):
-            found.append((f"a({_label(molecule, (one, apex, other))})", (one, apex, other)))
-    return _distinct(molecule, found)
+        for first, other in ((a, b) for k, a in enumerate(sorted(ends)) for b in sorted(ends)[k + 1 :]):
+            candidates.append((f"a({_label(molecule, (first, apex, other))})", (first, apex, other)))
+    return _distinct(molecule, candidates)
 
 
 def _label(molecule: Molecule, atoms: Atoms) -> str:
     return "-".join(f"{molecule.symbols[atom - 1]}{atom}" for atom in atoms)
 
 
-def _distinct(molecule: Molecule, found: Sequence[tuple[str, Atoms]]) -> list[Named]:
+def _distinct(molecule: Molecule, candidates: Sequence[tuple[str, Atoms]]) -> list[Named]:
     seen: set[Atoms] = set()
     out = []
-    for name, atoms in found:
+    for name, atoms in candidates:
         if _one_way(atoms) in seen:
             continue
         try:
-            one = named(molecule, name, atoms)
+            coordinate = named(molecule, name, atoms)
         except ValueError:  # a straight angle
             continue
-        seen.update(one.alike)
-        out.append(one)
+        seen.update(coordinate.alike)
+        out.append(coordinate)
     return out

@@ -145,7 +145,7 @@ def family(
         raise ValueError("a family without isotopologues: the constants of the parent at least are needed")
     molecule = symmetric_geometry(molecule)
     top = Top.from_molecule(molecule)
-    found: list[Species] = []
+    species: list[Species] = []
     for i, (label, isotopes, constants, errors) in enumerate(measured):
         changed = molecule.with_isotopes(isotopes) if isotopes else molecule
         corrections = corrections_mhz[i] if corrections_mhz else {}
@@ -153,10 +153,10 @@ def family(
         _refuse_constants(label, top.kind, constants, errors, corrections)
         axes, _ = matched_axes(top, Top.from_molecule(changed))
         source = sources[i] if sources else ""
-        found.append(Species(label, changed, dict(constants), dict(errors), dict(corrections), axes, source))
-    _refuse_family(found, molecule)
-    _refuse_far(found)
-    return Family(name or molecule.name or molecule.formula, tuple(found), top)
+        species.append(Species(label, changed, dict(constants), dict(errors), dict(corrections), axes, source))
+    _refuse_family(species, molecule)
+    _refuse_far(species)
+    return Family(name or molecule.name or molecule.formula, tuple(species), top)
 
 
 def _refuse_constants(
@@ -176,18 +176,18 @@ def _refuse_constants(
         raise ValueError(f"{name}: a linear molecule has B; {', '.join(constants)} given")
 
 
-def _refuse_far(found: Sequence[Species]) -> None:
+def _refuse_far(family_species: Sequence[Species]) -> None:
     """ValueError for constants that the start geometry, scaled to the parent's, cannot have: another unit, a digit too many."""
-    parent = _measured_to_rigid(found[0])
-    for one in found:
-        ratios = _measured_to_rigid(one)
+    parent = _measured_to_rigid(family_species[0])
+    for species in family_species:
+        ratios = _measured_to_rigid(species)
         for name, ratio in ratios.items():
-            is_scaled = one is not found[0] and name in parent
+            is_scaled = species is not family_species[0] and name in parent
             expected, most = (parent[name], _FAR) if is_scaled else (1.0, _FAR_OF_PARENT)
             if not 1 / most < ratio / expected < most:
-                rigid = one.constants_mhz[name] / ratio * expected
+                rigid = species.constants_mhz[name] / ratio * expected
                 raise ValueError(
-                    f"{one.name}: {name} = {one.constants_mhz[name]:g} MHz, where the geometry"
+                    f"{species.name}: {name} = {species.constants_mhz[name]:g} MHz, where the geometry"
                     f"{' and the parent give' if is_scaled else ' gives'} about {rigid:.6g}; check digits, unit and isotopes"
                 )
 
@@ -198,12 +198,14 @@ def _measured_to_rigid(species: Species) -> dict[str, float]:
     return {name: value / rigid[name] for name, value in species.constants_mhz.items() if rigid.get(name)}
 
 
-def _refuse_family(found: Sequence[Species], molecule: Molecule) -> None:
-    if found[0].molecule.mass_numbers != molecule.mass_numbers:
-        raise ValueError(f"{found[0].name}: the first isotopologue is the parent and has the isotopes of the geometry")
+def _refuse_family(family_species: Sequence[Species], molecule: Molecule) -> None:
+    if family_species[0].molecule.mass_numbers != molecule.mass_numbers:
+        raise ValueError(
+            f"{family_species[0].name}: the first isotopologue is the parent and has the isotopes of the geometry"
+        )
     seen: dict[tuple[int, ...], str] = {}
-    for one in found:
-        numbers = one.molecule.mass_numbers
+    for species in family_species:
+        numbers = species.molecule.mass_numbers
         if numbers in seen:
-            raise ValueError(f"{one.name} and {seen[numbers]} have the same isotopes; leave one out")
-        seen[numbers] = one.name
+            raise ValueError(f"{species.name} and {seen[numbers]} have the same isotopes; leave one out")
+        seen[numbers] = species.name

@@ -204,7 +204,7 @@ def _squares(both: Floats, mu: float, shape: str, pair: str) -> Floats:
         p, changed = (_in_plane(row, pair) for row in both)
         return np.concatenate([_interlaced(p, changed, mu), [0.0]])
     if shape == "symmetric":
-        return _of_symmetric(both, mu)
+        return _symmetric_top(both, mu)
     if shape == "spherical":  # I′ = I + μ r² across the line to the atom
         across = both[1, 1:] if mu > 0 else both[1, :2]
         return np.array([(np.nanmean(across) - np.nanmean(both[0])) / mu, 0.0, 0.0])
@@ -229,7 +229,7 @@ def _in_plane(moments: Floats, pair: str) -> Floats:
     return np.array([b, a])
 
 
-def _of_symmetric(both: Floats, mu: float) -> Floats:
+def _symmetric_top(both: Floats, mu: float) -> Floats:
     """z² and ρ² in a top with two equal moments I_x; an atom on the axis leaves the isotopologue symmetric, ΔI_x = μ z².
 
     The plane through the figure axis and the atom holds both: P_z and P_x there become two eigenvalues P′ of the pair, the

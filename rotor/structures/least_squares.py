@@ -141,7 +141,7 @@ def _refuse_settings(method: str, weights: str, coordinates: Sequence[Named], he
                 raise ValueError(
                     f"{once[image]} and {each.name} are the same coordinate, or equal by symmetry; give one"
                 )
-    both = {one for each in coordinates for one in each.alike} & {one for each in held for one in each.alike}
+    both = {atoms for each in coordinates for atoms in each.alike} & {atoms for each in held for atoms in each.alike}
     if both:
         raise ValueError(f"atoms {sorted(both)[0]}: the same coordinate is both fitted and held")
 
@@ -211,10 +211,10 @@ class _Problem:
         if not self.coordinates:
             x = self.start + (self.space @ change).reshape(self.start.shape)
         else:
-            every = (*self.coordinates, *self.held)
-            targets = np.array([one.value(self.start) for one in every])
-            targets[: len(change)] += change * np.array([one.factor for one in self.coordinates])
-            x = moved_to(self.start, self.space, every, targets)
+            coordinates = (*self.coordinates, *self.held)
+            targets = np.array([coordinate.value(self.start) for coordinate in coordinates])
+            targets[: len(change)] += change * np.array([coordinate.factor for coordinate in self.coordinates])
+            x = moved_to(self.start, self.space, coordinates, targets)
         if np.abs(x - self.start).max() > 2 * _FAR:
             raise ValueError("an atom would move by more than 1 Å from the start geometry; give a better one")
         return x
@@ -223,7 +223,7 @@ class _Problem:
         """∂x/∂p (3n, shape_count)."""
         if not self.coordinates:
             return self.space
-        b = np.array([one.gradient(x) for one in (*self.coordinates, *self.held)]) @ self.space
+        b = np.array([coordinate.gradient(x) for coordinate in (*self.coordinates, *self.held)]) @ self.space
         return np.asarray(self.space @ np.linalg.pinv(b, rcond=1e-9)[:, : len(self.coordinates)])
 
     def model(self, p: Floats) -> tuple[Floats, Floats]:
@@ -273,7 +273,11 @@ def _observations(
     twice = [axis for axis in AXES if list(leave_out).count(axis) > 1]
     if twice:
         raise ValueError(f"leave_out: axis {twice[0]} is named twice; once is enough")
-    idle = [axis for axis in leave_out if not any(np.isfinite(one.moments[AXES.index(axis)]) for one in family.species)]
+    idle = [
+        axis
+        for axis in leave_out
+        if not any(np.isfinite(species.moments[AXES.index(axis)]) for species in family.species)
+    ]
     if idle:
         raise ValueError(f"leave_out: axis {idle[0]}: no isotopologue has a moment about it")
     rows, observed, errors = [], list[float](), list[float]()
@@ -295,8 +299,8 @@ def _repeated(family: Family, species: Species, g: int) -> bool:
     kind = Top.from_molecule(species.molecule).kind
     if kind == "linear":
         return AXES[g] != "b"
-    given = species.constants_mhz
-    return (kind == "prolate" and g == 2 and "B" in given) or (kind == "oblate" and g == 0 and "B" in given)
+    constants = species.constants_mhz
+    return (kind == "prolate" and g == 2 and "B" in constants) or (kind == "oblate" and g == 0 and "B" in constants)
 
 
 def _equal_axis(family: Family, axis: str) -> str:
@@ -336,7 +340,9 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
     x = problem.positions(p)
     calculated, _ = problem.model(p)
     free = len(problem.observed) - problem.count
-    names = [*(one.name for one in problem.coordinates or ())] or [f"u{i + 1}" for i in range(problem.shape_count)]
+    names = [*(coordinate.name for coordinate in problem.coordinates or ())] or [
+        f"u{i + 1}" for i in range(problem.shape_count)
+    ]
     linear = regression(minimum.jacobian, [*names, *problem.terms])
     scale = float(np.sqrt(minimum.residuals @ minimum.residuals / free)) if free > 0 else np.nan
     covariance = linear.covariance * (scale**2 if (problem.sigma == 1).all() else 1.0)
@@ -377,18 +383,20 @@ def _values(problem: _Problem, x: Floats, covariance: Floats) -> tuple[Value, ..
     """Bonds and angles of the geometry x with their errors."""
     directions, shape = problem.directions(x), slice(0, problem.shape_count)
     values = []
-    for one in _worth_giving(problem, x):
-        spread = _spread(one.gradient(x) @ directions, covariance[shape, shape])
-        values.append(Value(one.name, one.atoms, one.value(x), spread * one.factor, one.unit))
+    for coordinate in _worth_giving(problem, x):
+        spread = _spread(coordinate.gradient(x) @ directions, covariance[shape, shape])
+        values.append(
+            Value(coordinate.name, coordinate.atoms, coordinate.value(x), spread * coordinate.factor, coordinate.unit)
+        )
     return tuple(values)
 
 
 def _worth_giving(problem: _Problem, x: Floats) -> list[Named]:
     """The coordinates fitted, and the bonds and angles of the geometry that are not among them."""
     molecule = Molecule(problem.family.molecule.symbols, x, problem.family.molecule.mass_numbers)
-    given = [*problem.coordinates, *problem.held]
-    seen = {atoms for one in given for atoms in one.alike}
-    return [*given, *(one for one in bonds_and_angles(molecule) if not seen & set(one.alike))]
+    chosen = [*problem.coordinates, *problem.held]
+    seen = {atoms for coordinate in chosen for atoms in coordinate.alike}
+    return [*chosen, *(coordinate for coordinate in bonds_and_angles(molecule) if not seen & set(coordinate.alike))]
 
 
 def _spread(gradient: Floats, covariance: Floats) -> float:

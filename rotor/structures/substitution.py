@@ -125,8 +125,8 @@ def substitution_structure(
         raise ValueError(f"{family.name}: r_s needs isotopologues with one atom replaced, and there is none")
 
     placed = _with_equal_atoms(family, atoms, ours)
-    asked = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
-    values = tuple(_value(one, placed) for one in asked if _known(one, placed.positions))
+    reported = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
+    values = tuple(_value(coordinate, placed) for coordinate in reported if _known(coordinate, placed.positions))
     return SubstitutionStructure(tuple(atoms), placed.positions, placed.errors, values, tuple(notes))
 
 
@@ -139,7 +139,7 @@ def replaced_atom(parent: Molecule, other: Molecule) -> int | None:
 def _substituted(family: Family, species: Species, atom: int, ours: Floats, pair: str) -> SubstitutedAtom:
     shape = _shape(family, ours[atom])
     parent, other = family.parent, species
-    found = kraitchman(
+    solution = kraitchman(
         parent.moments,
         other.moments,
         mass_u=parent.molecule.mass_u,
@@ -153,7 +153,7 @@ def _substituted(family: Family, species: Species, atom: int, ours: Floats, pair
     allowed = np.linalg.norm(directions @ _site_projector(family, ours, atom), axis=1) > 0.5  # 1 or 0 but for round-off
     allowed &= np.isin(np.arange(3), SHAPES[shape])
     directions = np.where(allowed[:, None], directions, 0.0)
-    return SubstitutedAtom(atom + 1, species.name, found, directions)
+    return SubstitutedAtom(atom + 1, species.name, solution, directions)
 
 
 def _shape(family: Family, place: Floats) -> str:
@@ -195,20 +195,24 @@ def _site_projector(family: Family, ours: Floats, atom: int) -> Floats:
     if family.linear:  # the half turn of a centrosymmetric molecule is the last rotation
         turned = symmetry.rotations[-1].permutation
         return np.eye(3) * float(len(symmetry.rotations) == 1 or turned[atom] != atom)
-    staying = [one.matrix for one in (*symmetry.rotations, *symmetry.improper) if one.permutation[atom] == atom]
+    staying = [
+        operation.matrix
+        for operation in (*symmetry.rotations, *symmetry.improper)
+        if operation.permutation[atom] == atom
+    ]
     return np.asarray(np.mean(staying, axis=0))
 
 
-def _doubts(one: SubstitutedAtom) -> list[str]:
+def _doubts(atom: SubstitutedAtom) -> list[str]:
     out = []
-    sizes, squares = one.coordinates_angstrom, one.squares_angstrom2
+    sizes, squares = atom.coordinates_angstrom, atom.squares_angstrom2
     imaginary = [axis for axis, square in zip("abc", squares.tolist(), strict=True) if square < 0]
     small = [axis for axis, size in zip("abc", np.abs(sizes).tolist(), strict=True) if 0 < size < 0.15]
     if imaginary:
         texts = ", ".join(f"{axis}² = {squares['abc'.index(axis)]:.2g}" for axis in imaginary)
-        out.append(f"atom {one.atom} ({one.species}): imaginary coordinate, {texts} Å²; taken as 0")
+        out.append(f"atom {atom.atom} ({atom.species}): imaginary coordinate, {texts} Å²; taken as 0")
     if small:
-        out.append(f"atom {one.atom} ({one.species}): |{'|, |'.join(small)}| below 0.15 Å is not trustworthy")
+        out.append(f"atom {atom.atom} ({atom.species}): |{'|, |'.join(small)}| below 0.15 Å is not trustworthy")
     return out
 
 
@@ -229,32 +233,32 @@ class _Placed(NamedTuple):
 def _with_equal_atoms(family: Family, atoms: list[SubstitutedAtom], ours: Floats) -> _Placed:
     """The substituted atoms and those that symmetry makes equal to one, which move with it."""
     positions, moves = np.full(ours.shape, np.nan), np.zeros((3 * len(atoms), *ours.shape))
-    for place, one in enumerate(atoms):
-        positions[one.atom - 1] = one.coordinates_angstrom
-        moves[3 * place : 3 * place + 3, one.atom - 1] = one.directions
+    for place, atom in enumerate(atoms):
+        positions[atom.atom - 1] = atom.coordinates_angstrom
+        moves[3 * place : 3 * place + 3, atom.atom - 1] = atom.directions
     symmetry = symmetry_of(_in_frame(family.molecule, ours))
     for operation in (*symmetry.rotations, *symmetry.improper):
-        for place, one in enumerate(atoms):
-            image = int(operation.permutation[one.atom - 1])
+        for place, atom in enumerate(atoms):
+            image = int(operation.permutation[atom.atom - 1])
             if np.isnan(positions[image, 0]):
-                positions[image] = operation.matrix @ positions[one.atom - 1]
-                moves[3 * place : 3 * place + 3, image] = one.directions @ operation.matrix.T
-    return _Placed(positions, moves, np.concatenate([one.kraitchman.errors_angstrom for one in atoms]))
+                positions[image] = operation.matrix @ positions[atom.atom - 1]
+                moves[3 * place : 3 * place + 3, image] = atom.directions @ operation.matrix.T
+    return _Placed(positions, moves, np.concatenate([atom.kraitchman.errors_angstrom for atom in atoms]))
 
 
 def _in_frame(molecule: Molecule, positions: Floats) -> Molecule:
     return Molecule(molecule.symbols, positions, molecule.mass_numbers)
 
 
-def _known(one: Named, positions: Floats) -> bool:
-    return bool(np.isfinite(positions[[atom - 1 for atom in one.atoms]]).all())
+def _known(coordinate: Named, positions: Floats) -> bool:
+    return bool(np.isfinite(positions[[atom - 1 for atom in coordinate.atoms]]).all())
 
 
-def _value(one: Named, placed: _Placed) -> Value:
+def _value(coordinate: Named, placed: _Placed) -> Value:
     """A coordinate between known atoms; atoms that symmetry makes equal have one error, not several."""
     positions = placed.positions
-    alone = Named(one.name, one.atoms, (one.atoms,))
+    alone = Named(coordinate.name, coordinate.atoms, (coordinate.atoms,))
     filled = np.where(np.isnan(positions), np.arange(positions.size).reshape(positions.shape) + 100.0, positions)
     slopes = np.tensordot(placed.moves, alone.gradient(filled).reshape(positions.shape), axes=2)
     spread = float(np.linalg.norm(slopes * placed.sigmas))
-    return Value(one.name, one.atoms, alone.value(filled), spread * one.factor, one.unit)
+    return Value(coordinate.name, coordinate.atoms, alone.value(filled), spread * coordinate.factor, coordinate.unit)

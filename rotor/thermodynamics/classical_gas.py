@@ -124,8 +124,10 @@ class GasAnswer(TextOf):
         above_k = classical_above_if_known(top, 0.01)
         where = "" if above_k is None else f": the heat capacity is classical within 1 % above {above_k:.3g} K"
         quantum = f"quantum mechanics{where}"
-        sizes = [one for one in model_sizes(top, j, effects) if one.present and one.name == "centrifugal distortion"]
-        distortion = [f"{one.name}: {one.size_mhz:.2g} MHz of a level at J = {j}" for one in sizes]
+        sizes = [
+            size for size in model_sizes(top, j, effects) if size.present and size.name == "centrifugal distortion"
+        ]
+        distortion = [f"{size.name}: {size.size_mhz:.2g} MHz of a level at J = {j}" for size in sizes]
         seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in OF_SPINS]
         return [f"collisions; vibrations; {quantum}", *distortion, *seen]
 
@@ -139,7 +141,7 @@ class GasAnswer(TextOf):
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/verbs."""
         request, test = self.request, self.test
-        one = count_degrees([request.top.moments_u_angstrom2])
+        degrees = count_degrees([request.top.moments_u_angstrom2])
         half_kt = 0.5 * test.kt * units.CM_PER_EV
         return {
             **top_facts(request.top),
@@ -148,9 +150,9 @@ class GasAnswer(TextOf):
             "seed": request.seed,
             "confidence": request.confidence,
             "degrees_of_freedom": {
-                "translation": one.translation,
-                "rotation": one.rotation,
-                "total": one.total,
+                "translation": degrees.translation,
+                "rotation": degrees.rotation,
+                "total": degrees.total,
                 "gas": round(self.ensemble.kinetic.total),
             },
             "tested_at_ps": request.tested_at_ps,

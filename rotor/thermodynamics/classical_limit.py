@@ -154,15 +154,21 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
     (2.7661, 108.46)
     """
     by_state = _weights_by_state(top, weights)
-    of = next((one for one in by_state if one.mean), by_state[0])
+    populated = next((state for state in by_state if state.mean), by_state[0])
     a, b, c = rotational_temperatures_k(top)
-    period = max(int(name) for name in of.classes if name.isdecimal()) + 1 if of.rule == "K" else _PERIODS[of.rule]
-    states = _shares(top, by_state, of.mean)
+    period = (
+        max(int(name) for name in populated.classes if name.isdecimal()) + 1
+        if populated.rule == "K"
+        else _PERIODS[populated.rule]
+    )
+    states = _shares(top, by_state, populated.mean)
     if top.kind == "linear":
-        return ClassicalLimit(2, of.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), 0.0, period, states)
+        return ClassicalLimit(
+            2, populated.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), 0.0, period, states
+        )
     scale = math.sqrt(math.pi / (a * b * c))
     corrections = (*_stripp_kirkwood(a, b, c), *_distortion(top))
-    return ClassicalLimit(3, of.mean, scale, *corrections, (a, b), a * (b - c) ** 2 / (b * c), period, states)
+    return ClassicalLimit(3, populated.mean, scale, *corrections, (a, b), a * (b - c) ** 2 / (b * c), period, states)
 
 
 def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights]:
@@ -170,8 +176,15 @@ def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights
     whole = weights or top.spin_weights
     if top.states is None:
         return [whole]
-    own = [top.states.weights.get(v) for v in range(top.states.count)]
-    return [whole if one is None else one if weights is None else of_species(one, weights) for one in own]
+    stated = [top.states.weights.get(v) for v in range(top.states.count)]
+    return [
+        whole
+        if weights_of_state is None
+        else weights_of_state
+        if weights is None
+        else of_species(weights_of_state, weights)
+        for weights_of_state in stated
+    ]
 
 
 def _shares(top: Top, by_state: list[SpinWeights], mean: float) -> tuple[tuple[float, float], ...]:
@@ -181,14 +194,14 @@ def _shares(top: Top, by_state: list[SpinWeights], mean: float) -> tuple[tuple[f
     names = ("B", "B") if top.kind == "linear" else ("A", "B", "C")
     first = top.rotational_constants_mhz
     volume = math.prod(first["ABC".index(name)] for name in names)
-    found = [(by_state[0].mean / mean, 0.0)]
+    shares = [(by_state[0].mean / mean, 0.0)]
     for v in range(1, top.states.count):
-        own = top.states.of_state(v)
-        axes = [own.get(name, own["B"]) for name in names]
-        found.append(
-            (by_state[v].mean / mean * math.sqrt(volume / math.prod(axes)), own.get("E", 0.0) / units.MHZ_PER_K)
+        constants = top.states.of_state(v)
+        axes = [constants.get(name, constants["B"]) for name in names]
+        shares.append(
+            (by_state[v].mean / mean * math.sqrt(volume / math.prod(axes)), constants.get("E", 0.0) / units.MHZ_PER_K)
         )
-    return tuple(found)
+    return tuple(shares)
 
 
 def rotational_temperatures_k(top: Top) -> tuple[float, float, float]:

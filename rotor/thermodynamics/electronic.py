@@ -62,12 +62,12 @@ class ElectronicStates:
         items = [_STATE.fullmatch(item) for item in text.split(",")]
         if not all(items):
             raise ValueError(f"{text!r}: expected degeneracies such as '3', or with energies '2,2@121.1cm-1'")
-        found = [item for item in items if item]
+        levels = [item for item in items if item]
         energies = (
             units.parse_quantity(f"{item['energy']} {item['unit'] or 'cm-1'}", "cm-1") if item["energy"] else 0.0
-            for item in found
+            for item in levels
         )
-        return cls(tuple(int(item["times"]) for item in found), tuple(energies), "given")
+        return cls(tuple(int(item["times"]) for item in levels), tuple(energies), "given")
 
     @property
     def listed(self) -> str:

@@ -79,17 +79,19 @@ def populations_in_field(
         levels = solved[0].block.levels
         ground = float(levels.energy_mhz[levels.weight > 0].min())
     free, factors = [], []
-    for one in solved:
-        levels = one.block.levels
-        weight = levels.weight[one.rows]
-        free.append(np.broadcast_to(weight * np.exp(-(levels.energy_mhz[one.rows] - ground) / kt), one.energies.shape))
-        factors.append(weight * np.exp(-(one.energies - ground) / kt))
+    for block in solved:
+        levels = block.block.levels
+        weight = levels.weight[block.rows]
+        free.append(
+            np.broadcast_to(weight * np.exp(-(levels.energy_mhz[block.rows] - ground) / kt), block.energies.shape)
+        )
+        factors.append(weight * np.exp(-(block.energies - ground) / kt))
     q = np.full(len(solved[0].energies), partition_function(top, temperature_k, effects=tuple(effects) or SEMI_RIGID).q)
     if populations == "adiabatic":
-        return Populations([one / q[:, None] for one in free], q)
-    for one, before, now in zip(solved, free, factors, strict=True):
-        q = q + one.block.copies * (now - before).sum(axis=1)
-    return Populations([one / q[:, None] for one in factors], q)
+        return Populations([factor / q[:, None] for factor in free], q)
+    for block, before, now in zip(solved, free, factors, strict=True):
+        q = q + block.block.copies * (now - before).sum(axis=1)
+    return Populations([factor / q[:, None] for factor in factors], q)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -218,7 +218,7 @@ def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, fl
     if known.keys() == {"all"}:
         raise ValueError(f"species {species!r}: all levels of {top.name or 'this top'} are of one nuclear-spin species")
     if species == "normal":
-        means = {name: one.mean for name, one in known.items()}
+        means = {name: weights.mean for name, weights in known.items()}
         return known, {name: mean / sum(means.values()) for name, mean in means.items()}
     if species not in known:
         raise ValueError(f"species {species!r}: {top.name or 'this top'} has {', '.join(species_names(top))}")
@@ -266,16 +266,16 @@ def _with_spins(
     from rotor.thermodynamics.spin_sums import spin_sums
 
     refuse_species_of_totals(top, species, effects)
-    found = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
-    counted = found.split.any()
-    method = next((one.method for one in effects if isinstance(one, HyperfineMethod)), EXACT)
+    spin_result = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
+    counted = spin_result.split.any()
+    method = next((effect.method for effect in effects if isinstance(effect, HyperfineMethod)), EXACT)
     hyperfine = {
         "spin_functions": spin_functions(top, effects),
-        "splitting_mhz": found.splitting_mhz,
-        "summed_up_to_k": float(temperatures[found.split].max()) if counted else None,
+        "splitting_mhz": spin_result.splitting_mhz,
+        "summed_up_to_k": float(temperatures[spin_result.split].max()) if counted else None,
         "method": method,
     }
-    return replace(_rotation(top, species, parts, fractions, found.sums, effects), hyperfine=hyperfine)
+    return replace(_rotation(top, species, parts, fractions, spin_result.sums, effects), hyperfine=hyperfine)
 
 
 def _rotation(
@@ -294,7 +294,7 @@ def _rotation(
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 
     limit = classical_limit(top, next(iter(parts.values())) if len(parts) == 1 else None)
-    means = np.array([classical_limit(top, one).mean_weight for one in parts.values()])
+    means = np.array([classical_limit(top, weights).mean_weight for weights in parts.values()])
     mean_weight = float(np.exp(shares @ np.log(means / shares)))
     limit = replace(limit, mean_weight=mean_weight * spin_functions(top, effects))
     of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
@@ -316,19 +316,19 @@ def _rotation(
         cv_over_r=cv,
         cv_over_r_classical=np.full(len(temperatures), limit.degrees / 2),
         cv_over_r_corrected=corrected_cv,
-        jmax=np.max([one.jmax for one in sums], axis=0),
-        relative_error=np.max([(one.error_q, one.error_energy, one.error_cv) for one in sums], axis=(0, 1)),
+        jmax=np.max([total.jmax for total in sums], axis=0),
+        relative_error=np.max([(total.error_q, total.error_energy, total.error_cv) for total in sums], axis=(0, 1)),
     )
 
 
 def _mixed(sums: Sequence[LevelSums], ground_k: float, shares: Floats) -> tuple[Floats, Floats, Floats]:
     """ln q = Σ x ln(q/x), U/RT and C_v/R of species mixed in fixed shares, energies from a common zero in K."""
     ln_q, mean, cv = 0.0, 0.0, 0.0
-    for one, share in zip(sums, shares.tolist(), strict=True):
-        above = (one.ground_k - ground_k) / one.temperatures_k
-        ln_q = ln_q + share * (np.log(one.q) - above - math.log(share))
-        mean = mean + share * (one.energy_over_rt + above)
-        cv = cv + share * one.cv_over_r
+    for total, share in zip(sums, shares.tolist(), strict=True):
+        above = (total.ground_k - ground_k) / total.temperatures_k
+        ln_q = ln_q + share * (np.log(total.q) - above - math.log(share))
+        mean = mean + share * (total.energy_over_rt + above)
+        cv = cv + share * total.cv_over_r
     return np.asarray(ln_q), np.asarray(mean), np.asarray(cv)
 
 
@@ -339,31 +339,31 @@ def _with_vibration(rotation: ThermoFunctions, vibrations: VibrationalStates | N
     return replace(rotation, vibrations=vibrations, q_vib=np.exp(ln_q), cv_vib_over_r=cv)
 
 
-def _with_gas(found: ThermoFunctions, pressure_bar: float, electronic: ElectronicStates) -> ThermoFunctions:
+def _with_gas(functions: ThermoFunctions, pressure_bar: float, electronic: ElectronicStates) -> ThermoFunctions:
     """The same with the functions of the ideal gas at a pressure."""
     if not (math.isfinite(pressure_bar) and pressure_bar > 0):
         raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
-    if found.top.mass_u is None:
+    if functions.top.mass_u is None:
         raise ValueError("the ideal gas needs the mass of the molecule, and bare constants have none; give a molecule")
-    t, rt = found.temperature_k, GAS_CONSTANT * found.temperature_k
+    t, rt = functions.temperature_k, GAS_CONSTANT * functions.temperature_k
     ln_q_vib, mean_vib, cv_vib = np.zeros((3, len(t)))
-    if found.vibrations is not None:
-        ln_q_vib, mean_vib, cv_vib = vibrational_functions(found.vibrations, t)
+    if functions.vibrations is not None:
+        ln_q_vib, mean_vib, cv_vib = vibrational_functions(functions.vibrations, t)
     ln_q_el, mean_el, cv_el = electronic.functions(t)
-    enthalpy = found.energy_j_per_mol + rt * (mean_vib + mean_el + 2.5)
-    entropy = found.entropy_j_per_mol_k - GAS_CONSTANT * math.log(found.spin_factor)
+    enthalpy = functions.energy_j_per_mol + rt * (mean_vib + mean_el + 2.5)
+    entropy = functions.entropy_j_per_mol_k - GAS_CONSTANT * math.log(functions.spin_factor)
     entropy = entropy + GAS_CONSTANT * (ln_q_vib + mean_vib + ln_q_el + mean_el)
-    entropy = entropy + translational_entropy(t, found.top.mass_u, pressure_bar)
+    entropy = entropy + translational_entropy(t, functions.top.mass_u, pressure_bar)
     gas = IdealGas(
         pressure_bar=pressure_bar,
-        mass_u=found.top.mass_u,
-        cp_j_per_mol_k=GAS_CONSTANT * (found.cv_over_r + cv_vib + cv_el + 2.5),
+        mass_u=functions.top.mass_u,
+        cp_j_per_mol_k=GAS_CONSTANT * (functions.cv_over_r + cv_vib + cv_el + 2.5),
         entropy_j_per_mol_k=entropy,
         enthalpy_j_per_mol=enthalpy,
         gibbs_j_per_mol_k=entropy - enthalpy / t,
         electronic=electronic,
     )
-    return replace(found, gas=gas)
+    return replace(functions, gas=gas)
 
 
 def translational_entropy(temperatures_k: ArrayLike, mass_u: float, pressure_bar: float) -> Floats:

@@ -23,10 +23,10 @@ LEFT_OUT = ErrorTerm(None, "a classical gas without collisions and vibrations", 
 
 def gas_budget(answer: Any) -> ErrorBudget:
     """The errors of the temperature in K, or of C1 and C2 at all their times."""
-    return _of_temperature(answer) if answer.correlations is None else _of_curves(answer)
+    return _temperature_budget(answer) if answer.correlations is None else _curves_budget(answer)
 
 
-def _of_temperature(answer: Any) -> ErrorBudget:
+def _temperature_budget(answer: Any) -> ErrorBudget:
     request = answer.request
     degrees = round(answer.ensemble.kinetic.total)
     return ErrorBudget(
@@ -42,7 +42,7 @@ def _of_temperature(answer: Any) -> ErrorBudget:
     )
 
 
-def _of_curves(answer: Any) -> ErrorBudget:
+def _curves_budget(answer: Any) -> ErrorBudget:
     curves, request = answer.correlations, answer.request
     assert curves is not None
     spread = max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)

@@ -52,8 +52,8 @@ def degrees_of(request: GasRequest) -> int:
     """Degrees of freedom of one molecule whose energy is drawn; bare constants have no translation."""
     from rotor.statistics.degrees_of_freedom import count_degrees
 
-    one = count_degrees([request.top.moments_u_angstrom2])
-    return round(one.rotation + (one.translation if request.top.mass_u is not None else 0))
+    degrees = count_degrees([request.top.moments_u_angstrom2])
+    return round(degrees.rotation + (degrees.translation if request.top.mass_u is not None else 0))
 
 
 def relative_spread(unit: str, degrees: int) -> float:
@@ -65,28 +65,30 @@ def relative_spread(unit: str, degrees: int) -> float:
     return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
 
 
-def choose_molecules(unit: str, request: GasRequest, asked: float) -> Choice:
+def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
     """The request with as many molecules as an accuracy in K of the temperature, % of the heat capacity, or of C1 and C2 needs."""
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
     refuse_given(request, "molecules")
     z = quantile(request.confidence)
-    count = max(math.ceil((z * _spread(request, asked, unit) / asked) ** 2), 2)
+    count = max(math.ceil((z * _spread(request, allowed, unit) / allowed) ** 2), 2)
     if count > MOST_MOLECULES:
         raise ValueError(
-            f"accuracy: {asked:g} {unit}".rstrip()
+            f"accuracy: {allowed:g} {unit}".rstrip()
             + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; ask for less"
         )
     return Choice(replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}")
 
 
-def _spread(request: GasRequest, asked: float, unit: str) -> float:
+def _spread(request: GasRequest, allowed: float, unit: str) -> float:
     """Standard error times √N in the unit of the accuracy."""
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
         return scale * relative_spread(unit, degrees_of(request))
     if request.times_ps is None:
-        raise ValueError(f"accuracy: {asked:g}: is of correlation functions; give observables.times, or a unit, K or %")
+        raise ValueError(
+            f"accuracy: {allowed:g}: is of correlation functions; give observables.times, or a unit, K or %"
+        )
     from rotor.thermodynamics.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
@@ -114,8 +116,8 @@ def sweeps_of_gas(request: Any) -> Sweeps:
     """The number of molecules, whose error is statistical."""
     from rotor.thermodynamics.classical_gas import answer_gas
 
-    def answers(asked: Any) -> list[Any]:
-        return [answer_gas(replace(asked, seed=asked.seed + 10 * n)) for n in range(SEEDS)]
+    def answers(varied: Any) -> list[Any]:
+        return [answer_gas(replace(varied, seed=varied.seed + 10 * n)) for n in range(SEEDS)]
 
     still = replace(request, times_ps=None)
     counts = [n for n in MOLECULES if n < request.molecules]
@@ -126,9 +128,9 @@ def sweeps_of_gas(request: Any) -> Sweeps:
         most = min(100 * request.molecules, MOST_IN_REFERENCE)
         many = replace(request, molecules=most, seed=request.seed + 1)
         curves = Measure("C1 and C2", "", _curve_error)
-        own = ladder(counts, request.molecules, partial(_with_molecules, request), "{:.0f}".format)
+        counted = ladder(counts, request.molecules, partial(_with_molecules, request), "{:.0f}".format)
         reference, against = many, f"{most} other molecules"
-        knobs.append(Sweep("numerics.molecules", (curves,), own, reference, against, answer_gas))
+        knobs.append(Sweep("numerics.molecules", (curves,), counted, reference, against, answer_gas))
     return Sweeps(tuple(knobs), (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",))
 
 
@@ -137,18 +139,23 @@ def _with_molecules(request: Any, count: float) -> Any:
 
 
 def _mean_square(errors: list[float]) -> float:
-    return math.sqrt(sum(one * one for one in errors) / len(errors))
+    return math.sqrt(sum(error * error for error in errors) / len(errors))
 
 
-def _temperature_error(found: list[Any], _: Any) -> float:
+def _temperature_error(answers: list[Any], _: Any) -> float:
     """Root mean square error in K of the temperature that the kinetic energy of a gas has."""
-    return _mean_square([_energies(one).mean() / _degrees(one) * 2 - one.request.temperature_k for one in found])
+    return _mean_square(
+        [_energies(answer).mean() / _degrees(answer) * 2 - answer.request.temperature_k for answer in answers]
+    )
 
 
-def _heat_capacity_error(found: list[Any], _: Any) -> float:
+def _heat_capacity_error(answers: list[Any], _: Any) -> float:
     """Root mean square error in percent of C_v = var(E)/kT² of a molecule, f k/2 for f degrees of freedom."""
     return _mean_square(
-        [100 * (_energies(one).var() / (0.5 * _degrees(one) * one.request.temperature_k**2) - 1) for one in found]
+        [
+            100 * (_energies(answer).var() / (0.5 * _degrees(answer) * answer.request.temperature_k**2) - 1)
+            for answer in answers
+        ]
     )
 
 
@@ -163,9 +170,9 @@ def _degrees(answer: Any) -> int:
     return len(answer.ensemble.kinetic.energies)
 
 
-def _curve_error(found: Any, reference: Any) -> float:
-    pairs = [(getattr(found.correlations, name), getattr(reference.correlations, name)) for name in ("c1", "c2")]
-    return max(float(np.max(np.abs(one - true))) for one, true in pairs if one is not None)
+def _curve_error(answer: Any, reference: Any) -> float:
+    pairs = [(getattr(answer.correlations, name), getattr(reference.correlations, name)) for name in ("c1", "c2")]
+    return max(float(np.max(np.abs(curve - true))) for curve, true in pairs if curve is not None)
 
 
 def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
@@ -202,8 +209,10 @@ def plan_of_gas(request: Any) -> Plan:
     )
 
 
-def _goal(of: str, unit: str) -> Goal:
-    return Goal(of, lambda _, request, asked: choose_molecules(unit, request, asked), partial(error_of_gas, unit))
+def _goal(quantity: str, unit: str) -> Goal:
+    return Goal(
+        quantity, lambda _, request, allowed: choose_molecules(unit, request, allowed), partial(error_of_gas, unit)
+    )
 
 
 GAS = Numerics(

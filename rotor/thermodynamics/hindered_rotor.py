@@ -120,8 +120,8 @@ def hindered_rotor_functions(
     free = BondTorsion(torsion.kinetic, FourierSeries(0.0, *no_terms()), torsion.fold)
     waves = torsion.waves_for(HIGHEST_KT * float(kt.max()))
     parts = {
-        "levels": _of_levels(torsion.all_energies(waves), kt),
-        "free rotor": _of_levels(free.all_energies(waves), kt),
+        "levels": _level_partition(torsion.all_energies(waves), kt),
+        "free rotor": _level_partition(free.all_energies(waves), kt),
         "classical": _classical(torsion, kt),
     }
     wells = torsion.wells()
@@ -142,7 +142,7 @@ def _table(t: Floats, parts: list[tuple[str, LogPartition]], symmetry_number: in
         np.tile(t, len(parts)),
         np.concatenate(ln_q),
         np.concatenate([GAS_CONSTANT * t * part.u for _, part in parts]),
-        np.concatenate([GAS_CONSTANT * (one + part.u) for one, (_, part) in zip(ln_q, parts, strict=True)]),
+        np.concatenate([GAS_CONSTANT * (ln_z + part.u) for ln_z, (_, part) in zip(ln_q, parts, strict=True)]),
         np.concatenate([part.cv for _, part in parts]),
     )
 
@@ -158,7 +158,7 @@ def _weighted(ln_q: Floats, u: Floats, cv: Floats) -> LogPartition:
     return LogPartition(highest[:, 0] + np.log(total), mean, np.sum(p * cv, axis=1) + spread)
 
 
-def _of_levels(energies: Floats, kt: Floats) -> LogPartition:
+def _level_partition(energies: Floats, kt: Floats) -> LogPartition:
     """Each level is a part with ln Q_i = -x and U_i/RT = x."""
     x = energies[None, :] / kt[:, None]
     return _weighted(-x, x, np.zeros_like(x))

@@ -62,8 +62,11 @@ class PartitionRows(Table):
     def columns(self) -> dict[str, NDArray[Any]]:
         """temperature_k, q, classical, jmax, relative_error; NaN and -1 where there is none."""
         names = ("temperature_k", "q", "classical", "relative_error")
-        numbers = {name: np.array([one[name] for one in self.records], dtype=np.float64) for name in names}
-        return {**numbers, "jmax": np.array([-1 if one["jmax"] is None else one["jmax"] for one in self.records])}
+        numbers = {name: np.array([record[name] for record in self.records], dtype=np.float64) for name in names}
+        return {
+            **numbers,
+            "jmax": np.array([-1 if record["jmax"] is None else record["jmax"] for record in self.records]),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +90,13 @@ class InfoAnswer:
 
     def facts(self) -> dict[str, Any]:
         """Everything about the top, by the keys of docs/verbs."""
-        found = {
+        facts = {
             **top_facts(self.request.top),
             **self.sizes,
             "partition_function": list(self.partition),
             "errors": self.errors.as_json(),
         }
-        return found | ({} if self.request.conformers is None else {"conformers": list(self.conformers)})
+        return facts | ({} if self.request.conformers is None else {"conformers": list(self.conformers)})
 
 
 def answer_info(request: InfoRequest, progress: Callable[..., Any] | None = None) -> InfoAnswer:
@@ -110,15 +113,15 @@ def _conformers(request: InfoRequest) -> Sequence[dict[str, Any]]:
         return ()
     from rotor.molecules.readers.smiles import conformers
 
-    found = []
-    for one in conformers(request.smiles.removeprefix("SMILES:").strip(), request.conformers):
-        top = Top.from_molecule(one.molecule)
-        found.append(
+    records = []
+    for conformer in conformers(request.smiles.removeprefix("SMILES:").strip(), request.conformers):
+        top = Top.from_molecule(conformer.molecule)
+        records.append(
             {
-                "energy_kj_per_mol": one.energy_kj_per_mol,
+                "energy_kj_per_mol": conformer.energy_kj_per_mol,
                 "rotational_constants_mhz": top.rotational_constants_mhz,
                 "dipole_abc_debye": top.dipole_abc_debye,
-                "uncertainty": one.molecule.uncertainty,
+                "uncertainty": conformer.molecule.uncertainty,
             }
         )
-    return found
+    return records

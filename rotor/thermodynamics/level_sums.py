@@ -149,11 +149,11 @@ def level_sums(
     ladder = _Ladder(top, tuple(weights), tuple(effects), progress)
     longest = ladder.longest
     expected = _last_j(top, temperatures, relative_error)
-    errors = np.array([classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0) for one in weights])
+    errors = np.array([classical_limit(top, each).errors(temperatures)[:kinds].max(axis=0) for each in weights])
     limit_serves = (expected > LONG_SUM) & (errors <= relative_error) | (expected > longest) & (errors <= at_worst)
     limit_serves &= ladder.semi_rigid
     ladder.reach(temperatures[~limit_serves.all(axis=0)].max(initial=0.0))
-    found = []
+    sums = []
     for s, classical in enumerate(limit_serves):
         parts = np.zeros((7, len(temperatures)))
         parts[:, classical] = _expanded(ladder, s, temperatures[classical])
@@ -162,10 +162,10 @@ def level_sums(
             ladder.last = int(min(hottest, longest))
             enough = (relative_error, 2 * at_worst)
             parts[:, ~classical] = _summed(ladder, s, temperatures[~classical], enough, kinds)
-        found.append(_as_sums(temperatures, ladder.ground[s][0], parts))
+        sums.append(_as_sums(temperatures, ladder.ground[s][0], parts))
         if refuse:
-            _refuse_inexact(found[-1], kinds, at_worst)
-    return found
+            _refuse_inexact(sums[-1], kinds, at_worst)
+    return sums
 
 
 def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
@@ -248,7 +248,9 @@ class _Ladder:
         self._by_j: list[Shell] = []
         self.last = 0
         others = [] if top.states is None else list(top.states.weights.values())
-        self.heaviest = [max(heaviest_component(each) for each in (one, *others)) for one in weights]
+        self.heaviest = [
+            max(heaviest_component(each) for each in (weights_of_species, *others)) for weights_of_species in weights
+        ]
         self.ground = [self._lowest(s) for s in range(len(weights))]
 
     def reach(self, hottest_k: float) -> None:
@@ -273,7 +275,7 @@ class _Ladder:
             self.top, last, jmin=first, effects=self._effects, vectors=False, below_mhz=self._below_mhz
         )
         plain = levels.states.astype(np.float64)
-        spin = np.array([levels.multiplicity * self._weights(levels, one) for one in self.weights], dtype=float)
+        spin = np.array([levels.multiplicity * self._weights(levels, each) for each in self.weights], dtype=float)
         energies = lower = levels.energy_mhz
         if self.semi_rigid:
             energies, lower = trusted_energies_mhz(self.top, levels)
@@ -285,14 +287,14 @@ class _Ladder:
             kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
             self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
 
-    def _weights(self, levels: Levels, one: SpinWeights) -> Ints:
+    def _weights(self, levels: Levels, species: SpinWeights) -> Ints:
         """The weights of levels by one set; of several states by their own, where the set has the level's class at all."""
         if "v" not in levels.quanta or self.top.states is None:
-            return weights_of_levels(levels, one)
+            return weights_of_levels(levels, species)
         total = np.zeros(len(levels), dtype=np.int64)
         for v in range(self.top.states.count):
-            own = self.top.states.weights.get(v)
-            weights = weights_of_levels(levels, one if own is None else of_species(own, one))
+            of_state = self.top.states.weights.get(v)
+            weights = weights_of_levels(levels, species if of_state is None else of_species(of_state, species))
             total = np.where(levels.quanta["v"] == v, weights, total)
         return total
 
@@ -300,11 +302,13 @@ class _Ladder:
         """Energy in K and J of the lowest level that exists, among those of the J solved by then."""
         while True:
             self._solve_more()
-            found = [
-                (one.kelvin[one.spin[s] > 0].min(), j) for j, one in enumerate(self._by_j) if (one.spin[s] > 0).any()
+            lowest = [
+                (solved.kelvin[solved.spin[s] > 0].min(), j)
+                for j, solved in enumerate(self._by_j)
+                if (solved.spin[s] > 0).any()
             ]
-            if found:
-                energy, j = min(found)
+            if lowest:
+                energy, j = min(lowest)
                 return float(energy), j
 
 

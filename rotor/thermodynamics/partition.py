@@ -130,8 +130,8 @@ def partition_function(
     >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
     (108.79, [3.97, 108.79])
     """
-    found = partition_functions(top, temperature_k, relative_error, effects)
-    return found if np.ndim(temperature_k) else found[0]
+    functions = partition_functions(top, temperature_k, relative_error, effects)
+    return functions if np.ndim(temperature_k) else functions[0]
 
 
 def partition_functions(

@@ -58,9 +58,9 @@ def partition_table(
         rows |= dict(zip(rest, partition_table(top, rest, progress), strict=True)) if rest else {}
         return [rows[t] for t in temperatures_k]
     try:
-        found = partition_functions(top, temperatures_k, refuse=False, progress=progress)
+        functions = partition_functions(top, temperatures_k, refuse=False, progress=progress)
         limit = classical_limit(top)
-        return [_unless_refused(partition_facts(top, one, limit=limit)) for one in found]
+        return [_unless_refused(partition_facts(top, function, limit=limit)) for function in functions]
     except ValueError:  # levels of one of them cannot be solved: each for itself
         return [_row_alone(top, temperature) for temperature in temperatures_k]
 

@@ -43,8 +43,8 @@ MOST_TEMPERATURES = 100_000
 CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
 
 
-def _electronic(given: ElectronicStates | str) -> ElectronicStates:
-    return ElectronicStates.parse(given) if isinstance(given, str) else given
+def _electronic(states: ElectronicStates | str) -> ElectronicStates:
+    return ElectronicStates.parse(states) if isinstance(states, str) else states
 
 
 def _relative(name: str) -> Callable[[Any, Any], float]:
@@ -53,7 +53,7 @@ def _relative(name: str) -> Callable[[Any, Any], float]:
     def error(answer: Any, reference: Any) -> float:
         import numpy as np
 
-        values, true = (np.asarray(getattr(one.functions, name)) for one in (answer, reference))
+        values, true = (np.asarray(getattr(each.functions, name)) for each in (answer, reference))
         return 100.0 * float(np.max(np.abs(values - true) / np.maximum(np.abs(true), 1e-12)))
 
     return error
@@ -61,7 +61,7 @@ def _relative(name: str) -> Callable[[Any, Any], float]:
 
 LEFT_OUT = Knob(
     (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10), 1e-13,
-    tuple(Measure(of, "%", _relative(name)) for of, name in (("Q", "q_rot"), ("U", "energy_j_per_mol"), ("C_v", "cv_over_r"))),
+    tuple(Measure(quantity, "%", _relative(name)) for quantity, name in (("Q", "q_rot"), ("U", "energy_j_per_mol"), ("C_v", "cv_over_r"))),
     "sums to {:g}", least=1e-13,
 )  # fmt: skip
 
@@ -136,8 +136,8 @@ class ThermoAnswer(TextOf):
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """What the Hamiltonian consists of, further states of the top among it."""
-        asked = self.request.effects
-        return effects_of(self.request.top, hyperfine=False) if asked == SEMI_RIGID else asked
+        effects = self.request.effects
+        return effects_of(self.request.top, hyperfine=False) if effects == SEMI_RIGID else effects
 
     @cached_property
     def classical_above_k(self) -> float | None:

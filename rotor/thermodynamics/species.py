@@ -75,8 +75,10 @@ def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
         raise ValueError(
             f"spin weights of a state by {weights.rule}, and of the molecule by {species.rule}: expected one rule"
         )
-    of = dict(zip(species.classes, species.values, strict=True))
-    whole = {name: of[name] if name in of else of["0"] for name in weights.classes}
+    weight_of_class = dict(zip(species.classes, species.values, strict=True))
+    whole = {
+        name: weight_of_class[name] if name in weight_of_class else weight_of_class["0"] for name in weights.classes
+    }
     return _only(weights, tuple(name for name, value in whole.items() if value))
 
 

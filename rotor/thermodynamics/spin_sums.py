@@ -91,22 +91,27 @@ def spin_sums(
     plainly: dict[str, Any] = {"progress": progress, "energies": energies, "refuse": refuse}
     settings = plainly | {"effects": effects}
     if functions == 1:
-        found = level_sums(top, weights, temperatures_k, relative_error, **settings)
-        return SpinSums(found, size, np.ones(len(temperatures_k), dtype=np.bool_))
+        sums = level_sums(top, weights, temperatures_k, relative_error, **settings)
+        return SpinSums(sums, size, np.ones(len(temperatures_k), dtype=np.bool_))
     rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
     ground = _lowest_split_k(top, weights, rotation, effects, size, relative_error / 10)
-    product = [times_functions(one, functions, lowest, size) for one, lowest in zip(rotation, ground, strict=True)]
+    product = [
+        times_functions(functions_of_rotation, functions, lowest, size)
+        for functions_of_rotation, lowest in zip(rotation, ground, strict=True)
+    ]
     split = np.any(
         [
-            _worst(one, energies) > _worst(plain, energies) + relative_error
-            for one, plain in zip(product, rotation, strict=True)
+            _worst(sums, energies) > _worst(plain, energies) + relative_error
+            for sums, plain in zip(product, rotation, strict=True)
         ],
         axis=0,
     )
     if not split.any():
         return SpinSums(product, size, split)
     summed = level_sums(top, weights, temperatures_k[split], relative_error, **settings)
-    return SpinSums([_placed(one, split, own) for one, own in zip(product, summed, strict=True)], size, split)
+    return SpinSums(
+        [_placed(whole, split, corrected) for whole, corrected in zip(product, summed, strict=True)], size, split
+    )
 
 
 def _lowest_split_k(
@@ -122,7 +127,7 @@ def _lowest_split_k(
     That of J = 0 and 1 where no rigid level of J = 2 is within twice the size of the couplings of the ground level; of J = 0 alone
     where it exists and none of J = 1 is. J = 0 has a shift of second order in χ and C alone, V²/ΔE; below `share` of kT it is left out.
     """
-    ground_mhz, least = max(one.ground_k for one in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
+    ground_mhz, least = max(sums.ground_k for sums in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
     reach = ground_mhz + 2 * size_mhz
     if top.states is not None or len(weights) > 1 or 6 * least < reach:
         return lowest_level_k(top, weights, effects)
@@ -188,10 +193,10 @@ def _worst(sums: LevelSums, energies: bool) -> Floats:
     return np.asarray(np.max(errors if energies else errors[:1], axis=0))
 
 
-def _placed(whole: LevelSums, where: NDArray[np.bool_], some: LevelSums) -> LevelSums:
+def _placed(whole: LevelSums, where: NDArray[np.bool_], parts: LevelSums) -> LevelSums:
     """The sums with others at some of the temperatures."""
     columns = {}
     for name in ("q", "energy_over_rt", "cv_over_r", "jmax", "error_q", "error_energy", "error_cv"):
         columns[name] = getattr(whole, name).copy()
-        columns[name][where] = getattr(some, name)
+        columns[name][where] = getattr(parts, name)
     return replace(whole, **columns)

@@ -41,9 +41,9 @@ Progress = Callable[[int, int], object]
 
 def _level_error(answer: Any, reference: Any) -> float:
     """Largest difference of the levels above the lowest one, cm⁻¹."""
-    one, other = (np.sort(each.levels.columns["above_lowest_cm"]) for each in (answer, reference))
-    count = min(len(one), len(other))
-    return float(np.max(np.abs(one[:count] - other[:count])))
+    levels, other = (np.sort(each.levels.columns["above_lowest_cm"]) for each in (answer, reference))
+    count = min(len(levels), len(other))
+    return float(np.max(np.abs(levels[:count] - other[:count])))
 
 
 ANGLES = Knob(
@@ -67,7 +67,7 @@ class TorsionRequest:
         common=True, example="1-2",
     )  # fmt: skip
     potential: Any = declared(
-        MMFF, Custom(lambda given: given, metavar="TEXT"),
+        MMFF, Custom(lambda value: value, metavar="TEXT"),
         "'V3=400 V6=-10 cm-1', 'table' (V3 of a similar molecule), or a relaxed scan: mmff or an ASE calculator", "observables.potential",
         common=True, example="V3=400 cm-1",
     )  # fmt: skip
@@ -157,7 +157,7 @@ class TorsionAnswer(TextOf):
         if self.torsion.fold == 1:
             return self._levels_without_symmetry()
         count, fold = self.request.vmax + 1, self.torsion.fold
-        energies = np.array([self.torsion.states(one, self.waves)[0][:count] for one in range(fold // 2 + 1)]).T
+        energies = np.array([self.torsion.states(species, self.waves)[0][:count] for species in range(fold // 2 + 1)]).T
         species = np.arange(fold // 2 + 1)
         single = (species == 0) | (2 * species == fold)
         v = np.repeat(np.arange(count), len(species))
@@ -180,21 +180,21 @@ class TorsionAnswer(TextOf):
             alike = np.abs(shares[upper] - shares[upper - 1]).max() < SAME_WELLS and shares[upper].max() < SHARED
             if alike and energies[upper - 1] < lowest_top and np.isnan(splitting[upper - 1]):
                 splitting[upper] = energies[upper] - energies[upper - 1]
-        one = np.ones(count, dtype=np.int64)
+        single = np.ones(count, dtype=np.int64)
         return TorsionLevels(
-            np.arange(count), np.zeros(count, dtype=np.int64), one, energies[:count] / units.MHZ_PER_CM, splitting
+            np.arange(count), np.zeros(count, dtype=np.int64), single, energies[:count] / units.MHZ_PER_CM, splitting
         )
 
     def functions_of_levels(self, angles: Floats) -> Floats:
         """Real wave functions (angles, levels) in the order of `levels`; of a pair ±σ the one that is even in its phase."""
-        found = []
+        by_species = []
         for species in range(self.torsion.fold // 2 + 1):
             rows = np.flatnonzero(self.levels.species == species)
             _, vectors, m = self.torsion.states(species, self.waves)
             waves = np.exp(1j * np.outer(angles, m)) @ vectors[:, : len(rows)] / math.sqrt(2 * math.pi)
-            found.append((rows, _real(waves)))
+            by_species.append((rows, _real(waves)))
         functions = np.empty((len(angles), len(self.levels)))
-        for rows, values in found:
+        for rows, values in by_species:
             functions[:, rows] = values
         return functions
 
@@ -207,8 +207,8 @@ class TorsionAnswer(TextOf):
     def errors(self) -> ErrorBudget:
         """How far the energies of the levels can be trusted."""
         count, fold = self.request.vmax + 1, self.torsion.fold
-        smaller = [self.torsion.states(one, max(3 * self.waves // 4, fold))[0][:count] for one in range(fold)]
-        larger = [self.torsion.states(one, self.waves)[0][:count] for one in range(fold)]
+        smaller = [self.torsion.states(species, max(3 * self.waves // 4, fold))[0][:count] for species in range(fold)]
+        larger = [self.torsion.states(species, self.waves)[0][:count] for species in range(fold)]
         size = min(map(len, smaller))
         change = max(float(np.abs(a[:size] - b[:size]).max()) for a, b in zip(smaller, larger, strict=True))
         largest = float(self.torsion.kinetic.values(np.zeros(1))[0]) * self.waves**2 + self.torsion.barrier_mhz
@@ -245,8 +245,8 @@ class TorsionAnswer(TextOf):
             "potential_sines_cm": dict(zip(map(str, potential.n.tolist()), (potential.sines / units.MHZ_PER_CM).tolist(), strict=True)),
             "barrier_cm": torsion.barrier_mhz / units.MHZ_PER_CM,
             "wells": [
-                {"angle_degrees": math.degrees(one.angle), "energy_cm": one.energy_mhz / units.MHZ_PER_CM,
-                 "harmonic_cm": one.quantum_mhz / units.MHZ_PER_CM} for one in wells
+                {"angle_degrees": math.degrees(well.angle), "energy_cm": well.energy_mhz / units.MHZ_PER_CM,
+                 "harmonic_cm": well.quantum_mhz / units.MHZ_PER_CM} for well in wells
             ],
             "reduced_moment_u_angstrom2": self.rotation.reduced_moment(),
             "reduced_moment_range_u_angstrom2": [float(moments.min()), float(moments.max())],
@@ -302,12 +302,12 @@ def _made(
     request: TorsionRequest, rotation: BondRotation, progress: Progress | None
 ) -> tuple[FourierSeries, FourierSeries, str, BondScan | None, float]:
     """V and F in MHz, where V is from, the scan and the misfit (cm⁻¹) of its series."""
-    given = request.potential
-    if not is_scan(given):
-        terms, source = _named_terms(given, rotation)
+    stated = request.potential
+    if not is_scan(stated):
+        terms, source = _named_terms(stated, rotation)
         return _series(terms), _rigid_kinetic(rotation, request.points), source, None, 0.0
     try:
-        scan = relaxed_scan(rotation, given, points=request.points, progress=progress)
+        scan = relaxed_scan(rotation, stated, points=request.points, progress=progress)
     except ValueError as error:
         raise ValueError(f"potential: {error}") from None
     period = rotation.symmetry_number(isotopes=False)
@@ -317,8 +317,8 @@ def _made(
     )
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
-    own = rotation.symmetry_number()
-    if own != period:  # isotopes: the masses repeat less often than the potential, and are scanned rigidly
+    symmetry = rotation.symmetry_number()
+    if symmetry != period:  # isotopes: the masses repeat less often than the potential, and are scanned rigidly
         return potential, _rigid_kinetic(rotation, request.points), scan.source, scan, float(misfit)
     kinetic = FourierSeries.fitted(
         scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
@@ -333,11 +333,11 @@ def _harmonics(angles: Floats, period: int) -> int:
     return max(1, min(len(angles) // 3, int(math.pi / (period * float(gaps.max())))))
 
 
-def _named_terms(given: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
+def _named_terms(potential: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
     """The terms that are given, or those of the table, and where they are from."""
-    if given == TABLE:
+    if potential == TABLE:
         return table_barrier(rotation)
-    return (given_terms(given, rotation) if isinstance(given, str) else given), "given"
+    return (given_terms(potential, rotation) if isinstance(potential, str) else potential), "given"
 
 
 def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:

@@ -88,7 +88,7 @@ def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
     if "v" in levels.quanta:
         return _above_the_ground(levels)
     if "n" in levels.quanta:
-        return _of_trusted_rotation(top, levels)
+        return _trusted_by_rotation(top, levels)
     if (tabulated := in_level_table(top, levels)) is not None:
         return tabulated
     rigid = rigid_energies_mhz(top, levels)
@@ -106,7 +106,7 @@ def _above_the_ground(levels: Levels) -> NDArray[np.bool_]:
     return ~np.isin(levels.rotational, levels.rotational[fallen])
 
 
-def _of_trusted_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
+def _trusted_by_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
     """Which levels with spins (n,) belong to a trusted rotational level; solved without spins only where energies look wrong."""
     energy = np.where(
         levels.rotational > 0, levels.energy_mhz, 0.0
@@ -145,8 +145,8 @@ def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Float
 def _truncated(top: Top, order: int) -> Constants:
     """The constants of terms up to J^2·order."""
     constants = top.constants
-    of = operators_by_name(constants)
-    values: dict[str, Any] = {k: v for k, v in constants.values.items() if all(sum(p) <= order for p in of[k])}
+    operators = operators_by_name(constants)
+    values: dict[str, Any] = {k: v for k, v in constants.values.items() if all(sum(p) <= order for p in operators[k])}
     reduction = constants.reduction if order > 1 else None
     return Constants(kind=constants.kind, reduction=reduction, representation=constants.representation, **values)
 
@@ -154,8 +154,8 @@ def _truncated(top: Top, order: int) -> Constants:
 def _energies_like(top: Top, levels: Levels) -> Floats:
     """Energies of a top in the order of the levels of another, by their labels."""
     j = levels.rotational
-    found = solve_levels(top, int(j.max()), jmin=int(j.min()), vectors=False)
-    return np.asarray(found.energy_mhz[found.rows_of(**{name: levels.quanta[name] for name in ("j", "ka", "kc")})])
+    solved = solve_levels(top, int(j.max()), jmin=int(j.min()), vectors=False)
+    return np.asarray(solved.energy_mhz[solved.rows_of(**{name: levels.quanta[name] for name in ("j", "ka", "kc")})])
 
 
 def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:

@@ -145,9 +145,9 @@ def vibrational_partition_function(
     for t in temperatures.ravel().tolist():
         if not (math.isfinite(t) and t > 0):
             raise ValueError(f"temperature {t} K: a temperature is above 0 K")
-    given = VibrationalStates(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
-    occupied = np.exp(-np.array(given.energies_cm) * units.MHZ_PER_CM / (temperatures[..., None] * units.MHZ_PER_K))
-    g = np.array(given.degeneracies, dtype=np.float64)
+    states = VibrationalStates(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
+    occupied = np.exp(-np.array(states.energies_cm) * units.MHZ_PER_CM / (temperatures[..., None] * units.MHZ_PER_K))
+    g = np.array(states.degeneracies, dtype=np.float64)
     q = np.prod((1 - occupied) ** -g, axis=-1) if harmonic else 1 + occupied @ g
     return np.asarray(q) if temperatures.ndim else float(q)
 

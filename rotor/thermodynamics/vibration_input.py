@@ -15,14 +15,14 @@ SCENE_TYPE = str | list[list[float]]
 def _reader(harmonic: bool) -> Custom:
     """Of energies in cm⁻¹ with degeneracies, as a text or as pairs."""
 
-    def read(given: Any) -> VibrationalStates:
-        if isinstance(given, VibrationalStates):
-            return given
-        if isinstance(given, str):
-            return VibrationalStates.parse(given, harmonic=harmonic)
-        if any(len(pair) != 2 for pair in given):
+    def read(value: Any) -> VibrationalStates:
+        if isinstance(value, VibrationalStates):
+            return value
+        if isinstance(value, str):
+            return VibrationalStates.parse(value, harmonic=harmonic)
+        if any(len(pair) != 2 for pair in value):
             raise ValueError("expected pairs of an energy and its degeneracy")
-        return VibrationalStates(tuple(pair[0] for pair in given), tuple(int(pair[1]) for pair in given), harmonic)
+        return VibrationalStates(tuple(pair[0] for pair in value), tuple(int(pair[1]) for pair in value), harmonic)
 
     def write(states: VibrationalStates) -> list[list[float]]:
         return [[e, float(g)] for e, g in zip(states.energies_cm, states.degeneracies, strict=True)]
@@ -47,7 +47,7 @@ class VibrationInput:
 def vibrations_field() -> Any:
     """The field `vibrations` of a request."""
     why = "give one of them, fundamentals or a list of states"
-    return part(VibrationInput, lambda given, _: given.fundamentals or given.states, _split, single=True, why=why)
+    return part(VibrationInput, lambda value, _: value.fundamentals or value.states, _split, single=True, why=why)
 
 
 def _split(states: VibrationalStates | None, _: Any) -> VibrationInput | None:

@@ -108,10 +108,12 @@ def refuse_forbidden_dipole(
             for axis, value in zip("abc", values.tolist(), strict=True)
             if axis in barred and abs(value) > NOISE_DEBYE
         ]
-        by, allowed = _of_weights(weights), [axis for axis in "abc" if axis not in barred]
+        by, allowed = _weights_text(weights), [axis for axis in "abc" if axis not in barred]
     if wrong:
-        given = ", ".join(f"μ{axis} = {values['abc'.index(axis)]:g} D" for axis in wrong)
-        raise ValueError(f"dipole {given}: {by} has none along {' and '.join(wrong)}; {_what_is_allowed('μ', allowed)}")
+        components = ", ".join(f"μ{axis} = {values['abc'.index(axis)]:g} D" for axis in wrong)
+        raise ValueError(
+            f"dipole {components}: {by} has none along {' and '.join(wrong)}; {_what_is_allowed('μ', allowed)}"
+        )
 
 
 def refuse_forbidden_polarizability(
@@ -150,7 +152,7 @@ def refuse_forbidden_polarizability(
         i, j = ("abc".index(letter) for letter in name)
         if abs(whole[i, j]) > NOISE * np.linalg.norm(whole) and not _joins_equals(axis, weights):
             raise ValueError(
-                f"polarizability α{name} = {whole[i, j]:g} Å³: {_of_weights(weights)} has none, since it would join levels of "
+                f"polarizability α{name} = {whole[i, j]:g} Å³: {_weights_text(weights)} has none, since it would join levels of "
                 "different nuclear-spin weight; give 0"
             )
 
@@ -167,16 +169,16 @@ def _what_is_allowed(letter: str, axes: list[str]) -> str:
 
 def _joins_equals(axis: str, weights: SpinWeights) -> bool:
     """Whether a dipole component joins levels of equal weight alone, by the classes of the weights."""
-    of = dict(zip(weights.classes, weights.values, strict=True))
+    weight_of = dict(zip(weights.classes, weights.values, strict=True))
     if weights.rule == "KaKc":
-        return all(of[one] == of[other] for one, other in _JOINED[axis])
+        return all(weight_of[first] == weight_of[other] for first, other in _JOINED[axis])
     if weights.rule == "J":
-        return of["even"] == of["odd"]
+        return weight_of["even"] == weight_of["odd"]
     if weights.rule == "irrep":
-        return len(set(of.values())) == 1
-    return weights.rule != "K" or of.get("0even", 0) == of.get("0odd", 0)
+        return len(set(weight_of.values())) == 1
+    return weights.rule != "K" or weight_of.get("0even", 0) == weight_of.get("0odd", 0)
 
 
-def _of_weights(weights: SpinWeights) -> str:
+def _weights_text(weights: SpinWeights) -> str:
     classes = ", ".join(f"{name} {value}" for name, value in zip(weights.classes, weights.values, strict=True))
     return f"a molecule of spin weights {classes}"

@@ -82,9 +82,9 @@ class Constants:
         terms: Mapping[Powers, float | str] | None = None,
         **values_mhz: float | str,
     ) -> None:
-        given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
-        _refuse_unknown(given)
-        numbers = {name: _finite(name, value) for name, value in given.items()}
+        named = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
+        _refuse_unknown(named)
+        numbers = {name: _finite(name, value) for name, value in named.items()}
         kind = kind_of(numbers, kind)
         values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
 
@@ -317,8 +317,8 @@ def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]
 
 def _refuse_named_term(kind: str, reduction: str | None, name: str, powers: Powers) -> None:
     """A term has one name; and it must be one that this kind of top can have."""
-    if own := published_name(powers, kind, reduction):
-        raise ValueError(f"{name} is the operator of {own}; give it by that name, with the sign of that name")
+    if published := published_name(powers, kind, reduction):
+        raise ValueError(f"{name} is the operator of {published}; give it by that name, with the sign of that name")
     letters = {"linear": "J", "spherical": "J", "prolate": "J and Jz", "oblate": "J and Jz"}.get(kind)
     if letters and (powers[2] or (powers[1] and letters == "J")):
         raise ValueError(f"{name} is no term of kind {kind!r}, where terms have powers of {letters} alone")
@@ -353,9 +353,9 @@ def _spread(name: str, value: float | str) -> float:
 class AxisOrderError(ValueError):
     """Rotational constants whose names are not in the order of their values; given: names and values."""
 
-    def __init__(self, given: str, names: Sequence[str]) -> None:
-        super().__init__(f"{given}: the names follow the order {' >= '.join(names)}; exchange them")
-        self.given = given
+    def __init__(self, constants: str, names: Sequence[str]) -> None:
+        super().__init__(f"{constants}: the names follow the order {' >= '.join(names)}; exchange them")
+        self.given = constants
 
 
 def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
@@ -368,8 +368,8 @@ def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
                 f"{name} = {value!r} MHz: expected a rotational constant from {LEAST_MHZ:g} to {MOST_MHZ:g} MHz; check the unit"
             )
     if list(rigid.values()) != sorted(rigid.values(), reverse=True):
-        given = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
-        raise AxisOrderError(f"{given} MHz", list(rigid))
+        constants = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
+        raise AxisOrderError(f"{constants} MHz", list(rigid))
 
 
 def _rebuilt(settings: dict[str, Any], values: dict[str, Any]) -> Constants:

@@ -54,4 +54,4 @@ def _measured(tops: Sequence[Top]) -> ErrorTerm:
     known = [top.constants.uncertainties.get(name) for top, name in measured]
     if not known or None in known:
         return ErrorTerm(None, "no uncertainties of the constants are known")
-    return ErrorTerm(max(one for one in known if one is not None), "constants", "more precise constants")
+    return ErrorTerm(max(error for error in known if error is not None), "constants", "more precise constants")

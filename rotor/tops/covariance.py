@@ -80,9 +80,9 @@ class Covariance:
         >>> Covariance(("B",), np.diag([4.0])).beside({"chi_aa(14N)": 3.0}).matrix_mhz2.tolist()
         [[4.0, 0.0], [0.0, 9.0]]
         """
-        count, own = len(self.names), [s**2 for s in uncertainties_mhz.values()]
-        matrix = np.zeros((count + len(own),) * 2)
-        matrix[:count, :count], matrix[count:, count:] = self.matrix_mhz2, np.diag(own)
+        count, variances = len(self.names), [s**2 for s in uncertainties_mhz.values()]
+        matrix = np.zeros((count + len(variances),) * 2)
+        matrix[:count, :count], matrix[count:, count:] = self.matrix_mhz2, np.diag(variances)
         return Covariance((*self.names, *uncertainties_mhz), matrix)
 
     @property

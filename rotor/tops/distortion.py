@@ -177,23 +177,23 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
     if rigid.kind == "spherical":
         return rigid.replace(D=-float(np.trace(tensor) / 5 + 2 * (tensor.sum() - np.trace(tensor)) / 30))
     if rigid.kind in ("prolate", "oblate"):
-        found = cylindrical(tensor, (1, 2, 0) if rigid.kind == "prolate" else (0, 1, 2))
-        return rigid.replace(DJ=-found.jj, DJK=-found.jz, DK=-found.zz)
+        quartic = cylindrical(tensor, (1, 2, 0) if rigid.kind == "prolate" else (0, 1, 2))
+        return rigid.replace(DJ=-quartic.jj, DJK=-quartic.jz, DK=-quartic.zz)
     return _asymmetric(rigid, tensor, reduction, representation or str(rigid.representation))
 
 
 def _asymmetric(rigid: Constants, tensor: Floats, reduction: str, representation: str) -> Constants:
     rigid = rigid.replace(representation=representation)
     x, y, z = ("abc".index(letter) for letter in axes_of(representation))
-    found = reduced(tensor, np.array(rigid.rigid), (x, y, z), reduction)
+    quartic = reduced(tensor, np.array(rigid.rigid), (x, y, z), reduction)
     if reduction == "S":
-        return rigid.replace(DJ=-found.jj, DJK=-found.jz, DK=-found.zz, d1=found.ju / 2, d2=found.four)
+        return rigid.replace(DJ=-quartic.jj, DJK=-quartic.jz, DK=-quartic.zz, d1=quartic.ju / 2, d2=quartic.four)
     quartics = {
-        "DeltaJ": found.jj,
-        "DeltaJK": found.jz,
-        "DeltaK": found.zz,
-        "deltaJ": found.ju / 2,
-        "deltaK": found.zu / 2,
+        "DeltaJ": quartic.jj,
+        "DeltaJK": quartic.jz,
+        "DeltaK": quartic.zz,
+        "deltaJ": quartic.ju / 2,
+        "deltaK": quartic.zu / 2,
     }
     return rigid.replace(**{name: -value for name, value in quartics.items()})
 

@@ -109,7 +109,7 @@ def _states(top: Top) -> dict[str, Any] | None:
         "constants_mhz": dict(states.values),
         "names": [states.name_of(v) for v in range(states.count)],
         "symmetry": states.symmetry or None,
-        "spin_weights": {str(v): one.to_mapping() for v, one in states.weights.items()},
+        "spin_weights": {str(v): weights.to_mapping() for v, weights in states.weights.items()},
         "dipoles_abc_debye": {f"{low},{up}" if low != up else f"{up}": m for (up, low), m in states.dipoles.items()},
         "source": states.source or None,
     }

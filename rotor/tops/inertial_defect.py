@@ -65,8 +65,8 @@ def harmonic_correction_u_angstrom2(field: ForceField) -> Floats:
     squares = inertia_by_modes(field, top) ** 2
     stretched = 3 / 4 * np.einsum("kgx,x,k->g", squares, 1 / moments, 1 / wavenumbers)
 
-    one, other = wavenumbers[:, None], wavenumbers[None, :]
-    coupled = (one - other) ** 2 / (one * other * (one + other))
+    first, other = wavenumbers[:, None], wavenumbers[None, :]
+    coupled = (first - other) ** 2 / (first * other * (first + other))
     coriolis = np.einsum("gkl,kl->g", coriolis_zeta(field) ** 2, coupled) / 2  # each pair once
     return np.asarray(-ROTATIONAL_MHZ_U_ANGSTROM2 / MHZ_PER_CM * (stretched - coriolis))
 

@@ -45,18 +45,18 @@ def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
 
 def kind_of(values: Mapping[str, float], kind: str | None) -> str:
     """The kind given, where it fits the constants, else that of the rule of `Constants`; ValueError where neither is possible."""
-    given = "".join(name for name in RIGID if name in values)
+    rigid = "".join(name for name in RIGID if name in values)
     if kind is None:
-        return _by_rule(given, values)
+        return _by_rule(rigid, values)
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r}: a top is one of {', '.join(KINDS)}")
 
     fits = {
-        "linear": given == "B",
-        "spherical": "B" in given and len({values[name] for name in given}) == 1,
-        "prolate": given == "AB" or (given == "ABC" and values["B"] == values["C"]),
-        "oblate": given == "BC" or (given == "ABC" and values["A"] == values["B"]),
-        "asymmetric": given == "ABC",
+        "linear": rigid == "B",
+        "spherical": "B" in rigid and len({values[name] for name in rigid}) == 1,
+        "prolate": rigid == "AB" or (rigid == "ABC" and values["B"] == values["C"]),
+        "oblate": rigid == "BC" or (rigid == "ABC" and values["A"] == values["B"]),
+        "asymmetric": rigid == "ABC",
     }
     if not fits[kind]:
         needed = {
@@ -66,24 +66,24 @@ def kind_of(values: Mapping[str, float], kind: str | None) -> str:
             "oblate": "B and C, or A, B, C with A = B exactly",
             "asymmetric": "A, B and C",
         }[kind]
-        have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
+        have = ", ".join(f"{name} = {values[name]!r}" for name in rigid) or "none of A, B, C"
         raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
     return kind
 
 
-def _by_rule(given: str, values: Mapping[str, float]) -> str:
-    if given not in ("B", "AB", "BC", "ABC"):
+def _by_rule(rigid: str, values: Mapping[str, float]) -> str:
+    if rigid not in ("B", "AB", "BC", "ABC"):
         raise ValueError(
-            f"constants with {given or 'none of A, B, C'}: give B (linear molecule), A and B (prolate top), "
+            f"constants with {rigid or 'none of A, B, C'}: give B (linear molecule), A and B (prolate top), "
             "B and C (oblate top) or A, B and C"
         )
-    if given == "B":
+    if rigid == "B":
         return "linear"
-    if len({values[name] for name in given}) == 1:
+    if len({values[name] for name in rigid}) == 1:
         return "spherical"
-    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):
+    if rigid == "AB" or (rigid == "ABC" and values["B"] == values["C"]):
         return "prolate"
-    if given == "BC" or values["A"] == values["B"]:
+    if rigid == "BC" or values["A"] == values["B"]:
         return "oblate"
     return "asymmetric"
 
@@ -97,15 +97,19 @@ def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -
             raise ValueError(f"reduction {reduction!r} belongs to asymmetric tops; the kind here is {kind!r}")
         return None
 
-    own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in REDUCED.items()}
-    if own["A"] and own["S"]:
-        raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
-    found = next((key for key, members in own.items() if members), None)
-    if reduction and found and reduction != found:
-        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[found])} belong to the {found}-reduction")
-    if not reduction and not found and any(name in _SHARED - {*RIGID} for name in names):
+    belonging = {key: [n for n in names if n in table and n not in _SHARED] for key, table in REDUCED.items()}
+    if belonging["A"] and belonging["S"]:
+        raise ValueError(
+            f"both reductions in one set: {', '.join(belonging['A'])} (A) with {', '.join(belonging['S'])} (S)"
+        )
+    implied = next((key for key, members in belonging.items() if members), None)
+    if reduction and implied and reduction != implied:
+        raise ValueError(
+            f"reduction {reduction!r}, but {', '.join(belonging[implied])} belong to the {implied}-reduction"
+        )
+    if not reduction and not implied and any(name in _SHARED - {*RIGID} for name in names):
         raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
-    return reduction or found
+    return reduction or implied
 
 
 def representation_of(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:

@@ -34,8 +34,8 @@ def constants_of_names(values: Mapping[str, float | str], spins: str | None = No
         others["spin_constants"] = SpinConstants.from_values(kinds["("], spins)
     if kinds["["]:
         others["states"] = StateConstants(kinds["["])
-    own: dict[str, Any] = dict(kinds[""])
-    return Constants(**own), others
+    fields: dict[str, Any] = dict(kinds[""])
+    return Constants(**fields), others
 
 
 def fields_of_texts(fields: Mapping[str, Any], spins: str | None = None) -> dict[str, Any]:
@@ -44,17 +44,17 @@ def fields_of_texts(fields: Mapping[str, Any], spins: str | None = None) -> dict
     >>> fields_of_texts({"spin_constants": "chi_aa(14N)=-4.2 MHz"})["spin_constants"].of("14N")
     {'chi_aa': -4.2}
     """
-    found = dict(fields)
-    spin, states = found.get("spin_constants"), found.get("states")
+    read = dict(fields)
+    spin, states = read.get("spin_constants"), read.get("states")
     if isinstance(spin, str):
-        found["spin_constants"] = SpinConstants.parse(spin, spins)
+        read["spin_constants"] = SpinConstants.parse(spin, spins)
     elif isinstance(spin, Mapping):
-        found["spin_constants"] = SpinConstants.from_values(_in_mhz(spin), spins)
+        read["spin_constants"] = SpinConstants.from_values(_in_mhz(spin), spins)
     if isinstance(states, str):
-        found["states"] = StateConstants.parse(states)
+        read["states"] = StateConstants.parse(states)
     elif isinstance(states, Mapping):
-        found["states"] = StateConstants(_in_mhz(states))
-    return found
+        read["states"] = StateConstants(_in_mhz(states))
+    return read
 
 
 def _in_mhz(values: Mapping[str, float | str]) -> dict[str, float]:

@@ -135,10 +135,10 @@ def published_name(powers: Powers, kind: str, reduction: str | None) -> str:
     if sum(powers) == 1:
         return "A, B, C" if kind == "asymmetric" else "B"
     reductions = (reduction,) if reduction or kind != "asymmetric" else ("A", "S")
-    found = [
+    names = [
         name
         for reduction in reductions
         for name, term in distortion_terms(kind, reduction).items()
         if term.keys() == {powers}
     ]
-    return " or ".join(dict.fromkeys(found))
+    return " or ".join(dict.fromkeys(names))

@@ -197,10 +197,10 @@ class Top:
         if isinstance(constants, str):
             constants = Constants.parse(constants)
         if not isinstance(constants, Constants):
-            constants, found = constants_of_names(constants, spins)
-            if twice := ", ".join(found.keys() & others.keys()):
+            constants, coupled = constants_of_names(constants, spins)
+            if twice := ", ".join(coupled.keys() & others.keys()):
                 raise ValueError(f"{twice}: given by name among the constants and again; give each once")
-            others |= found
+            others |= coupled
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
         return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **fields_of_texts(others, spins))
@@ -266,7 +266,7 @@ class Top:
         symmetry = symmetry_of(molecule, symmetry_within)
         kind = kind_with_symmetry(kind, symmetry)
         dipole, tensor = molecule.dipole_debye, molecule.polarizability_angstrom3
-        weights = spin_weights(symmetry, [one.spin for one in molecule.nuclei], molecule.electronic)
+        weights = spin_weights(symmetry, [nucleus.spin for nucleus in molecule.nuclei], molecule.electronic)
         return cls(
             constants=constants_of_moments(frame.moments, kind.kind),
             dipole_abc_debye=None if dipole is None else in_frame(frame, allowed_dipole(dipole, symmetry)),
@@ -398,7 +398,7 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
         return ""
     if molecule.electronic == "odd":
         return ", electrons in a state that half turns change in sign"
-    electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
+    electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     odd = "; theirs is an odd number here, so that the state may be another" if electrons % 2 else ""
     return f", electrons taken for a closed shell{odd}"
 

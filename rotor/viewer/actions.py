@@ -98,7 +98,7 @@ def assign(state: State, message: Message, context: Context) -> tuple[str, dict[
     )
     width = number_of(message, "width_mhz", above=0) if message.get("width_mhz") is not None else None
     targets = message.get("to")
-    if not isinstance(targets, list) or not targets or not all(isinstance(one, dict) for one in targets):
+    if not isinstance(targets, list) or not targets or not all(isinstance(target, dict) for target in targets):
         raise ValueError("to: expected a list of lines, each with species, upper and lower")
     _refuse_many(state, len(targets))
     first, blend = state.free_number("line"), free_blend(state)
@@ -150,7 +150,7 @@ def _refuse_label(model: Any, upper: tuple[int, ...], lower: tuple[int, ...]) ->
 def _same_labels(state: State, line: Line) -> list[str]:
     """Keys of lines of the same species and labels, which a new assignment replaces."""
     same = (line.species, line.upper, line.lower)
-    return [line_key(n) for n, one in state.lines.items() if (one.species, one.upper, one.lower) == same]
+    return [line_key(n) for n, other in state.lines.items() if (other.species, other.upper, other.lower) == same]
 
 
 def free_blend(state: State) -> int:
@@ -276,11 +276,11 @@ def free(state: State, message: Message, context: Context) -> tuple[str, dict[st
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError("free: expected a list of names of constants")
     model = context.predictions.model(species)
-    own = list(dict.fromkeys(model.constants.own_name(name) for name in names))
-    added = {name: 0.0 for name in own if name not in species.constants}
-    record = msgspec.structs.replace(species, constants={**species.constants, **added}, free=tuple(own))
+    names_of_species = list(dict.fromkeys(model.constants.own_name(name) for name in names))
+    added = {name: 0.0 for name in names_of_species if name not in species.constants}
+    record = msgspec.structs.replace(species, constants={**species.constants, **added}, free=tuple(names_of_species))
     context.predictions.model(record)
-    return f"free {', '.join(own) or 'no constant'} of {species.name}", {species_key(number): record}
+    return f"free {', '.join(names_of_species) or 'no constant'} of {species.name}", {species_key(number): record}
 
 
 _NUMBERS = {
@@ -308,7 +308,9 @@ def species(state: State, message: Message, context: Context) -> tuple[str, dict
         dipole = message["dipole_abc_debye"]
         if not isinstance(dipole, list) or len(dipole) != 3:
             raise ValueError(f"dipole_abc_debye: {dipole!r}: expected three numbers")
-        values["dipole_abc_debye"] = tuple(number_of({"dipole_abc_debye": one}, "dipole_abc_debye") for one in dipole)
+        values["dipole_abc_debye"] = tuple(
+            number_of({"dipole_abc_debye": component}, "dipole_abc_debye") for component in dipole
+        )
     if not values and "hyperfine" not in message:
         raise ValueError(
             f"species: expected {', '.join(_NUMBERS)}, visible, colour, name, hyperfine or dipole_abc_debye"

@@ -56,7 +56,7 @@ def page_data(service: Service, half_width_mhz: float | None = None) -> dict[str
         "hello": hello,
         "x": _axis(x),
         "y": _packed(y),
-        "sticks": {str(n): _sticks(service, n) for n, one in species.items() if one.visible},
+        "sticks": {str(n): _sticks(service, n) for n, record in species.items() if record.visible},
         "model": window.get("model"),
         "loomis_wood": rows.get("ok", {"rows": []}) | {"half_width_mhz": half},
         "levels": {str(n): service.answer({"do": "levels", "species": n}).get("ok") for n in species},
@@ -87,5 +87,5 @@ def _packed(values: Floats, plain: bool = False) -> dict[str, Any]:
 def data_of_page(text: str) -> dict[str, Any]:
     """The data inside an exported page."""
     start = text.index(">", text.index('id="rotor-data"')) + 1
-    found: dict[str, Any] = json.loads(text[start : text.index("</script>", start)])
-    return found
+    data: dict[str, Any] = json.loads(text[start : text.index("</script>", start)])
+    return data

@@ -30,21 +30,21 @@ def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
             raise ValueError(
                 f"line {number}: {len(line.upper)} and {len(line.lower)} quantum numbers; {model.record.name} has {', '.join(names)}"
             )
-    every = list(lines.values())
+    records = list(lines.values())
     made = assignments(
         names,
-        [line.upper for line in every],
-        [line.lower for line in every],
-        [line.frequency_mhz for line in every],
-        [line.error_mhz for line in every],
-        weight=[line.weight for line in every],
-        blend=[line.blend for line in every],
-        wavenumber=[line.wavenumber for line in every],
+        [line.upper for line in records],
+        [line.lower for line in records],
+        [line.frequency_mhz for line in records],
+        [line.error_mhz for line in records],
+        weight=[line.weight for line in records],
+        blend=[line.blend for line in records],
+        wavenumber=[line.wavenumber for line in records],
         source=f"lines of {model.record.name}",
-        comments=[line.comment for line in every] if any(line.comment for line in every) else (),
+        comments=[line.comment for line in records] if any(line.comment for line in records) else (),
         halves=model.halves,
     )
-    rejected = np.array([line.rejected for line in every], dtype=bool)
+    rejected = np.array([line.rejected for line in records], dtype=bool)
     return replace(made, excluded=rejected) if rejected.any() else made
 
 
@@ -99,7 +99,7 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
         rms_mhz=rms if math.isfinite(rms) else None,
         weighted_rms=weighted if math.isfinite(weighted) else None,
         before=dict(record.constants),
-        open=tuple(one.text for one in fit.statistics.undetermined),
+        open=tuple(combination.text for combination in fit.statistics.undetermined),
         notes=fit.notes,
     )
     errors = {name: error for name, error in fitted.uncertainties.items() if math.isfinite(error)}

@@ -36,23 +36,25 @@ def records_of(answer: Any, state: State) -> tuple[str, dict[str, Record | None]
     changes: dict[str, Record | None] = {}
     remarks = []
     number, line_number, blend = state.free_number("species"), state.free_number("line"), free_blend(state)
-    for place, one in enumerate(answer.species):
-        constants = one.constants
+    for place, assigned in enumerate(answer.species):
+        constants = assigned.constants
         record = Species(
             name=f"species {number + place}",
             source="",
             constants=dict(constants.values),
             errors=dict(constants.uncertainties),
-            free=tuple(name for name in constants.values if name not in one.refined.open_constants),
-            temperature_k=float(one.grown.temperature_k),
-            dipole_abc_debye=tuple(one.dipole_ratio.tolist()),
+            free=tuple(name for name in constants.values if name not in assigned.refined.open_constants),
+            temperature_k=float(assigned.grown.temperature_k),
+            dipole_abc_debye=tuple(assigned.dipole_ratio.tolist()),
             colour=(number + place - 1) % COLOURS,
             reduction=constants.reduction or "",
             representation=constants.representation or "",
         )
-        lines = lines_from(one.lines, number + place, blend, state.settings.default_error_mhz)
+        lines = lines_from(assigned.lines, number + place, blend, state.settings.default_error_mhz)
         changes[species_key(number + place)] = record
         changes |= {line_key(line_number + i): line for i, line in enumerate(lines)}
         line_number, blend = line_number + len(lines), max((line.blend for line in lines), default=blend) + 1
-        remarks.append(f"species {number + place}: {one.word} (p = {one.probability:.4f}), {len(lines)} lines")
+        remarks.append(
+            f"species {number + place}: {assigned.word} (p = {assigned.probability:.4f}), {len(lines)} lines"
+        )
     return f"rotor assign ({len(answer.species)} species)", changes, remarks

@@ -151,7 +151,7 @@ def _fill(service: Service, molecules: Sequence[str], lines: str | None, tempera
     """Put in the molecules that are not there yet, and assigned lines."""
     session = service.session
     for source in molecules:
-        if any(one.source == service.predictions.stored(source) for one in session.state.species.values()):
+        if any(species.source == service.predictions.stored(source) for species in session.state.species.values()):
             continue
         context = Context(service.spectrum, service.predictions, [], service.peaks)
         message: dict[str, Any] = {"source": source, "temperature_k": temperature_k}
@@ -162,6 +162,6 @@ def _fill(service: Service, molecules: Sequence[str], lines: str | None, tempera
         if not session.state.species:
             raise ValueError(f"{lines}: lines need a molecule that they belong to; name it after the spectrum")
         chosen = service.predictions.stored(molecules[0]) if molecules else None
-        first = next(n for n, one in session.state.species.items() if chosen in (None, one.source))
+        first = next(n for n, species in session.state.species.items() if chosen in (None, species.source))
         for text in service.read_lines(lines, first):
             note(text)

@@ -181,11 +181,13 @@ def model_of_species(record: Species, base: Callable[[str], Top] = top_of_source
     top = with_assumed_dipole(base(record.source))[0]
     if record.dipole_abc_debye is not None and record.dipole_abc_debye != top.dipole_abc_debye:
         top = top.with_dipole(record.dipole_abc_debye, "set in the session")
-    own = constant_set(top, record.hyperfine)
-    if dict(own.values) == record.constants:
-        return Model(record, top, own)  # with level energies and all else that the source has
-    own = with_names(own, [name for name in record.constants if name not in own])
-    moved = own.replace(**record.constants, uncertainties=record.errors)
+    constants_of_source = constant_set(top, record.hyperfine)
+    if dict(constants_of_source.values) == record.constants:
+        return Model(record, top, constants_of_source)  # with level energies and all else that the source has
+    constants_of_source = with_names(
+        constants_of_source, [name for name in record.constants if name not in constants_of_source]
+    )
+    moved = constants_of_source.replace(**record.constants, uncertainties=record.errors)
     return Model(record, moved.top if isinstance(moved, TopConstants) else top.with_constants(moved), moved)
 
 

@@ -118,9 +118,9 @@ class Service:
         before = self.session.state.records
         touched = set[int]()
         for key, record in changes.items():
-            for one in (record, before.get(key)):
-                if isinstance(one, Line):
-                    touched.add(one.species)
+            for revision in (record, before.get(key)):
+                if isinstance(revision, Line):
+                    touched.add(revision.species)
             if key.startswith("species/"):
                 touched.add(int(key.partition("/")[2]))
         made: dict[str, Record | None] = {}
@@ -206,7 +206,7 @@ class Service:
             raise ValueError(f"window: {first:g} to {last:g} MHz: expected a range that rises")
         pixels = min(int(number_of(message, "pixels", above=0)), MOST_PIXELS)
         x, y = self.pyramid.window(first, last, pixels)
-        species = {n: one for n, one in self._previewed(message).items() if one.visible}
+        species = {n: record for n, record in self._previewed(message).items() if record.visible}
         answer: Answer = {"x": _numbers(x, 10), "y": _numbers(y), "sticks": {}}
         for number, record in species.items():
             answer["sticks"][str(number)] = self.sticks(self.predictions.lines(record), first, last)
@@ -233,9 +233,13 @@ class Service:
 
         components = [
             Component(
-                self.predictions.emitter(one), one.column_per_cm2, one.temperature_k, one.velocity_km_s, one.fwhm_km_s
+                self.predictions.emitter(record),
+                record.column_per_cm2,
+                record.temperature_k,
+                record.velocity_km_s,
+                record.fwhm_km_s,
             )
-            for one in species.values()
+            for record in species.values()
         ]
         grid = np.linspace(max(first, self.band_mhz[0]), min(last, self.band_mhz[1]), 2 * pixels)
         seen = model(components, grid, Sight(self.session.state.settings.background_k))
@@ -296,7 +300,7 @@ class Service:
             predicted = self.predictions.lines(record)
             rows = predicted.between(centre - reach, centre + reach, 40)
             answer["candidates"] += self._candidates(number, predicted, rows, centre)
-        answer["candidates"].sort(key=lambda one: -one["height"])
+        answer["candidates"].sort(key=lambda candidate: -candidate["height"])
         return answer
 
     def _candidates(self, number: int, predicted: Predicted, rows: Any, centre: float) -> list[Answer]:

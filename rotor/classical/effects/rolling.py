@@ -91,8 +91,10 @@ class RollingEllipsoid(Torque, AddedInertia):
 
     def compiled_form(self) -> TorqueForm:
         """The torque and the inertia."""
-        own = self.__dict__
-        return torque_form(ROLLING, self.mass, own["_weight"], own["_vertical"], self.centre, own["_squares"])
+        attributes = self.__dict__
+        return torque_form(
+            ROLLING, self.mass, attributes["_weight"], attributes["_vertical"], self.centre, attributes["_squares"]
+        )
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """m g x·μ, of the height of the mass centre above the plane."""

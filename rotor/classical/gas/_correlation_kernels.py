@@ -50,12 +50,12 @@ def add_bodies(rows: Rows, times: Floats, vector: Floats, axes: Floats, beta: Fl
     """Add u(0)·u(t) and β(0):β(t) and their squares, over all bodies of `rows`, to sums (4, times)."""
     momentum, attitude = np.empty((1, times.size, 3)), np.empty((1, times.size, 4))
     for b in range(rows.kind.shape[0]):
-        one = Rows(
+        body = Rows(
             rows.kind[b : b + 1], rows.rates[b : b + 1], rows.shift[b : b + 1], rows.series[b : b + 1],
             rows.axes[b : b + 1], rows.signs[b : b + 1], rows.left[b : b + 1], rows.right[b : b + 1],
             rows.momentum0[b : b + 1],
         )  # fmt: skip
-        evaluate(one, times, momentum, attitude)
+        evaluate(body, times, momentum, attitude)
         for i in range(times.size):
             w, x, y, z = attitude[0, i, 0], attitude[0, i, 1], attitude[0, i, 2], attitude[0, i, 3]
             first, second = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
@@ -118,8 +118,8 @@ def _add_block(row: Floats, here: int, vector: Floats, axes: Floats, beta: Float
     for k in range(here):
         p = row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k]
         w, x, y, z = product(p, (row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k]))
-        one, two = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
-        s1, s2, s3, s4 = s1 + one, s2 + one * one, s3 + two, s4 + two * two
+        turned, two = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
+        s1, s2, s3, s4 = s1 + turned, s2 + turned * turned, s3 + two, s4 + two * two
     out[0] += s1
     out[1] += s2
     out[2] += s3

@@ -39,7 +39,7 @@ def kicked(
     codes, parameters, inner = form
     rows, carry, torques = state
     turning = inner[0] != 0.0 or inner[1] != 0.0 or inner[2] != 0.0
-    one = np.ones(1)
+    whole_step = np.ones(1)
     for body in range(rows.shape[0]):
         row, lost = rows[body], carry[body]
         i0, i1, i2 = inverse[body, 0], inverse[body, 1], inverse[body, 2]
@@ -56,7 +56,7 @@ def kicked(
                     kick_body(row, lost, torque, half)
                     if turning:
                         turn_body(row, lost, -half * inner[0] * i0, -half * inner[1] * i1, -half * inner[2] * i2)
-                    symmetric_drift(row, lost, inverse[body], axes[body], h, one, one.shape[0])
+                    symmetric_drift(row, lost, inverse[body], axes[body], h, whole_step, whole_step.shape[0])
                     if turning:
                         turn_body(row, lost, -half * inner[0] * i0, -half * inner[1] * i1, -half * inner[2] * i2)
                     time += h

@@ -69,8 +69,8 @@ def _rolling_rate(
     m = turned(conjugate(q), (state[i, 0] + change[i, 0], state[i, 1] + change[i, 1], state[i, 2] + change[i, 2]))
     relative = m[0] - inner[0], m[1] - inner[1], m[2] - inner[2]
     omega = rolling_omega(rolling, q, relative, (inverse[i, 0], inverse[i, 1], inverse[i, 2]))
-    own, others = rolling_torque(rolling, q, omega), torque_at(codes, parameters, time, q, omega)
-    torque = turned(q, (own[0] + others[0], own[1] + others[1], own[2] + others[2]))
+    rolling_part, others = rolling_torque(rolling, q, omega), torque_at(codes, parameters, time, q, omega)
+    torque = turned(q, (rolling_part[0] + others[0], rolling_part[1] + others[1], rolling_part[2] + others[2]))
     rate = turning_of(u, omega, factor)
     for k in range(3):
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]

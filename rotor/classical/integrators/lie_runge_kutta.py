@@ -80,8 +80,8 @@ class LieRungeKutta(Method):
         path = np.empty((len(times), len(q), 7))
         path[0, :, :3], path[0, :, 3:] = momentum, attitude
         step = self.fixed_step or self._first_step(system, float(times[0]), momentum, attitude)
-        some = PLAIN_STEPS / ROLLING_COST if system.added else PLAIN_STEPS
-        most = some if system.compiled is not None and kernels_are_compiled() else np.inf
+        plain_steps = PLAIN_STEPS / ROLLING_COST if system.added else PLAIN_STEPS
+        most = plain_steps if system.compiled is not None and kernels_are_compiled() else np.inf
         for k, (start, stop) in enumerate(pairwise(times.tolist())):
             space, q, step, steps, reached = self._to(system, (start, stop, most - taken), space, q, step)
             taken += steps

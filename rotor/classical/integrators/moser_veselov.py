@@ -168,8 +168,8 @@ def _least_squares(matrix: Floats, expected: Floats) -> Floats:
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     along = np.einsum("nij,ni->nj", left, expected)
-    found = sizes > 1e-13 * sizes[:, :1]
-    return np.asarray(np.einsum("nj,nji->ni", np.where(found, along, 0.0) / np.where(found, sizes, 1.0), right))
+    regular = sizes > 1e-13 * sizes[:, :1]
+    return np.asarray(np.einsum("nj,nji->ni", np.where(regular, along, 0.0) / np.where(regular, sizes, 1.0), right))
 
 
 def _check_turn(momentum: Floats, moments: Floats, step: float) -> None:

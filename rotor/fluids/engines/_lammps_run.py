@@ -30,7 +30,7 @@ def frame(lmp: Any, out: BinaryIO, first: bool, rank: int) -> None:
     out.flush()
 
 
-def main(folder: str, steps: int, every: int) -> None:
+def main(folder: str, steps: int, steps_per_piece: int) -> None:
     """Read the input in a folder and run it in pieces."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what the library itself prints goes to standard error
@@ -42,8 +42,8 @@ def main(folder: str, steps: int, every: int) -> None:
     lmp.file("in.box")
     lmp.command("run 0 post no")
     frame(lmp, out, True, rank)
-    for _ in range(steps // every):
-        lmp.command(f"run {every} pre no post no")
+    for _ in range(steps // steps_per_piece):
+        lmp.command(f"run {steps_per_piece} pre no post no")
         frame(lmp, out, False, rank)
     lmp.close()
 

@@ -50,7 +50,7 @@ class EngineInput:
     @cached_property
     def sites_of_kinds(self) -> Ints:
         """(species,) number of sites."""
-        return np.array([len(one.model.sites) for one in self.species])
+        return np.array([len(kind.model.sites) for kind in self.species])
 
     @cached_property
     def first_sites(self) -> Ints:
@@ -66,7 +66,7 @@ class EngineInput:
     @cached_property
     def site_masses(self) -> Floats:
         """(sites,) 0 for sites without mass."""
-        padded = [np.pad(one.masses, (0, len(one.model.sites) - len(one.masses))) for one in self.species]
+        padded = [np.pad(kind.masses, (0, len(kind.model.sites) - len(kind.masses))) for kind in self.species]
         return np.concatenate([padded[k] for k in self.kinds])
 
     @cached_property
@@ -223,10 +223,10 @@ def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
     spans = [slice(bodies.starts[body], bodies.starts[body + 1]) for body in heads]
     species = tuple(Species(by_symbols[tuple(atoms.symbols[span])], bodies.masses[span]) for span in spans)
     own_axes = [
-        superpose(one.model.positions_angstrom[: len(one.masses)], bodies.sites[span], one.masses).apply(
-            one.model.positions_angstrom
+        superpose(kind.model.positions_angstrom[: len(kind.masses)], bodies.sites[span], kind.masses).apply(
+            kind.model.positions_angstrom
         )
-        for one, span in zip(species, spans, strict=True)
+        for kind, span in zip(species, spans, strict=True)
     ]
     removed = 0 if settings.ensemble == "langevin" else 3
     motion = _starting_motion(atoms, bodies, pose, settings, removed)

@@ -49,8 +49,8 @@ def mpi_folders() -> list[str]:
         files = importlib.metadata.files("mpich") or []
     except importlib.metadata.PackageNotFoundError:
         return []
-    found = {str(Path(str(file.locate())).resolve().parent) for file in files if file.name.startswith("libmpi.so")}
-    return sorted(found)
+    folders = {str(Path(str(file.locate())).resolve().parent) for file in files if file.name.startswith("libmpi.so")}
+    return sorted(folders)
 
 
 def environment() -> dict[str, str]:

@@ -41,11 +41,11 @@ def site_types(engine_input: EngineInput) -> SiteTypes:
     """The site types of an engine's input."""
     known: dict[tuple[float, ...], int] = {}
     sites, masses, of_species = [], [], []
-    for one in engine_input.species:
+    for kind in engine_input.species:
         numbers = []
-        for k, site in enumerate(one.model.sites):
-            mass = float(one.masses[k]) if k < len(one.masses) else MASSLESS_U
-            key = (mass, site.charge_e, site.sigma_angstrom, site.epsilon_k, len(one.model.sites) == 1)
+        for k, site in enumerate(kind.model.sites):
+            mass = float(kind.masses[k]) if k < len(kind.masses) else MASSLESS_U
+            key = (mass, site.charge_e, site.sigma_angstrom, site.epsilon_k, len(kind.model.sites) == 1)
             if key not in known:
                 known[key] = len(known) + 1
                 sites.append(site)
@@ -128,7 +128,7 @@ def pair_commands(engine_input: EngineInput, settings: Settings, form: Form, acc
         Commands.
     """
     pairs, cutoff = _pairs(engine_input), settings.cutoff_angstrom
-    charged = any(site.charge_e for one in engine_input.species for site in one.model.sites)
+    charged = any(site.charge_e for kind in engine_input.species for site in kind.model.sites)
     if charged and settings.electrostatics != "ewald":
         style = [f"pair_style table spline {TABLE_POINTS}"]
         return style + [f"pair_coeff {i} {j} pairs.table PAIR_{i}_{j} {cutoff:.17g}" for i, j, _ in pairs]
@@ -145,8 +145,8 @@ def pair_commands(engine_input: EngineInput, settings: Settings, form: Form, acc
 
 def _depth(sites: tuple[Site, Site]) -> str:
     """ε in eV and σ in Å of two sites."""
-    one, other = sites
-    sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
+    first, other = sites
+    sigma, epsilon = mixed((first.sigma_angstrom, other.sigma_angstrom), (first.epsilon_ev, other.epsilon_ev))
     return f"{epsilon:.17g} {sigma or 1.0:.17g}"
 
 

@@ -79,7 +79,7 @@ def build_system(engine_input: EngineInput, settings: Settings, form: Form, accu
     a, b, c = engine_input.edges / 10
     system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
     force = nonbonded(mm, settings, form, accuracy)
-    plans = [equimomental_points(one.model, one.masses) for one in engine_input.species]
+    plans = [equimomental_points(kind.model, kind.masses) for kind in engine_input.species]
     massive: list[int] = []
     owners: list[int] = []
     atoms: list[int] = []
@@ -314,7 +314,7 @@ def session(
 def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int) -> Any:
     """A context; where the choice of the platform is left to OpenMM and it is not the CPU, it finds one that works."""
     known = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
-    chosen = platform or max(known, key=lambda one: float(one.getSpeed())).getName()
+    chosen = platform or max(known, key=lambda candidate: float(candidate.getSpeed())).getName()
     if chosen == "CPU":
         return mm.Context(system, made, mm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
     if platform is None:

@@ -51,8 +51,8 @@ def pair_energy(
         S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) in eV, with the switch S and the form f of charges under a cutoff as in
         `rotor.fluids.forces.interactions`, and minus its slope in eV/Å.
     """
-    one, other = sites
-    sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
+    first, other = sites
+    sigma, epsilon = mixed((first.sigma_angstrom, other.sigma_angstrom), (first.epsilon_ev, other.epsilon_ev))
     sixth = (sigma / r) ** 6
     _, begin, slope = switched(settings.cutoff_angstrom, form.switch_angstrom)
     t = np.clip((r - begin) * slope, 0.0, 1.0)
@@ -62,7 +62,7 @@ def pair_energy(
     if not charges:
         return energy, force
     f, g = _charges(r, settings, form)
-    qq = COULOMB_EV_ANGSTROM * one.charge_e * other.charge_e
+    qq = COULOMB_EV_ANGSTROM * first.charge_e * other.charge_e
     return energy + qq * f, force + qq * g
 
 
@@ -81,7 +81,7 @@ def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]
 def tail_of(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
     """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, the fluid taken as even there."""
     counts = np.bincount(engine_input.kinds, minlength=len(engine_input.species))
-    models = tuple(one.model for one in engine_input.species)
+    models = tuple(kind.model for kind in engine_input.species)
     energy, pressure = tail(models, counts, settings.cutoff_angstrom, form.switch_angstrom)
     volume = float(np.prod(engine_input.edges))
     return energy / volume, pressure / volume**2

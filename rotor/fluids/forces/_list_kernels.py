@@ -62,21 +62,21 @@ def _image(raw: int, bins: int, box: float) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _keep_near(
-    there: Floats, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, found: int,
+    there: Floats, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, count: int,
     mine: Integers,
 ) -> int:  # fmt: skip
     """Append the molecules from start to stop that are in range of (x, y, z); how many there are then."""
     for p in range(start, stop):
         dx, dy, dz = there[p, 0] - x, there[p, 1] - y, there[p, 2] - z
-        mine[found] = order[p] * 128 + code
-        found += 1 if dx * dx + dy * dy + dz * dz < range2 else 0
-    return found
+        mine[count] = order[p] * 128 + code
+        count += 1 if dx * dx + dy * dy + dz * dz < range2 else 0
+    return count
 
 
 @njit(cache=True, error_model="numpy")
 def _along_column(
-    m: int, raw_x: int, raw_y: int, left: float, own: bool, rank: int, places: Integers, starts: Integers, there: Floats,
-    order: Integers, here: Floats, box: Floats, low: Floats, width: Floats, bins: Integers, range2: float, found: int,
+    m: int, raw_x: int, raw_y: int, left: float, same_column: bool, rank: int, places: Integers, starts: Integers, there: Floats,
+    order: Integers, here: Floats, box: Floats, low: Floats, width: Floats, bins: Integers, range2: float, count: int,
     mine: Integers,
 ) -> Any:  # fmt: skip
     """Neighbours of m in a column of bins along z, within √left of it there; own: the column of m, from m upwards."""
@@ -85,28 +85,28 @@ def _along_column(
     reach = np.sqrt(left)
     bottom = int(np.floor((here[2] - reach - low[2]) / width[2]))
     top = int(np.floor((here[2] + reach - low[2]) / width[2]))
-    bottom = max(bottom, places[m, 2]) if own else bottom
+    bottom = max(bottom, places[m, 2]) if same_column else bottom
     for image_z in range(-IMAGES, IMAGES + 1):
         first, last = max(bottom, image_z * bins[2]), min(top, image_z * bins[2] + bins[2] - 1)
         if first > last or (box[2] == 0.0 and image_z != 0):
             continue
         start, stop = starts[column + first - image_z * bins[2]], starts[column + last - image_z * bins[2] + 1]
-        start = rank + 1 if own and image_z == 0 else start
-        if found + stop - start > len(mine):
+        start = rank + 1 if same_column and image_z == 0 else start
+        if count + stop - start > len(mine):
             mine = _longer(mine, len(mine) + stop - start)
         x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
         code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
-        found = _keep_near(there, order, start, stop, x, y, z, range2, code, found, mine)
-    return found, mine
+        count = _keep_near(there, order, start, stop, x, y, z, range2, code, count, mine)
+    return count, mine
 
 
 @njit(cache=True)
 def _by_kind(
-    mine: Integers, found: int, kinds: Integers, species: int, entries: Integers, used: int, starts: Integers
+    mine: Integers, count: int, kinds: Integers, species: int, entries: Integers, used: int, starts: Integers
 ) -> int:
     """Copy one molecule's list behind the others, one kind after the other, and note where each ends."""
     for kind in range(species):
-        for p in range(found):
+        for p in range(count):
             if species == 1 or kinds[mine[p] // 128] == kind:
                 entries[used] = mine[p]
                 used += 1
@@ -141,7 +141,7 @@ def neighbour_list(
     starts = np.zeros(n * species + 1, dtype=np.int64)
     entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), nothing
     for m in range(n):
-        found, here = nothing, centres[m]
+        count, here = nothing, centres[m]
         for raw_x in range(places[m, 0], places[m, 0] + steps_x + 1):
             gap_x = _gap2(here[0], low[0] + raw_x * width[0], width[0])
             if abs(_image(raw_x, bins[0], box[0])) > IMAGES or gap_x > range2:
@@ -151,13 +151,13 @@ def neighbour_list(
                 left = range2 - gap_x - _gap2(here[1], low[1] + raw_y * width[1], width[1])
                 if abs(_image(raw_y, bins[1], box[1])) > IMAGES or left < 0.0:
                     continue
-                found, mine = _along_column(
+                count, mine = _along_column(
                     m, raw_x, raw_y, left, not ahead and raw_y == places[m, 1], rank[m], places, first, there, order, here,
-                    box, low, width, bins, range2, found, mine,
+                    box, low, width, bins, range2, count, mine,
                 )  # fmt: skip
-        if used + found > len(entries):
-            entries = _longer(entries, len(entries) + found)
-        used = _by_kind(mine, found, kinds, species, entries, used, starts[m * species + 1 : (m + 1) * species + 1])
+        if used + count > len(entries):
+            entries = _longer(entries, len(entries) + count)
+        used = _by_kind(mine, count, kinds, species, entries, used, starts[m * species + 1 : (m + 1) * species + 1])
     return starts, entries[:used]
 
 
@@ -170,7 +170,7 @@ def closest_atoms(
 
     starts: where each molecule's list begins. The real atoms of a molecule are the first of its sites.
     """
-    best, one, other = np.inf, -1, -1
+    best, first, other = np.inf, -1, -1
     for i in range(len(centres)):
         for p in range(starts[i], starts[i + 1]):
             entry = np.int64(entries[p])
@@ -184,5 +184,5 @@ def closest_atoms(
                 for b in range(first_atom[j + 1] - first_atom[j]):
                     square = np.sum((sites[first_site[j] + b] + image - sites[first_site[i] + a]) ** 2)
                     if square < best:
-                        best, one, other = square, first_atom[i] + a, first_atom[j] + b
-    return best, one, other
+                        best, first, other = square, first_atom[i] + a, first_atom[j] + b
+    return best, first, other

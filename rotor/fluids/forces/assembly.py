@@ -113,16 +113,16 @@ class Assembly:
             real = model.positions_angstrom[: self.atoms[kind]]
             for s in range(len(real)):
                 for t in range(s):
-                    found = np.linalg.norm(sites_angstrom[first + s] - sites_angstrom[first + t], axis=1)
-                    self._refuse_distance(kind, s, t, found, float(np.linalg.norm(real[s] - real[t])))
+                    distances = np.linalg.norm(sites_angstrom[first + s] - sites_angstrom[first + t], axis=1)
+                    self._refuse_distance(kind, s, t, distances, float(np.linalg.norm(real[s] - real[t])))
 
-    def _refuse_distance(self, kind: int, s: int, t: int, found: Floats, expected: float) -> None:
-        wrong = np.flatnonzero(~(np.abs(found - expected) <= GEOMETRY_ANGSTROM))
+    def _refuse_distance(self, kind: int, s: int, t: int, distances: Floats, expected: float) -> None:
+        wrong = np.flatnonzero(~(np.abs(distances - expected) <= GEOMETRY_ANGSTROM))
         if len(wrong):
             molecule = int(np.flatnonzero(self.kinds == kind)[wrong[0]])
             atoms = self.first_atom[molecule] + t, self.first_atom[molecule] + s
             raise ValueError(
-                f"molecule {molecule}: atoms {atoms[0]} and {atoms[1]} are {found[wrong[0]]:.4g} Å apart, in model "
+                f"molecule {molecule}: atoms {atoms[0]} and {atoms[1]} are {distances[wrong[0]]:.4g} Å apart, in model "
                 f"{self.models[kind].name} {expected:.4g} Å; give the atoms of a molecule one after another, in the model's shape"
             )
 
@@ -135,13 +135,13 @@ def _by_label(symbols: list[str], labels: Integers, models: tuple[RigidModel, ..
     known = {model.symbols: kind for kind, model in enumerate(models)}
     kinds = []
     for start, end in pairwise(bounds):
-        found = tuple(symbols[start:end])
-        if found not in known:
+        elements = tuple(symbols[start:end])
+        if elements not in known:
             raise ValueError(
-                f"molecule {labels[start]} (atoms {start} to {end - 1}) is {'-'.join(found)}; the models are "
+                f"molecule {labels[start]} (atoms {start} to {end - 1}) is {'-'.join(elements)}; the models are "
                 f"{_spelled(models)}, their atoms in this order"
             )
-        kinds.append(known[found])
+        kinds.append(known[elements])
     return kinds
 
 

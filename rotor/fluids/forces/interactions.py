@@ -36,10 +36,10 @@ def mixed(sigma: tuple[float, float], epsilon: tuple[float, float]) -> tuple[flo
 
 
 def _numbers(first: RigidModel, second: RigidModel, s: int, t: int) -> tuple[float, float, float]:
-    one, other = first.sites[s], second.sites[t]
-    sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
+    site, other = first.sites[s], second.sites[t]
+    sigma, epsilon = mixed((site.sigma_angstrom, other.sigma_angstrom), (site.epsilon_ev, other.epsilon_ev))
     return (
-        COULOMB_EV_ANGSTROM * one.charge_e * other.charge_e,
+        COULOMB_EV_ANGSTROM * site.charge_e * other.charge_e,
         4 * epsilon * sigma**12,
         4 * epsilon * sigma**6,
     )
@@ -145,7 +145,7 @@ def tail(
             for s in range(len(first.sites)):
                 for t in range(len(second.sites)):
                     _, c12, c6 = _numbers(first, second, s, t)
-                    one, two = _beyond(c12, c6, cutoff_angstrom, width_angstrom)
-                    energy += 2 * math.pi * n * m * one
+                    tail_energy, two = _beyond(c12, c6, cutoff_angstrom, width_angstrom)
+                    energy += 2 * math.pi * n * m * tail_energy
                     pressure += 2 * math.pi * n * m * two
     return energy, pressure

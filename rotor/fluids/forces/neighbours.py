@@ -120,11 +120,11 @@ class Neighbours:
         return first, entries // 128, self.images[entries % 128]
 
     def _refuse_overlaps(self) -> None:
-        found = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)
-        if found is not None and found[0] < CLOSEST_ANGSTROM:
+        closest = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)
+        if closest is not None and closest[0] < CLOSEST_ANGSTROM:
             self.starts = self.starts[:0]  # so that asking again fails again
             raise ValueError(
-                f"atoms {found[1]} and {found[2]} of different molecules are {found[0]:.3g} Å apart; molecules "
+                f"atoms {closest[1]} and {closest[2]} of different molecules are {closest[0]:.3g} Å apart; molecules "
                 f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them, or, if "
                 "they were apart before, take a shorter step"
             )
@@ -134,8 +134,8 @@ class Neighbours:
         from rotor.fluids.forces import _list_kernels
 
         a = self.assembly
-        square, one, other = _list_kernels.closest_atoms(
+        square, first, other = _list_kernels.closest_atoms(
             np.ascontiguousarray(self.starts[:: len(a.models)]), self.entries, self.images, self.centres, self.sites,
             a.first_site, a.first_atom, within_angstrom**2,
         )  # fmt: skip
-        return None if one < 0 else (math.sqrt(square), int(one), int(other))
+        return None if first < 0 else (math.sqrt(square), int(first), int(other))

@@ -166,24 +166,24 @@ class RigidPotential(Calculator):
         box: Any = self.atoms if atoms is None else atoms
         if box is None:
             raise ValueError("no atoms were given to this calculator yet")
-        found = self.last = self.evaluate(box)
-        self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
+        evaluation = self.last = self.evaluate(box)
+        self.results = {"energy": evaluation.energy_ev, "forces": evaluation.forces_ev_per_angstrom}
         if box.pbc.all():
             volume = float(box.cell.array.diagonal().prod())
-            stress = -(found.virial_ev / volume)[VOIGT]
-            stress[:3] -= found.tail_pressure_ev_per_angstrom3
+            stress = -(evaluation.virial_ev / volume)[VOIGT]
+            stress[:3] -= evaluation.tail_pressure_ev_per_angstrom3
             self.results["stress"] = stress
         self._remember(box)
 
     def _remember(self, atoms: Any) -> None:
         """Keep a copy for `check_state`; most often only positions changed."""
-        own: Any = self.atoms
-        if own is None or not _same_atoms(own, atoms):
+        remembered: Any = self.atoms
+        if remembered is None or not _same_atoms(remembered, atoms):
             self.atoms = atoms.copy()
             return
-        own.positions[:] = atoms.positions
-        own.cell[:] = atoms.cell.array
-        own.pbc[:] = atoms.pbc
+        remembered.positions[:] = atoms.positions
+        remembered.cell[:] = atoms.cell.array
+        remembered.pbc[:] = atoms.pbc
 
     @property
     def rebuilds(self) -> int:
@@ -280,8 +280,10 @@ class RigidPotential(Calculator):
 
         self._run([lambda i=i: share(i) for i in range(self.threads)])
         if not np.isfinite(totals).all():
-            found = neighbours.closest(2 * a.reach_angstrom.max() + CLOSEST_ANGSTROM)
-            near = f"atoms {found[1]} and {found[2]} are {found[0]:.3g} Å apart" if found else "no atoms are near"
+            closest = neighbours.closest(2 * a.reach_angstrom.max() + CLOSEST_ANGSTROM)
+            near = (
+                f"atoms {closest[1]} and {closest[2]} are {closest[0]:.3g} Å apart" if closest else "no atoms are near"
+            )
             raise ValueError(f"the energy is not finite; {near}")
         return (forces[0], totals[0]) if self.threads == 1 else (forces.sum(axis=0), totals.sum(axis=0))
 

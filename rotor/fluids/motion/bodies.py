@@ -176,12 +176,14 @@ def bodies_of(
     for number, (elements, members) in enumerate(groups):
         rows = np.stack([order[starts[b] : starts[b + 1]] for b in members])
         places = whole(atoms.positions[rows], atoms)
-        given = (shapes or {}).get(elements)
-        shape = _principal(masses[rows[0]], places[0] if given is None else np.asarray(given, dtype=np.float64))
+        model_shape = (shapes or {}).get(elements)
+        shape = _principal(
+            masses[rows[0]], places[0] if model_shape is None else np.asarray(model_shape, dtype=np.float64)
+        )
         sites[rows], moments[members], species[members] = shape.sites, shape.moments, number
         notes += [f"{_formula(elements)}: {note}" for note in shape.notes]
         centres[members], attitude[members] = _fitted(
-            shape, places, members, rows, _formula(elements), tolerance_angstrom, given is not None
+            shape, places, members, rows, _formula(elements), tolerance_angstrom, model_shape is not None
         )
     mass = np.add.reduceat(masses[order], starts[:-1])
     names = tuple(_formula(elements) for elements, _ in groups)
@@ -198,10 +200,10 @@ def atom_masses(atoms: Atoms) -> Floats:
     from rotor.molecules.nuclei import masses
 
     if atoms.has("masses"):
-        given = np.asarray(atoms.get_masses(), dtype=np.float64)
-        if not (np.isfinite(given).all() and (given >= 0.0).all()):
-            raise ValueError(f"masses must be finite and not negative; got {given.min()}")
-        return given
+        user_masses = np.asarray(atoms.get_masses(), dtype=np.float64)
+        if not (np.isfinite(user_masses).all() and (user_masses >= 0.0).all()):
+            raise ValueError(f"masses must be finite and not negative; got {user_masses.min()}")
+        return user_masses
     symbols = atoms.get_chemical_symbols()
     kinds = sorted(set(symbols))
     table = dict(zip(kinds, masses(kinds), strict=True))

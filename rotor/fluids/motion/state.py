@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.fluids.motion.bodies import Bodies, Pose
 
-_ONE = np.ones(1)
+_WHOLE_STEP = np.ones(1)
 
 
 @dataclass
@@ -78,7 +78,7 @@ class Flows:
         from rotor.classical.integrators._step_kernels import symmetric
 
         state.centres += state.momentum * (time / self.bodies.mass[:, None])
-        symmetric(state.spin, state.carry, self._inverse, self._axes, time, _ONE, 1)
+        symmetric(state.spin, state.carry, self._inverse, self._axes, time, _WHOLE_STEP, 1)
 
     def kick(self, state: State, force: Floats, torque: Floats, time: float) -> None:
         """Momenta gain force and torque times a time, in place.

@@ -42,10 +42,10 @@ def read_plain(output: Output) -> Read:
 
     Raises ValueError, with the line, for a table that does not hold what it should, and for an output without geometry.
     """
-    found = tables(output)
-    if not found:
+    geometries = tables(output)
+    if not geometries:
         raise ValueError(f"{output.where}: no geometry in it; give an output with one")
-    start, rows = found[-1]
+    start, rows = geometries[-1]
     try:
         numbers = [isotope(row[0].rstrip("0123456789").capitalize()).element_number for row in rows]
         coordinates = coordinates_angstrom(output, start, rows)
@@ -66,17 +66,17 @@ def unread(output: Output) -> tuple[str, ...]:
 
 
 def _version(output: Output) -> int:
-    found = next(
+    version = next(
         (re.search(r"Program Version (\d+)", line) for line in output.lines if "Program Version" in line), None
     )
-    return int(found[1]) if found else 0
+    return int(version[1]) if version else 0
 
 
 def _charge(output: Output) -> int:
     """`Total Charge  Charge  ....  0` of ORCA, `CHARGE  ICHRGE  0  ***` of CFOUR; 0 where neither stands."""
     pattern = r"\s*(?:Total Charge\s+Charge\s+\.{4}|CHARGE\s+ICHRGE)\s+(-?\d+)"
-    found = [match for line in output.lines if (match := re.match(pattern, line))]
-    return int(found[-1][1]) if found else 0
+    charges = [match for line in output.lines if (match := re.match(pattern, line))]
+    return int(charges[-1][1]) if charges else 0
 
 
 def _dipole(output: Output) -> Floats | None:
@@ -91,9 +91,9 @@ def _dipole(output: Output) -> Floats | None:
 
 
 def _three(output: Output, i: int, pattern: str) -> Floats:
-    found = re.search(pattern, output.lines[i])  # `refuse_cut` made sure that more lines follow a heading
+    numbers = re.search(pattern, output.lines[i])  # `refuse_cut` made sure that more lines follow a heading
     try:
-        return np.array([float(word) for word in (found.groups() if found else [""])])
+        return np.array([float(word) for word in (numbers.groups() if numbers else [""])])
     except ValueError:
         raise output.refuse(i, "expected three numbers of a dipole here") from None
 

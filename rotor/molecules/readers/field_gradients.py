@@ -44,7 +44,7 @@ def with_field_gradients(molecule: Molecule, output: Output) -> Molecule:
 
 def _gradients(output: Output, start: int, molecule: Molecule) -> dict[int, Floats]:
     """The matrices below a line, by the number of the atom."""
-    found: dict[int, Floats] = {}
+    gradients: dict[int, Floats] = {}
     atom: int | None = None
     for i in range(start, len(output.lines)):
         if head := _NUCLEUS.match(output.lines[i]):
@@ -52,8 +52,8 @@ def _gradients(output: Output, start: int, molecule: Molecule) -> dict[int, Floa
         elif output.lines[i].strip() == HEADING:
             if atom is None:
                 raise output.refuse(i, "a field gradient without the line `Nucleus` that says of which atom")
-            found[atom] = _matrix(output, i)
-    return found
+            gradients[atom] = _matrix(output, i)
+    return gradients
 
 
 def _atom(output: Output, i: int, molecule: Molecule, atom: int, symbol: str) -> int:

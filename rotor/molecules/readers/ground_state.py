@@ -29,7 +29,7 @@ def dipole_lines(output: Output) -> list[int]:
 def is_excited(output: Output, start: int) -> bool:
     """Whether the dipole that opens at a line is of an excited density."""
     if output.program.name == "Gaussian":
-        heads = [found[1] for line in output.lines[:start] if (found := _DENSITY.search(line))]
+        heads = [match[1] for line in output.lines[:start] if (match := _DENSITY.search(line))]
         density = heads[-1].upper() if heads else "SCF"
         lists_states = any(line.lstrip().startswith("Excited State ") for line in output.lines)
         return "CIS" in density or (density in ("CI", "CURRENT") and lists_states)

@@ -73,8 +73,8 @@ class Output:
 
     def last(self, openings: tuple[str, ...]) -> int | None:
         """Index of the last line that begins with one of the openings."""
-        found = [i for i, line in enumerate(self.lines) if line.strip().startswith(openings)]
-        return found[-1] if found else None
+        rows = [i for i, line in enumerate(self.lines) if line.strip().startswith(openings)]
+        return rows[-1] if rows else None
 
     def refuse(self, i: int, rule: str) -> ValueError:
         return ValueError(f"{self.where}: line {i + 1}: {rule}: {self.lines[i].strip()[:80]!r}")

@@ -46,15 +46,15 @@ def with_quadrupole(molecule: Molecule, output: Output) -> Molecule:
         return _noted(molecule, output, start, "stand in axes that no table of the same geometry says")
     if not _dipole_agrees(molecule, output, start, fit):
         return _noted(molecule, output, start, "stand beside a dipole that is not the molecule's in the same axes")
-    found = {}
+    couplings = {}
     for atom, (symbol, mass_number), tensor in _tensors(output, start):
         nucleus: Isotope = molecule.nuclei[atom - 1]
         if (nucleus.symbol, nucleus.mass_number) != (symbol, mass_number):
             return _noted(molecule, output, start, f"are of {mass_number}{symbol}, atom {atom} is {nucleus.label}")
         turned = fit.rotation @ tensor @ fit.rotation.T
-        found[atom] = (turned + turned.T) / 2 - np.eye(3) * np.trace(turned) / 3
+        couplings[atom] = (turned + turned.T) / 2 - np.eye(3) * np.trace(turned) / 3
     source = f"{output.program.name}, {output.where}"
-    return replace(molecule, quadrupole_mhz=found, quadrupole_source=source)
+    return replace(molecule, quadrupole_mhz=couplings, quadrupole_source=source)
 
 
 def _axes(output: Output, table: int, molecule: Molecule) -> Superposition | None:
@@ -84,14 +84,14 @@ def _dipole_agrees(molecule: Molecule, output: Output, start: int, fit: Superpos
 
 def _tensors(output: Output, start: int) -> list[tuple[int, tuple[str, int], Floats]]:
     """Number of the atom, its element and mass number, and the tensor as printed."""
-    found, i = [], start + 1
+    tensors, i = [], start + 1
     while i + 3 < len(output.lines) and (head := _NUCLEUS.match(output.lines[i])):
         rows = [_NUMBER.findall(line) for line in output.lines[i + 1 : i + 4]]
         if [len(row) for row in rows] != [3, 3, 3]:
             raise output.refuse(i, "nine elements of a quadrupole coupling are expected in three lines after this one")
-        found.append((int(head[1]), (head[2], int(head[3])), np.array(rows, dtype=float)))
+        tensors.append((int(head[1]), (head[2], int(head[3])), np.array(rows, dtype=float)))
         i += 4
-    return found
+    return tensors
 
 
 def _noted(molecule: Molecule, output: Output, start: int, why: str) -> Molecule:

@@ -179,12 +179,12 @@ def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
     masses = _printed_masses(data)
     if masses is None:
         return symbols, ()
-    found = []
+    mass_numbers = []
     for number, symbol, mass in zip(numbers, symbols, masses, strict=True):
         average = abs(mass - atomic_masses[number]) < 5e-3  # programs' averages differ in the third decimal
         near = isotope(symbol) if average else isotope_of_mass(symbol, float(mass))
-        found.append(near.mass_number)
-    return symbols, tuple(found)
+        mass_numbers.append(near.mass_number)
+    return symbols, tuple(mass_numbers)
 
 
 def _printed_masses(data: Any) -> Floats | None:
@@ -237,10 +237,10 @@ def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
     if not starts:
         return molecule
     start, known = starts[-1], len(getattr(data, "moments", ())) > 1
-    own = np.asarray(data.moments[1], dtype=np.float64) if known else printed_dipole(output, starts[-1])
-    if own is None:
+    vector = np.asarray(data.moments[1], dtype=np.float64) if known else printed_dipole(output, starts[-1])
+    if vector is None:
         return molecule
-    printed = own
+    printed = vector
     if is_excited(output, start):
         ground = [
             (i, dipole)
@@ -270,12 +270,12 @@ def _moment_origin(data: Any, output: Output) -> Floats | None:
     if output.program.name in ("Gaussian", "CFOUR"):
         return np.zeros(3)
     for line in reversed(output.lines):
-        found = re.search(
+        origin = re.search(
             r"origin for moment calculation is .*= *\(([^)]*)\)|Position of electric origin *\.\.\.(.*)", line
         )
-        if found:
+        if origin:
             return BOHR_RADIUS_ANGSTROM * np.array(
-                [float(word) for word in (found[1] or found[2]).replace(",", " ").split()]
+                [float(word) for word in (origin[1] or origin[2]).replace(",", " ").split()]
             )
     return None
 
@@ -309,12 +309,12 @@ def _polarizability_axes(molecule: Molecule, data: Any, output: Output, start: i
         return None
     line = output.lines[above].replace("D", "E")
     here = np.array([float(line[k : k + 15]) for k in (16, 31, 46)]) * DEBYE_PER_E_ANGSTROM * BOHR_RADIUS_ANGSTROM
-    fits = [one for one in (fit, turned) if _close(one.rotation @ here, molecule.dipole_debye)]
+    fits = [axes for axes in (fit, turned) if _close(axes.rotation @ here, molecule.dipole_debye)]
     return fits[0] if len(fits) == 1 else None
 
 
-def _close(one: Floats, other: Floats) -> bool:
-    return bool(np.max(np.abs(one - other)) < SAME_DIPOLE_DEBYE)
+def _close(dipole: Floats, other: Floats) -> bool:
+    return bool(np.max(np.abs(dipole - other)) < SAME_DIPOLE_DEBYE)
 
 
 def _noted(molecule: Molecule, output: Output, start: int, tensor: str, why: str) -> Molecule:
@@ -334,7 +334,7 @@ def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, .
     apart = _apart(printed, here)
     if apart < max(CONSTANTS_AGREE, digits):
         return ()
-    texts = ["/".join(f"{value:.3f}" for value in some) for some in (printed, here[-len(printed) :])]
+    texts = ["/".join(f"{value:.3f}" for value in constants) for constants in (printed, here[-len(printed) :])]
     differ = f"{output.where}: printed constants {texts[0]} MHz, from the geometry {texts[1]}"
     others = [
         _apart(printed, _constants_mhz(masses, molecule.positions_angstrom)) for masses in _other_masses(molecule, data)
@@ -354,7 +354,7 @@ def _other_masses(molecule: Molecule, data: Any) -> list[Floats]:
     from ase.data import atomic_masses
 
     printed = _printed_masses(data)
-    averages = np.array([atomic_masses[one.element_number] for one in molecule.nuclei])
+    averages = np.array([atomic_masses[nucleus.element_number] for nucleus in molecule.nuclei])
     return [averages] if printed is None else [averages, printed]
 
 
@@ -364,10 +364,10 @@ def _printed_constants(output: Output) -> tuple[Floats, float]:
     And what half of the last digit of the smallest is of it.
     """
     pairs = zip(output.lines, (*output.lines[1:], ""), strict=True)
-    found = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
-    if not found:
+    texts = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
+    if not texts:
         return np.zeros(0), 0.0
-    words = [word for word in re.findall(r"\d+\.\d+", found[-1]) if float(word) > 0]
+    words = [word for word in re.findall(r"\d+\.\d+", texts[-1]) if float(word) > 0]
     values = [float(word) * output.program.constants_mhz for word in words]
     digits = [0.5 * 10.0 ** -len(word.partition(".")[2]) / float(word) for word in words]
     return np.sort(values)[::-1], max(digits, default=0.0)
@@ -388,7 +388,7 @@ def _apart(printed: Floats, calculated: Floats) -> float:
     >>> round(_apart(np.array([10.1, 8.0]), np.array([np.inf, 10.0, 8.0])), 9)
     0.01
     """
-    some = calculated[-len(printed) :]
-    if not np.all(np.isfinite(some)):
+    smaller = calculated[-len(printed) :]
+    if not np.all(np.isfinite(smaller)):
         return float("inf")
-    return float(np.max(np.abs(printed / some - 1)))
+    return float(np.max(np.abs(printed / smaller - 1)))

@@ -177,16 +177,16 @@ def _ase_mass_numbers(atoms: Any, symbols: tuple[str, ...]) -> tuple[int, ...]:
 
     if not atoms.has("masses"):
         return ()
-    found = []
+    numbers = []
     for i, (symbol, mass) in enumerate(zip(symbols, atoms.get_masses(), strict=True)):
         if abs(mass - atomic_masses[atoms.numbers[i]]) < 1e-6:
-            found.append(isotope(symbol).mass_number)
+            numbers.append(isotope(symbol).mass_number)
             continue
         try:
-            found.append(isotope_of_mass(symbol, float(mass)).mass_number)
+            numbers.append(isotope_of_mass(symbol, float(mass)).mass_number)
         except ValueError as reason:
             raise ValueError(f"atom {i + 1}: {reason}") from None
-    return tuple(found)
+    return tuple(numbers)
 
 
 def g2_names() -> tuple[str, ...]:

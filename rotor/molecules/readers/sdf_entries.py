@@ -17,8 +17,8 @@ def entry_of(word: str) -> tuple[Path, int] | None:
     >>> entry_of("many.sdf#3"), entry_of("water")
     ((PosixPath('many.sdf'), 3), None)
     """
-    found = _ENTRY.fullmatch(word)
-    return None if found is None or os.path.exists(word) else (Path(found[1]), int(found[2]))
+    entry = _ENTRY.fullmatch(word)
+    return None if entry is None or os.path.exists(word) else (Path(entry[1]), int(entry[2]))
 
 
 def entry_names(path: Path) -> tuple[str, ...]:

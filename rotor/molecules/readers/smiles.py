@@ -72,15 +72,15 @@ def from_smiles(text: str) -> Molecule:
     >>> from_smiles("[2H]O[2H]").formula
     '[2H]2O'
     """
-    found = conformers(text)
-    near = sum(0 < one.energy_kj_per_mol < NEAR_KJ_PER_MOL for one in found)
+    distinct = conformers(text)
+    near = sum(0 < conformer.energy_kj_per_mol < NEAR_KJ_PER_MOL for conformer in distinct)
     if not near:
-        return found[0].molecule
+        return distinct[0].molecule
     others = (
         f"the lowest conformer was taken; {near} more within {NEAR_KJ_PER_MOL:g} kJ/mol of it have other constants "
         "(rotor info --conformers lists them)"
     )
-    return replace(found[0].molecule, notes=(*found[0].molecule.notes, others))
+    return replace(distinct[0].molecule, notes=(*distinct[0].molecule.notes, others))
 
 
 def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
@@ -129,17 +129,19 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
                 continue
         molecule = from_rdkit(mol, conformer=place, name=text)
         source = f"SMILES {text}: {field} geometry, of {counted(len(energies), 'conformer')}" if field else "one atom"
-        one = Conformer(replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy)
-        distinct.append(one)
-        shapes.append((energy, _planar_moments(one.molecule.masses_u, one.molecule.positions_angstrom)))
+        conformer = Conformer(
+            replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy
+        )
+        distinct.append(conformer)
+        shapes.append((energy, _planar_moments(conformer.molecule.masses_u, conformer.molecule.positions_angstrom)))
     return tuple(distinct)
 
 
-def _same_conformer(one: tuple[float, Floats], other: tuple[float, Floats]) -> bool:
+def _same_conformer(first: tuple[float, Floats], other: tuple[float, Floats]) -> bool:
     """Whether energies and planar moments agree."""
-    if abs(one[0] - other[0]) > SAME_KJ_PER_MOL:
+    if abs(first[0] - other[0]) > SAME_KJ_PER_MOL:
         return False
-    return bool(np.abs(one[1] - other[1]).max() <= SAME_MOMENTS * one[1].max())
+    return bool(np.abs(first[1] - other[1]).max() <= SAME_MOMENTS * first[1].max())
 
 
 def _planar_moments(masses_u: Floats, positions_angstrom: Floats) -> Floats:
@@ -330,9 +332,9 @@ def _stereo_note(mol: Any) -> tuple[str, ...]:
     from rdkit import Chem
 
     kinds = Chem.StereoType
-    found = [s for s in Chem.FindPotentialStereo(mol) if s.specified == Chem.StereoSpecified.Unspecified]
-    bonds = sum(s.type == kinds.Bond_Double for s in found)
-    centres = sum(s.type == kinds.Atom_Tetrahedral for s in found)
+    open_stereo = [s for s in Chem.FindPotentialStereo(mol) if s.specified == Chem.StereoSpecified.Unspecified]
+    bonds = sum(s.type == kinds.Bond_Double for s in open_stereo)
+    centres = sum(s.type == kinds.Atom_Tetrahedral for s in open_stereo)
     if not bonds and centres < 2:
         return ()
     return ("the SMILES leaves the configuration open (/ \\ or @): the conformer of lowest energy was taken",)

@@ -159,8 +159,8 @@ def _molecule(
     dipole = info.get("dipole")
     try:
         return Molecule(
-            symbols=tuple(one.symbol for one in nuclei),
-            mass_numbers=tuple(one.mass_number for one in nuclei),
+            symbols=tuple(nucleus.symbol for nucleus in nuclei),
+            mass_numbers=tuple(nucleus.mass_number for nucleus in nuclei),
             positions_angstrom=np.array(positions),
             charge=info.get("charge", 0),
             dipole_debye=None if dipole is None else np.asarray(dipole, dtype=float) * DEBYE_PER_E_ANGSTROM,
@@ -190,8 +190,8 @@ def _nucleus(words: list[str], columns: _Columns, where: str) -> Isotope:
             "mass number first, as in '13C'"
         )
     try:
-        one = isotope(element_symbol(int(label)) if label.isdecimal() else label)
-        return one if columns.mass is None else isotope_of_mass(one.symbol, _number(words[columns.mass], where))
+        nucleus = isotope(element_symbol(int(label)) if label.isdecimal() else label)
+        return nucleus if columns.mass is None else isotope_of_mass(nucleus.symbol, _number(words[columns.mass], where))
     except ValueError as reason:
         raise ValueError(f"{where}: {reason}") from None
 

@@ -93,8 +93,8 @@ class _AllDistances:
         """Distances to the k nearest points, rising, and their indices."""
         distances = np.linalg.norm(places[:, None, :] - self.points, axis=2)
         nearest = np.argsort(distances, axis=1, kind="stable")[:, :k]
-        found = np.take_along_axis(distances, nearest, axis=1)
-        return (found[:, 0], nearest[:, 0]) if k == 1 else (found, nearest)
+        rising = np.take_along_axis(distances, nearest, axis=1)
+        return (rising[:, 0], nearest[:, 0]) if k == 1 else (rising, nearest)
 
 
 def best_turn(points: Floats, images: Floats, proper: bool) -> Floats:
@@ -117,20 +117,20 @@ def find_operations(labels: Ints, points: Floats, reach: float) -> tuple[list[Op
     base = _base_pair(labels, points, reach)
     turns = _candidates(labels, points, base, reach)
     matches = _Matcher(labels, points)
-    found: dict[tuple[int, int, bool], Operation] = {}
+    operations: dict[tuple[int, int, bool], Operation] = {}
     for turn in matches.survivors(turns, base):
         permutation = matches.permutation(turn)
         if permutation is None:
             continue
         key = (int(permutation[base[0]]), int(permutation[base[1]]), bool(np.linalg.det(turn) > 0))
-        if key not in found:
-            found[key] = fitted(points, permutation, key[2])
-        if len(found) > MOST_OPERATIONS:
+        if key not in operations:
+            operations[key] = fitted(points, permutation, key[2])
+        if len(operations) > MOST_OPERATIONS:
             raise ValueError(
                 f"more than {MOST_OPERATIONS} symmetry operations within {reach:.3g} Å: not a molecule whose group can "
                 "be named; give spin weights by hand"
             )
-    return [one for one in found.values() if one.mismatch_angstrom <= reach], base
+    return [operation for operation in operations.values() if operation.mismatch_angstrom <= reach], base
 
 
 def fitted(points: Floats, permutation: Ints, proper: bool) -> Operation:
@@ -141,9 +141,9 @@ def fitted(points: Floats, permutation: Ints, proper: bool) -> Operation:
     return Operation(turn, permutation, mismatch)
 
 
-def _images(labels: Ints, radii: Floats, one: int, reach: float) -> Ints:
+def _images(labels: Ints, radii: Floats, point: int, reach: float) -> Ints:
     """Points that point `one` can be carried to: like ones, as far from the centre."""
-    return np.flatnonzero((labels == labels[one]) & (np.abs(radii - radii[one]) <= reach))
+    return np.flatnonzero((labels == labels[point]) & (np.abs(radii - radii[point]) <= reach))
 
 
 def _image_counts(labels: Ints, radii: Floats, reach: float) -> Ints:
@@ -170,7 +170,7 @@ def _base_pair(labels: Ints, points: Floats, reach: float) -> tuple[int, int]:
 def _candidates(labels: Ints, points: Floats, base: tuple[int, int], reach: float) -> Floats:
     """Operations (m, 3, 3), proper and improper, that carry the base pair to a pair of images at like distance."""
     radii = np.linalg.norm(points, axis=1)
-    firsts, seconds = (_images(labels, radii, one, reach) for one in base)
+    firsts, seconds = (_images(labels, radii, point, reach) for point in base)
     if len(firsts) * len(seconds) > 20 * MOST_CANDIDATES:
         raise ValueError(_too_many(len(firsts) * len(seconds), reach))
     apart = np.linalg.norm(points[firsts][:, None] - points[seconds][None], axis=2)
@@ -179,10 +179,10 @@ def _candidates(labels: Ints, points: Floats, base: tuple[int, int], reach: floa
     if len(pairs) > MOST_CANDIDATES:
         raise ValueError(_too_many(len(pairs), reach))
 
-    own = _triads(points[[base[0]]], points[[base[1]]])[0]
+    base_triad = _triads(points[[base[0]]], points[[base[1]]])[0]
     others = _triads(points[firsts[pairs[:, 0]]], points[seconds[pairs[:, 1]]])
     mirror = np.array([1.0, 1.0, -1.0])
-    return np.concatenate([others @ own.T, (others * mirror) @ own.T])
+    return np.concatenate([others @ base_triad.T, (others * mirror) @ base_triad.T])
 
 
 def _too_many(count: int, reach: float) -> str:

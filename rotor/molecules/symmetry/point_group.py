@@ -141,7 +141,7 @@ def find_symmetry(
     if not 0 < tolerance <= NEAR:
         raise ValueError(f"tolerance {tolerance}: expected a part of the shortest distance, above 0 and up to {NEAR}")
     if len(points) == 1:
-        return _of_atom(tolerance)
+        return _atom_symmetry(tolerance)
 
     shortest = shortest_distance(points)
     if shortest < CLOSEST_ANGSTROM:
@@ -149,7 +149,7 @@ def find_symmetry(
     reach, near_reach = tolerance * shortest, NEAR * shortest
     line, off_line = _line_of(points)
     if off_line <= reach:
-        return _of_linear(labels, masses, points, line, tolerance, shortest)
+        return _linear_symmetry(labels, masses, points, line, tolerance, shortest)
 
     near_sought = len(points) <= NEAR_UP_TO
     operations, base = find_operations(labels, points, near_reach if near_sought else reach)
@@ -202,7 +202,7 @@ def _linear_name(labels: Ints, points: Floats, line: Floats, reach: float) -> st
     return "D∞h" if _reversal(labels, points, line)[1] <= reach else "C∞v"
 
 
-def _of_linear(
+def _linear_symmetry(
     labels: Ints, masses: Floats, points: Floats, line: Floats, tolerance: float, shortest: float
 ) -> Symmetry:
     """C∞v or D∞h; one half turn across the axis stands for all."""
@@ -233,9 +233,9 @@ def _of_linear(
     )
 
 
-def _of_atom(tolerance: float) -> Symmetry:
-    one = Operation(np.eye(3), np.zeros(1, dtype=np.int64), 0.0)
-    return Symmetry("Kh", "K", (one,), (), np.eye(3), np.zeros(3), ((0,),), tolerance, 0.0, 0.0, None, True)
+def _atom_symmetry(tolerance: float) -> Symmetry:
+    identity = Operation(np.eye(3), np.zeros(1, dtype=np.int64), 0.0)
+    return Symmetry("Kh", "K", (identity,), (), np.eye(3), np.zeros(3), ((0,),), tolerance, 0.0, 0.0, None, True)
 
 
 def _near_symmetry(points: Floats, group: list[Operation], order: int) -> NearSymmetry | None:
@@ -299,9 +299,9 @@ def _principal_axes(masses: Floats, points: Floats, ideal: Floats, rotations: li
     for _, axis in rotation_axes(rotations):
         if all(abs(axis @ other) < 1e-6 for other in settled):
             settled.append(axis)
-    exact, given = _inertia(masses, ideal), _inertia(masses, points)
+    exact, measured = _inertia(masses, ideal), _inertia(masses, points)
     axes = _completed(settled, exact)
-    moments = np.einsum("ij,jk,ik->i", axes, given, axes)
+    moments = np.einsum("ij,jk,ik->i", axes, measured, axes)
     order = np.argsort(moments, kind="stable")
     axes = axes[order]
     return axes * [[1.0], [1.0], [np.sign(np.linalg.det(axes))]], moments[order]
@@ -315,8 +315,8 @@ def _inertia(masses: Floats, points: Floats) -> Floats:
 
 def _completed(settled: list[Floats], tensor: Floats | None = None) -> Floats:
     """Three axes at right angles as rows: those given, then the principal axes of the tensor across them."""
-    given = np.array(settled[:3]).reshape(-1, 3)
-    across = np.linalg.svd(given, full_matrices=True)[2][len(given) :]
+    known = np.array(settled[:3]).reshape(-1, 3)
+    across = np.linalg.svd(known, full_matrices=True)[2][len(known) :]
     if tensor is not None and len(across):
         across = np.linalg.eigh(across @ tensor @ across.T)[1].T @ across
-    return np.concatenate([given, across])
+    return np.concatenate([known, across])

@@ -21,9 +21,9 @@ _SAME_LINE = 1e-4  # of 1 - |cos|: two axes of a group of order below 480 differ
 def rotation_axes(rotations: Sequence[Operation]) -> list[tuple[int, Floats]]:
     """The order and the unit vector (3,) of each axis of rotation, highest order first; each line once."""
     axes: list[tuple[int, Floats]] = []
-    for one in sorted((r for r in rotations if r.order > 1), key=lambda r: -r.order):
-        if not any(_along(one.axis, other) for _, other in axes):
-            axes.append((one.order, one.axis))
+    for rotation in sorted((r for r in rotations if r.order > 1), key=lambda r: -r.order):
+        if not any(_along(rotation.axis, other) for _, other in axes):
+            axes.append((rotation.order, rotation.axis))
     return axes
 
 
@@ -41,7 +41,7 @@ def point_group_name(rotations: Sequence[Operation], improper: Sequence[Operatio
     group = rotation_group_name(rotations)
     if not improper:
         return group
-    inverts = any(np.trace(one.matrix) < -3 + 1e-6 for one in improper)
+    inverts = any(np.trace(operation.matrix) < -3 + 1e-6 for operation in improper)
     if group in ("T", "O", "I"):
         return f"{group}h" if group != "T" or inverts else "Td"
     if group == "C1":
@@ -50,7 +50,9 @@ def point_group_name(rotations: Sequence[Operation], improper: Sequence[Operatio
         return "D2h" if inverts else "D2d"
 
     n, main = rotation_axes(rotations)[0]
-    normals = [one.axis for one in improper if one.order == 2 and not np.trace(one.matrix) < -3 + 1e-6]
+    normals = [
+        operation.axis for operation in improper if operation.order == 2 and not np.trace(operation.matrix) < -3 + 1e-6
+    ]
     if any(_along(normal, main) for normal in normals):
         return f"{group}h"
     if normals:
@@ -58,5 +60,5 @@ def point_group_name(rotations: Sequence[Operation], improper: Sequence[Operatio
     return f"S{2 * n}"
 
 
-def _along(one: Floats, other: Floats) -> bool:
-    return bool(abs(one @ other) > 1 - _SAME_LINE)
+def _along(axis: Floats, other: Floats) -> bool:
+    return bool(abs(axis @ other) > 1 - _SAME_LINE)

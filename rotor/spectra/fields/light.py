@@ -53,7 +53,7 @@ class Light:
             return 3 * _square(of_axes, self.direction)
         along, across = self.factors
         parallel = _square(of_axes, field)
-        whole = np.sum([np.abs(one) ** 2 for one in of_axes], axis=0)
+        whole = np.sum([np.abs(component) ** 2 for component in of_axes], axis=0)
         return np.asarray(along * parallel + across * np.maximum(whole - parallel, 0.0))
 
     @property

@@ -207,10 +207,10 @@ def field_lines(
     jmax = smallest_jmax(request, executor) if jmax is None else jmax
     both = each_block(request, jmax, partial(states_of_both_signs, request, fields=request.fields, jmax=jmax), executor)
     solved = [states for pair in both for states in pair]
-    found = populations_in_field(top, solved, temperature_k, populations, effects)
+    populations_of_states = populations_in_field(top, solved, temperature_k, populations, effects)
     seen = seen if isinstance(solved[0].block, TiltedBlock) else seen.about(unit)
     parts = [
-        _lines_of(solved, pair, strength, found, j_highest)
+        _lines_of(solved, pair, strength, populations_of_states, j_highest)
         for pair, strength in _strengths(acting(top, 0.0, unit, effects)[0], solved, seen, unit)
     ]
     columns = _joined(parts)
@@ -225,7 +225,7 @@ def field_lines(
         field_kv_per_cm=np.tile(request.fields, len(columns["upper"]) // len(request.fields)),
         jmax=jmax,
         accuracy_mhz=2 * _largest_error(solved, j_highest),
-        q=found.q,
+        q=populations_of_states.q,
         request=request,
         blocks=tuple(states.block for states in solved),
         **columns,
@@ -234,19 +234,21 @@ def field_lines(
 
 def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
     """Bound of what the basis leaves out of energies of states that come from levels up to a J, MHz."""
-    return max(float(one.error[:, one.block.levels.j[one.rows] <= j_highest].max(initial=0.0)) for one in solved)
+    return max(
+        float(block.error[:, block.block.levels.j[block.rows] <= j_highest].max(initial=0.0)) for block in solved
+    )
 
 
 def _strengths(
     dipole: Contraction, solved: list[BlockStates], light: Light, unit: Vector
 ) -> Iterator[tuple[BlockPair, Floats]]:
     """Pairs of blocks and S (fields, up, low) of their states in D²."""
-    blocks = [one.block for one in solved]
+    blocks = [states.block for states in solved]
     if isinstance(blocks[0], TiltedBlock):
         for low, up in combinations_with_replacement(range(len(blocks)), 2):
             axes = elements_of_mixed(blocks[up], blocks[low], dipole)  # type: ignore[arg-type]
-            if any(one.any() for one in axes):
-                between = [_between(solved[up], solved[low], one) for one in axes]
+            if any(elements.any() for elements in axes):
+                between = [_between(solved[up], solved[low], elements) for elements in axes]
                 yield BlockPair(up, low, 0, 1), light.strength(between, unit)
         return
     for pair in pairs_of_blocks(blocks):
@@ -275,18 +277,18 @@ class _Part(NamedTuple):
 
 
 def _lines_of(
-    solved: list[BlockStates], pair: BlockPair, strength: Floats, found: Populations, j_highest: int
+    solved: list[BlockStates], pair: BlockPair, strength: Floats, populations: Populations, j_highest: int
 ) -> _Part:
     """Every pair of states of two blocks with its strength (fields, up, low)."""
     up, low = solved[pair.up], solved[pair.low]
-    ours = [one.block.levels.j[one.rows] <= j_highest for one in (up, low)]
+    ours = [side.block.levels.j[side.rows] <= j_highest for side in (up, low)]
     first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair.up == pair.low else True))
     frequency = up.energies[:, first] - low.energies[:, second]
     turned = frequency[-1] < 0
     levels = up.block.levels
     free = levels.energy_mhz[up.rows[first]] - levels.energy_mhz[low.rows[second]]
     sign = np.where(turned, -1.0, 1.0)
-    difference = found.of_block[pair.low][:, second] - found.of_block[pair.up][:, first]
+    difference = populations.of_block[pair.low][:, second] - populations.of_block[pair.up][:, first]
     intensity = INTENSITY_NM2_MHZ * frequency * strength[:, first, second] * difference
     return _Part(
         sign * frequency,
@@ -306,11 +308,11 @@ def _names(
     for this, other in ((0, 1), (1, 0)):
         sides = (up, low)
         labels = [
-            np.array([one.block.levels.label(int(row)) for row in one.rows[of]])
-            for one, of in zip(sides, states, strict=True)
+            np.array([side.block.levels.label(int(row)) for row in side.rows[rows]])
+            for side, rows in zip(sides, states, strict=True)
         ]
         out.append(np.where(turned, labels[other], labels[this]))
-        m_values = [one.block.m if isinstance(one.block, TiltedBlock) else abs(one.block.m) for one in sides]
+        m_values = [side.block.m if isinstance(side.block, TiltedBlock) else abs(side.block.m) for side in sides]
         out.append(np.where(turned, m_values[other], m_values[this]))
     return out[0], out[1], out[2], out[3]
 
@@ -338,7 +340,7 @@ def _joined(parts: list[_Part]) -> dict[str, NDArray[Any]]:
         return np.concatenate([np.repeat(part.names[pick], len(part.frequency)) for part in parts])
 
     values = ("frequency_mhz", "shift_mhz", "strength_debye2", "intensity_nm2_mhz", "lower_mhz")
-    out = {one: column(place) for place, one in enumerate(values)}
+    out = {name: column(place) for place, name in enumerate(values)}
     names = ("upper", "upper_m", "lower", "lower_m", "upper_state", "lower_state")
     return {**out, **{one: name(place) for place, one in enumerate(names)}}
 
@@ -362,7 +364,7 @@ def merged(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[A
     number = np.zeros(place.shape[1], dtype=np.int64)
     for line, key in enumerate(zip(*(key.tolist() for key in keys), strict=True)):
         known = groups.setdefault(key, [])
-        same = [one for one in known if np.abs(place[:, first[one]] - place[:, line]).max() <= SAME_MHZ]
+        same = [earlier for earlier in known if np.abs(place[:, first[earlier]] - place[:, line]).max() <= SAME_MHZ]
         if not same:
             known.append(len(first))
             first.append(line)

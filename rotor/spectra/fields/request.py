@@ -27,27 +27,27 @@ MOST_POINTS = 2_000_000
 FIELDS_OF_SPREAD = 41
 
 
-def _read_light(given: Any) -> LightText:
-    if given in ("parallel", "perpendicular", "isotropic") or not isinstance(given, str):
-        return tuple(given) if isinstance(given, list) else given
+def _read_light(light: Any) -> LightText:
+    if light in ("parallel", "perpendicular", "isotropic") or not isinstance(light, str):
+        return tuple(light) if isinstance(light, list) else light
     try:
-        numbers = tuple(float(part) for part in given.removesuffix("deg").split(","))
+        numbers = tuple(float(part) for part in light.removesuffix("deg").split(","))
     except ValueError:
         numbers = ()
     if len(numbers) not in (1, 3):
         raise ValueError(
-            f"{given!r}: expected parallel, perpendicular, isotropic, an angle in degrees, or a direction such as 1,0,1"
+            f"{light!r}: expected parallel, perpendicular, isotropic, an angle in degrees, or a direction such as 1,0,1"
         )
     return numbers if len(numbers) == 3 else numbers[0]
 
 
-def _read_line(given: Any) -> tuple[str, str]:
-    if not isinstance(given, str):
-        upper, lower = given
+def _read_line(line: Any) -> tuple[str, str]:
+    if not isinstance(line, str):
+        upper, lower = line
         return str(upper), str(lower)
-    parts = [" ".join(part.replace(",", " ").split()) for part in given.split(" - ")]
+    parts = [" ".join(part.replace(",", " ").split()) for part in line.split(" - ")]
     if len(parts) != 2 or not all(parts):
-        raise ValueError(f"{given!r}: expected quantum numbers of two levels, such as '1 - 0' or '2 1 2 - 1 1 1'")
+        raise ValueError(f"{line!r}: expected quantum numbers of two levels, such as '1 - 0' or '2 1 2 - 1 1 1'")
     return parts[0], parts[1]
 
 
@@ -121,7 +121,7 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
     from rotor.spectra.fields.lines import field_lines
 
     stark = request.stark
-    found = field_lines(
+    lines = field_lines(
         stark.top,
         fields,
         j_highest=stark.j_highest,
@@ -135,7 +135,7 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
         tolerance_mhz=stark.tolerance_mhz,
         executor=executor,
     )
-    return found if request.line is None else found.lobes(*request.line)
+    return lines if request.line is None else lines.lobes(*request.line)
 
 
 def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:

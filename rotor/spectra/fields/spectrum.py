@@ -149,7 +149,7 @@ def _smeared(
         )
     out = []
     for rows in lines.pairs():
-        curves = [CubicSpline(fields, one[rows]) for one in (lines.frequency_mhz, lines.intensity_nm2_mhz)]
+        curves = [CubicSpline(fields, column[rows]) for column in (lines.frequency_mhz, lines.intensity_nm2_mhz)]
         if not isinstance(distribution, FieldDistribution):
             out.append((curves[0](np.array([first])), curves[1](np.array([first]))))
             continue

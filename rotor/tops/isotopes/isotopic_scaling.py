@@ -49,9 +49,9 @@ def matched_axes(parent: Top, turned: Top) -> tuple[str, float]:
     assert turned.frame is not None
     squares = (turned.frame.axes @ parent.frame.axes.T) ** 2
     inside = np.zeros((3, 3))  # of each axis in the space that the other may turn in
-    for own, other in itertools.product(map(list, _alike(turned.kind)), map(list, _alike(parent.kind))):
-        block = np.ix_(own, other)
-        inside[block] = squares[block].sum() / min(len(own), len(other))
+    for axes, other in itertools.product(map(list, _alike(turned.kind)), map(list, _alike(parent.kind))):
+        block = np.ix_(axes, other)
+        inside[block] = squares[block].sum() / min(len(axes), len(other))
         squares[block] = squares[block].mean()
     ways = itertools.permutations(range(3))  # the first, which changes nothing, wins where overlaps are alike
     best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))
@@ -67,8 +67,8 @@ def turned_degrees(parent: Top, turned: Top, axes: str) -> float:
     if parent.kind == turned.kind == "asymmetric":
         matched = parent.frame.axes[["abc".index(letter) for letter in axes]]
         return min(_angle(turned.frame.axes @ (matched * signs).T) for signs in _proper_signs(matched))
-    one, other = (turned, parent) if parent.kind == "asymmetric" else (parent, turned)
-    unique = one.frame.axes[2 if one.kind == "oblate" else 0]  # type: ignore[union-attr]  # asserted above
+    asymmetric, other = (turned, parent) if parent.kind == "asymmetric" else (parent, turned)
+    unique = asymmetric.frame.axes[2 if asymmetric.kind == "oblate" else 0]  # type: ignore[union-attr]  # asserted above
     nearest = float(np.abs(other.frame.axes @ unique).max())  # type: ignore[union-attr]
     return math.degrees(math.atan2(math.sqrt(max(0.0, 1 - nearest**2)), nearest))
 
@@ -116,13 +116,13 @@ def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) 
     """
     if _masses(turned) == _masses(parent):
         return parent
-    if _of_geometry(parent.constants, rigid.constants):
+    if _is_rigid(parent.constants, rigid.constants):
         return turned
     ratios = _ratios(rigid, turned, axes)
     order = ["abc".index(letter) for letter in axes]
     values = np.array(parent.constants.rigid)[order] * ratios
     values, turned = _in_order(values, turned)
-    constants = _of_kind(values, turned.kind)
+    constants = _constants_of_kind(values, turned.kind)
     name = parent.name or "the parent"
     note = (
         f"constants are those of {name} times the ratio of those calculated from its geometry; such constants were "
@@ -146,7 +146,7 @@ def _masses(top: Top) -> tuple[int, ...]:
     return top.molecule.mass_numbers if top.molecule else ()
 
 
-def _of_geometry(constants: Constants, rigid: Constants) -> bool:
+def _is_rigid(constants: Constants, rigid: Constants) -> bool:
     """Whether constants are those of a rigid geometry and nothing more."""
     same = constants.values.keys() == rigid.values.keys()
     return same and all(math.isclose(constants[name], rigid[name], rel_tol=1e-9) for name in rigid.values)
@@ -162,8 +162,8 @@ def _ratios(rigid: Top, turned: Top, axes: str) -> Floats:
 
 def _ratio_text(ratios: Floats, axes: str) -> str:
     return ", ".join(
-        f"{own.upper()} {ratio:.5f}" + (f" (from the parent's {other.upper()})" if own != other else "")
-        for own, other, ratio in zip("abc", axes, ratios, strict=True)
+        f"{axis.upper()} {ratio:.5f}" + (f" (from the parent's {other.upper()})" if axis != other else "")
+        for axis, other, ratio in zip("abc", axes, ratios, strict=True)
     )
 
 
@@ -188,7 +188,7 @@ def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     return values[order], annotated
 
 
-def _of_kind(values: Floats, kind: str) -> Constants:
+def _constants_of_kind(values: Floats, kind: str) -> Constants:
     a, b, c = (float(value) for value in values)
     return {
         "linear": lambda: Constants(B=(b + c) / 2, kind=kind),
@@ -216,7 +216,7 @@ def _with_distortion(
         return constants, (_why_rigid(old, constants, axes, angle),)
     if constants.kind == "asymmetric":
         constants = constants.replace(representation=old.representation)
-    across, along = (new / before for new, before in zip(_of_z(constants), _of_z(old), strict=True))
+    across, along = (new / before for new, before in zip(_z_constants(constants), _z_constants(old), strict=True))
     scaled = {name: old[name] * across ** (p + n) * along**q for name, (p, q, n) in _powers(old, names).items()}
     changes = {**scaled, "reduction": old.reduction} if old.reduction else scaled
     note = (
@@ -230,7 +230,7 @@ def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int,
     """(p, q, n) of the one operator that each distortion constant stands for."""
     table = distortion_terms(constants.kind, constants.reduction)
     spelled = {name: powers_of_spelled(name) for name in names}
-    return {name: own if (own := spelled[name]) else next(iter(table[name])) for name in names}
+    return {name: powers if (powers := spelled[name]) else next(iter(table[name])) for name in names}
 
 
 def _why_rigid(old: Constants, constants: Constants, axes: str, angle: float) -> str:
@@ -243,7 +243,7 @@ def _why_rigid(old: Constants, constants: Constants, axes: str, angle: float) ->
     return f"no distortion constants: those of the parent do not serve, {why}; a force field gives them (rotor.tops.distortion)"
 
 
-def _of_z(constants: Constants) -> tuple[float, float]:
+def _z_constants(constants: Constants) -> tuple[float, float]:
     """½(Bx + By) and Bz, 1 for the z of a linear or spherical top, whose terms have no Jz."""
     a, b, c = constants.rigid
     if constants.kind in ("linear", "spherical"):

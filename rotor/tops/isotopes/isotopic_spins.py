@@ -63,7 +63,7 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
     values: dict[str, float] = {}
     twice: dict[str, int] = {}
     atoms: dict[str, int] = {}
-    notes = _of_pairs(constants)
+    notes = _pair_notes(constants)
     for spin in constants.twice:
         atom = constants.atoms.get(spin) or _only_atom(parent.molecule, spin)
         if atom is None:
@@ -71,11 +71,13 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
             continue
         old, new = parent.molecule.nuclei[atom - 1], top.molecule.nuclei[atom - 1]
         change = _Change(old, new, rotation, _moments(parent), _moments(top))
-        own, said = _of_spin(constants.of(spin), change, angle if top.kind == parent.kind else 90.0, parent.kind)
+        carried, said = _carried_spin(
+            constants.of(spin), change, angle if top.kind == parent.kind else 90.0, parent.kind
+        )
         notes += [f"{spin}: {text}" for text in said]
-        if own:
+        if carried:
             name = spin if old == new else new.label + spin.removeprefix(spin.partition("_")[0])
-            values |= {f"{symbol}({name})": value for symbol, value in own.items()}
+            values |= {f"{symbol}({name})": value for symbol, value in carried.items()}
             twice[name], atoms[name] = round(2 * new.spin), atom
     if not values:
         return None, tuple(notes)
@@ -87,11 +89,11 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
 
 def _only_atom(molecule: Molecule, spin: str) -> int | None:
     """The number of the atom that a spin named by its isotope must be: that of the only nucleus of it, counted from 1."""
-    found = [number for number, nucleus in enumerate(molecule.nuclei, 1) if nucleus.label == spin]
-    return found[0] if len(found) == 1 else None
+    atoms = [number for number, nucleus in enumerate(molecule.nuclei, 1) if nucleus.label == spin]
+    return atoms[0] if len(atoms) == 1 else None
 
 
-def _of_pairs(constants: SpinConstants) -> list[str]:
+def _pair_notes(constants: SpinConstants) -> list[str]:
     pairs = [name for name in constants.values if len(spins_of(name)) != 1]
     return [f"{', '.join(pairs)}: what belongs to two spins is not carried over"] if pairs else []
 
@@ -100,11 +102,13 @@ def _moments(top: Top) -> Floats:
     return np.array(top.moments_u_angstrom2)
 
 
-def _of_spin(own: Mapping[str, float], change: _Change, angle: float, kind: str) -> tuple[dict[str, float], list[str]]:
+def _carried_spin(
+    constants: Mapping[str, float], change: _Change, angle: float, kind: str
+) -> tuple[dict[str, float], list[str]]:
     """The constants of one nucleus, without its name, and remarks."""
-    chi = {name: value for name, value in own.items() if name.startswith("chi_")}
-    rotation = {name: value for name, value in own.items() if name.startswith("C_")}
-    notes = [f"{name} is not carried over" for name in own if name not in chi and name not in rotation]
+    chi = {name: value for name, value in constants.items() if name.startswith("chi_")}
+    rotation = {name: value for name, value in constants.items() if name.startswith("C_")}
+    notes = [f"{name} is not carried over" for name in constants if name not in chi and name not in rotation]
     out: dict[str, float] = {}
     if chi and change.new.spin >= 1:
         tensor = chi_tensor(chi)
@@ -159,14 +163,14 @@ def named_chi(tensor: Floats) -> dict[str, float]:
     tensor = without_rounding(tensor)
     if np.count_nonzero(tensor) == 3 and tensor[0, 0] == tensor[1, 1]:  # symmetric about c
         return {"chi_cc": float(tensor[2, 2])}
-    found = {
+    elements = {
         "aa": tensor[0, 0],
         "bb-cc": tensor[1, 1] - tensor[2, 2],
         "ab": tensor[0, 1],
         "ac": tensor[0, 2],
         "bc": tensor[1, 2],
     }
-    return {f"chi_{letters}": float(value) for letters, value in found.items() if value}
+    return {f"chi_{letters}": float(value) for letters, value in elements.items() if value}
 
 
 def without_rounding(tensor: Floats) -> Floats:
@@ -183,14 +187,14 @@ def without_rounding(tensor: Floats) -> Floats:
     return out
 
 
-def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) -> dict[str, float]:
+def _turned_rotation(constants: Mapping[str, float], change: _Change, g_ratio: float) -> dict[str, float]:
     """Spin-rotation constants with the new moments of inertia; of a linear molecule C_iso alone goes with B."""
-    if set(own) == {"C_iso"}:
-        return {"C_iso": own["C_iso"] * g_ratio * float(change.moments[1] / change.new_moments[1])}
-    if not set(own) <= {f"C_{letters}" for letters in (*LETTERS, *DIFFERENCES)}:
+    if set(constants) == {"C_iso"}:
+        return {"C_iso": constants["C_iso"] * g_ratio * float(change.moments[1] / change.new_moments[1])}
+    if not set(constants) <= {f"C_{letters}" for letters in (*LETTERS, *DIFFERENCES)}:
         return {}
     tensor = np.zeros((3, 3))
-    for name, value in own.items():
+    for name, value in constants.items():
         i, k = ("abc".index(letter) for letter in name[2:4])
         tensor[i, k] += value
         if i != k:
@@ -200,10 +204,10 @@ def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) 
         new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
     new = without_rounding(new)
     mean, half = (new + new.T) / 2, (new - new.T) / 2
-    found = {letters: _element(mean, letters) for letters in LETTERS}
-    if any("-" in name for name in own):  # else C_ab stands for both orders
-        found |= {letters: _element(half, letters) for letters in DIFFERENCES}
-    return {f"C_{letters}": value for letters, value in found.items() if value}
+    elements = {letters: _element(mean, letters) for letters in LETTERS}
+    if any("-" in name for name in constants):  # else C_ab stands for both orders
+        elements |= {letters: _element(half, letters) for letters in DIFFERENCES}
+    return {f"C_{letters}": value for letters, value in elements.items() if value}
 
 
 def _element(tensor: Floats, letters: str) -> float:

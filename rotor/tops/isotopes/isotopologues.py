@@ -99,11 +99,11 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
         raise ValueError(f"least abundance {min_abundance:g}: expected a fraction above 0 and up to 1")
     ancestor = _Ancestor(parent)
     molecule, permutations = ancestor.molecule, ancestor.permutations
-    found: dict[tuple[int, ...], tuple[float, int]] = {}
+    placements: dict[tuple[int, ...], tuple[float, int]] = {}
     for numbers, abundance in _placements(molecule, min_abundance / len(permutations)):
         alike = {tuple(image) for image in _images(numbers, permutations)}
-        found[max(alike, key=lambda image: _earliest(molecule, image))] = (abundance * len(alike), len(alike))
-    common = {numbers: one for numbers, one in found.items() if one[0] >= min_abundance}
+        placements[max(alike, key=lambda image: _earliest(molecule, image))] = (abundance * len(alike), len(alike))
+    common = {numbers: placement for numbers, placement in placements.items() if placement[0] >= min_abundance}
     if not common:
         raise ValueError(
             f"no isotopologue of {molecule.formula} has an abundance of {min_abundance:g}; lower the limit"
@@ -162,11 +162,11 @@ def _bare_symmetry(molecule: Molecule) -> Symmetry:
 
 def _permutations(symmetry: Symmetry) -> list[NDArray[np.int64]]:
     """The permutations of atoms that the operations make."""
-    distinct = {tuple(one.permutation.tolist()) for one in (*symmetry.rotations, *symmetry.improper)}
+    distinct = {tuple(operation.permutation.tolist()) for operation in (*symmetry.rotations, *symmetry.improper)}
     return [np.array(permutation) for permutation in sorted(distinct)]
 
 
-def _of_bare_symmetry(dipole: Floats, symmetry: Symmetry) -> Floats:
+def _without_masses(dipole: Floats, symmetry: Symmetry) -> Floats:
     """A dipole as the bare geometry has it: charges do not know isotopes, components measured of one of them have errors."""
     part = invariant_vector(dipole, symmetry)
     return part if np.linalg.norm(dipole - part) < _DIPOLE_ERROR * np.linalg.norm(dipole) else dipole
@@ -184,7 +184,7 @@ def _placements(molecule: Molecule, least: float) -> Iterator[tuple[tuple[int, .
     From the most abundant one atom after another is substituted, each step less abundant than the one before, so that
     what falls below the limit is cut with all that would follow.
     """
-    fractions = [{one.mass_number: one.abundance for one in natural_isotopes(s)} for s in molecule.symbols]
+    fractions = [{nuclide.mass_number: nuclide.abundance for nuclide in natural_isotopes(s)} for s in molecule.symbols]
     base = _abundant(molecule)
     ratios = [
         [(number, part / options[base[atom]]) for number, part in options.items() if number != base[atom]]
@@ -231,7 +231,7 @@ class _Ancestor:
         symmetry = _bare_symmetry(molecule)
         self.permutations = _permutations(symmetry)
         if dipole is not None and parent.frame is not None:
-            vector = _of_bare_symmetry(np.array(dipole) @ parent.frame.axes, symmetry)
+            vector = _without_masses(np.array(dipole) @ parent.frame.axes, symmetry)
             molecule = replace(molecule, dipole_debye=vector, dipole_source=parent.dipole_source)
         if parent.polarizability_abc_angstrom3 is not None and parent.frame is not None:
             axes = parent.frame.axes

@@ -140,9 +140,9 @@ class SpinConstants:
         >>> dict(SpinConstants.from_values({"eps_aa(S)": 300.0, "b_F(S,1H)": 40.0}, "S=1/2").twice)
         {'S': 1, '1H': 1}
         """
-        given, totals = parse_coupled(spins or "")
-        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values_mhz) if s not in given}}
-        ordered = {name: every[name] for name in sorted(every, key=lambda name: name in totals)}
+        listed, totals = parse_coupled(spins or "")
+        twice: dict[str, int] = {**listed, **{s: twice_of(s) for s in _named(values_mhz) if s not in listed}}
+        ordered = {name: twice[name] for name in sorted(twice, key=lambda name: name in totals)}
         return cls(values_mhz, ordered, source, totals=totals)
 
 
@@ -154,9 +154,9 @@ def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> 
     if molecule is None:
         return
     called = [match[1] for match in map(_ISOTOPE.fullmatch, constants.twice) if match]
-    asked = Counter((one.symbol, one.mass_number) for one in map(isotope, called))
-    there = Counter((one.symbol, one.mass_number) for one in molecule.nuclei)
-    for (symbol, number), count in asked.items():
+    named = Counter((nucleus.symbol, nucleus.mass_number) for nucleus in map(isotope, called))
+    there = Counter((nucleus.symbol, nucleus.mass_number) for nucleus in molecule.nuclei)
+    for (symbol, number), count in named.items():
         if count > there[symbol, number]:
             has = ", ".join(f"{n} of {a}{s}" for (s, a), n in there.items())
             raise ValueError(
@@ -167,9 +167,11 @@ def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> 
 
 def _without_spin(text: str) -> str:
     """What to do about a constant that does not say to which spin it belongs; "" where there is none."""
-    found = re.search(r"(?<![\w)])([A-Za-z][\w-]*)\s*=\s*[-+−.\d]", text)
+    constant = re.search(r"(?<![\w)])([A-Za-z][\w-]*)\s*=\s*[-+−.\d]", text)
     return (
-        f"; {found[1]} needs its spin or spins in round brackets, {found[1]}(14N), {found[1]}(S,14N)" if found else ""
+        f"; {constant[1]} needs its spin or spins in round brackets, {constant[1]}(14N), {constant[1]}(S,14N)"
+        if constant
+        else ""
     )
 
 
@@ -242,18 +244,18 @@ def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
     >>> parse_coupled("S=1/2 1H_1+1H_2=1/2")
     ({'S': 1, '1H_1': 1, '1H_2': 1}, {'1H_1': 'I', '1H_2': 'I'})
     """
-    found, totals = dict[str, int](), dict[str, str]()
+    spins, totals = dict[str, int](), dict[str, str]()
     for part in text.replace(",", " ").split():
         names, equals, value = part.partition("=")
         together = names.split("+")
         for name in together:
             if not name:
                 raise ValueError(f"{text!r}: expected spins such as S=1/2 14N or 35Cl_1+35Cl_2; {part!r} is none")
-            if name in found:
+            if name in spins:
                 raise ValueError(f"{text!r}: spin {name} is given twice; once is enough")
-            found |= parse_spins(f"{name}={value}") if equals else {name: twice_of(name)}
+            spins |= parse_spins(f"{name}={value}") if equals else {name: twice_of(name)}
         totals |= dict.fromkeys(together, "I") if len(together) > 1 else {}
-    return found, totals
+    return spins, totals
 
 
 def parse_spins(text: str) -> dict[str, int]:
@@ -262,7 +264,7 @@ def parse_spins(text: str) -> dict[str, int]:
     >>> parse_spins("S=1/2, 14N=1, X=1.5")
     {'S': 1, '14N': 2, 'X': 3}
     """
-    found: dict[str, int] = {}
+    spins: dict[str, int] = {}
     for part in text.replace(",", " ").split():
         name, equals, value = part.partition("=")
         whole, slash, half = value.partition("/")
@@ -272,5 +274,5 @@ def parse_spins(text: str) -> dict[str, int]:
             raise ValueError(
                 f"{text!r}: expected spins such as S=1/2 14N=1, each a multiple of 1/2 (1/2, 1, 3/2, ...); {part!r} is none"
             )
-        found[name] = int(twice)
-    return found
+        spins[name] = int(twice)
+    return spins

@@ -69,7 +69,7 @@ def weights_of(
     >>> weights_of(water.with_isotopes("2=2H")).to_mapping()
     {}
     """
-    spins = [one.spin for one in molecule.nuclei]
+    spins = [nucleus.spin for nucleus in molecule.nuclei]
     electronic = molecule.electronic if electronic is None else electronic
     if inversion is None:
         return spin_weights(symmetry_of(molecule, tolerance), spins, electronic)
@@ -132,8 +132,11 @@ def spin_characters(
         raise ValueError(f"spins {list(spins)[:8]}: expected multiples of 1/2 from 0 up")
     signs = _electronic_characters(symmetry, electronic)
     return tuple(
-        sign * math.prod(_of_cycle(spin, length) ** count for spin, length, count in cycles(one.permutation, spins))
-        for sign, one in zip(signs, symmetry.rotations, strict=True)
+        sign
+        * math.prod(
+            _cycle_character(spin, length) ** count for spin, length, count in cycles(operation.permutation, spins)
+        )
+        for sign, operation in zip(signs, symmetry.rotations, strict=True)
     )
 
 
@@ -142,8 +145,8 @@ def character_rows(
 ) -> list[CharacterRow]:
     """The characters f(R) behind the weights, rotations of one kind together, E first and the others by name."""
     counts: dict[tuple[str, tuple[tuple[float, int, int], ...], int], int] = {}
-    for one, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
-        key = _name_of(symmetry, one), cycles(one.permutation, spins), character
+    for operation, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
+        key = _name_of(symmetry, operation), cycles(operation.permutation, spins), character
         counts[key] = counts.get(key, 0) + 1
     ordered = sorted(counts.items(), key=lambda item: (item[0][0] != "E", item[0]))  # round-off orders rotations
     return [CharacterRow(name, count, turns, character) for (name, turns, character), count in ordered]
@@ -216,11 +219,11 @@ def inverting_symmetry(
         raise ValueError("nuclei meet in the plane of the a and b axes: the molecule does not invert through it")
 
     flat = find_symmetry(kinds, masses_u, flat_points, tolerance)
-    rigid_ones = {one.permutation.tobytes() for one in rigid.rotations}
-    return flat, tuple(1 if one.permutation.tobytes() in rigid_ones else -1 for one in flat.rotations)
+    rigid_ones = {operation.permutation.tobytes() for operation in rigid.rotations}
+    return flat, tuple(1 if operation.permutation.tobytes() in rigid_ones else -1 for operation in flat.rotations)
 
 
-def _of_cycle(spin: float, length: int) -> int:
+def _cycle_character(spin: float, length: int) -> int:
     """Spin character of one cycle with the sign of its permutation of fermions."""
     states = round(2 * spin) + 1
     fermions = states % 2 == 0
@@ -247,35 +250,35 @@ def _electronic_characters(symmetry: Symmetry, electronic: str | Sequence[int]) 
 
 
 def _is_representation(rotations: Sequence[Operation], signs: Sequence[int]) -> bool:
-    of = {one.permutation.tobytes(): sign for one, sign in zip(rotations, signs, strict=True)}
-    products = ((p, q, of[p.permutation[q.permutation].tobytes()]) for p in rotations for q in rotations)
+    sign_of = {operation.permutation.tobytes(): sign for operation, sign in zip(rotations, signs, strict=True)}
+    products = ((p, q, sign_of[p.permutation[q.permutation].tobytes()]) for p in rotations for q in rotations)
     return set(signs) <= {1, -1} and all(
-        sign == of[p.permutation.tobytes()] * of[q.permutation.tobytes()] for p, q, sign in products
+        sign == sign_of[p.permutation.tobytes()] * sign_of[q.permutation.tobytes()] for p, q, sign in products
     )
 
 
-def _principal_letter(symmetry: Symmetry, one: Operation) -> str:
+def _principal_letter(symmetry: Symmetry, operation: Operation) -> str:
     """Which principal axis a twofold axis lies on."""
-    return "abc"[int(np.argmax(np.abs(symmetry.axes_abc @ one.axis)))]
+    return "abc"[int(np.argmax(np.abs(symmetry.axes_abc @ operation.axis)))]
 
 
-def _name_of(symmetry: Symmetry, one: Operation) -> str:
+def _name_of(symmetry: Symmetry, operation: Operation) -> str:
     """E, C3, C2(b) along a principal axis, C2′ across the main axis, C4² along a fourfold one."""
-    if one.order == 1:
+    if operation.order == 1:
         return "E"
     group = symmetry.rotation_group
     if group == "D∞":
         return "C2′"
     if group in ("C2", "D2"):
-        return f"C2({_principal_letter(symmetry, one)})"
-    if group == "O" and one.order == 2:
-        return "C4²" if _on_fourfold_axis(symmetry, one) else "C2"
-    across = group.startswith("D") and abs(one.axis @ symmetry.axes[0][1]) < 0.5
-    return f"C{one.order}{'′' if across else ''}"
+        return f"C2({_principal_letter(symmetry, operation)})"
+    if group == "O" and operation.order == 2:
+        return "C4²" if _on_fourfold_axis(symmetry, operation) else "C2"
+    across = group.startswith("D") and abs(operation.axis @ symmetry.axes[0][1]) < 0.5
+    return f"C{operation.order}{'′' if across else ''}"
 
 
-def _on_fourfold_axis(symmetry: Symmetry, one: Operation) -> bool:
-    return any(order == 4 and abs(axis @ one.axis) > 0.9 for order, axis in symmetry.axes)
+def _on_fourfold_axis(symmetry: Symmetry, operation: Operation) -> bool:
+    return any(order == 4 and abs(axis @ operation.axis) > 0.9 for order, axis in symmetry.axes)
 
 
 def _by_parities(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
@@ -284,7 +287,10 @@ def _by_parities(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int
     for species in SPECIES:
         ka, kc = (-1 if parity == "o" else 1 for parity in species)
         signs = {"E": 1, "C2(a)": ka, "C2(b)": ka * kc, "C2(c)": kc}
-        terms = [signs[_name_of(symmetry, one)] * f for one, f in zip(symmetry.rotations, characters, strict=True)]
+        terms = [
+            signs[_name_of(symmetry, operation)] * f
+            for operation, f in zip(symmetry.rotations, characters, strict=True)
+        ]
         weights[species] = sum(terms) // len(terms)
     return weights
 
@@ -297,11 +303,11 @@ def _by_k(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
     n, main = symmetry.axes[0]
     turns = dict.fromkeys((d for d in range(1, n + 1) if n % d == 0), 0)
     across = 0
-    for one, f in zip(symmetry.rotations, characters, strict=True):
-        if one.order > 1 and abs(one.axis @ main) < 0.5:
+    for operation, f in zip(symmetry.rotations, characters, strict=True):
+        if operation.order > 1 and abs(operation.axis @ main) < 0.5:
             across += f
         else:
-            turns[one.order] = f  # rotations of one order are powers of each other and share f
+            turns[operation.order] = f  # rotations of one order are powers of each other and share f
     along = [sum(f * _ramanujan_sum(order, k) for order, f in turns.items()) for k in range(n)]
     if symmetry.rotation_group.startswith("C"):
         return {str(k): total // n for k, total in enumerate(along)}
@@ -318,7 +324,7 @@ def _by_irrep(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
     """T, O, I. Classes of one order that are powers of each other share f, so that sums of characters are whole."""
     irreps = IRREPS[symmetry.rotation_group]
     classes, table = character_table(irreps)
-    of_name = {_name_of(symmetry, one): f for one, f in zip(symmetry.rotations, characters, strict=True)}
+    of_name = {_name_of(symmetry, operation): f for operation, f in zip(symmetry.rotations, characters, strict=True)}
     names = ["E" if n == 1 else f"C{n}" for n, _, _ in classes]
     if symmetry.rotation_group == "O":
         names[2] = "C4²"

@@ -67,16 +67,16 @@ class SpinWeights:
         >>> SpinWeights.from_mapping({"ee": 1, "eo": 1, "oe": 0, "oo": 0}).exchanged().to_mapping()
         {'ee': 0, 'eo': 0, 'oe': 1, 'oo': 1}
         """
-        given = self.to_mapping()
+        weights = self.to_mapping()
         if self.rule in ("none", "J"):
             return SpinWeights(self.rule, self.classes, self.values[::-1])
         for odd in (("oe", "oo"), ("eo", "oe"), ("eo", "oo")) if self.rule == "KaKc" else ():
-            sides = [{w for name, w in given.items() if (name in odd) == side} for side in (False, True)]
+            sides = [{w for name, w in weights.items() if (name in odd) == side} for side in (False, True)]
             if len(sides[0]) == len(sides[1]) == 1:
                 (even,), (other,) = sides
                 return SpinWeights(self.rule, self.classes, tuple(even if n in odd else other for n in self.classes))
         raise ValueError(
-            f"spin weights {given} beside a total spin of two nuclei: expected those of half a turn about one axis, such as ee = eo = 1 "
+            f"spin weights {weights} beside a total spin of two nuclei: expected those of half a turn about one axis, such as ee = eo = 1 "
             "and oe = oo = 0, of levels of even total spin; those of odd total spin have them exchanged"
         )
 
@@ -91,7 +91,7 @@ class SpinWeights:
         """
         even, odd = (twice + 2, twice) if twice % 2 == 0 else (twice, twice + 2)
         both = zip(self.classes, self.values, self.exchanged().values, strict=True)
-        return SpinWeights.from_mapping({name: even * own + odd * other for name, own, other in both})
+        return SpinWeights.from_mapping({name: even * weight + odd * other for name, weight, other in both})
 
     def is_of_pair(self, twice: int) -> bool:
         """Whether the classes weigh as the functions of two nuclei of spin `twice`/2 alone, i + 1 to i.

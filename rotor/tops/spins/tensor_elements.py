@@ -29,8 +29,8 @@ def plain_elements(
     >>> plain_elements({"C_ab(H)": 3.0, "C_ba(H)": 1.0, "chi_bb_minus_cc(D)": 2.0}, {})[0]
     {'C_ab(H)': 2.0, 'chi_bb-cc(D)': 2.0, 'C_ab-ba(H)': 1.0}
     """
-    short = ({_in_short(name): value for name, value in one.items()} for one in (values, errors))
-    return without_trace(*in_both_orders(*(dict(one) for one in short)))
+    short = ({_in_short(name): value for name, value in by_name.items()} for by_name in (values, errors))
+    return without_trace(*in_both_orders(*(dict(by_name) for by_name in short)))
 
 
 def without_trace(
@@ -49,25 +49,25 @@ def without_trace(
         (n.partition("_")[0], n.partition("(")[2]) for n in values if n[:2] in ("ch", "T_", "D_")
     ):
         names = {letters: f"{tensor}_{letters}({spins}" for letters in ("aa", "bb", "cc")}
-        found = {letters: values[name] for letters, name in names.items() if name in values}
-        if len(found) < 2:
+        elements = {letters: values[name] for letters, name in names.items() if name in values}
+        if len(elements) < 2:
             continue
         difference = [n for n in values if n.startswith(f"{tensor}_") and "-" in n and n.endswith(f"({spins}")]
-        trace = sum(found.values()) if len(found) == 3 else 0.0
-        if abs(trace) > 1e-3 * max(map(abs, found.values())):
+        trace = sum(elements.values()) if len(elements) == 3 else 0.0
+        if abs(trace) > 1e-3 * max(map(abs, elements.values())):
             raise ValueError(
                 f"{tensor}({spins}: aa + bb + cc = {trace:g} MHz; the tensor is traceless, check the elements"
             )
         if difference:
             raise ValueError(
-                f"{', '.join(difference)} beside {', '.join(found)}: give aa and a difference, or the elements alone"
+                f"{', '.join(difference)} beside {', '.join(elements)}: give aa and a difference, or the elements alone"
             )
-        aa, bb, cc = (found.get(letters, -sum(found.values())) - trace / 3 for letters in names)
+        aa, bb, cc = (elements.get(letters, -sum(elements.values())) - trace / 3 for letters in names)
         spread = {letters: left.pop(name) for letters, name in names.items() if name in left}
         for name in names.values():
             out.pop(name, None)
         out |= {names["aa"]: aa, f"{tensor}_bb-cc({spins}": bb - cc}
-        if len(spread) == len(found):
+        if len(spread) == len(elements):
             left |= {
                 names["aa"]: spread.get("aa", hypot(*spread.values())),
                 f"{tensor}_bb-cc({spins}": hypot(*spread.values()),
@@ -103,7 +103,7 @@ def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[
             raise ValueError(f"{difference} beside {other} and {name}: give {other} and {difference}, or both orders")
         first, second = values[other], out.pop(name)
         out[other], out[difference] = (first + second) / 2, (first - second) / 2
-        spread = [left.pop(one) for one in (other, name) if one in left]
+        spread = [left.pop(order) for order in (other, name) if order in left]
         if len(spread) == 2:
             left[other] = left[difference] = hypot(*spread) / 2
     return out, left

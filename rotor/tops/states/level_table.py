@@ -72,9 +72,9 @@ class LevelTable(Table):
     def rows_of(self, quanta: Mapping[str, Ints]) -> Ints:
         """The row (m,) of each labelled level, -1 where the table has none; labels by the names that the table has."""
         order, keys, sizes = self._sorted
-        asked = np.stack([np.asarray(quanta[name], dtype=np.int64) for name in self.quanta])
-        inside = ((asked >= 0) & (asked < sizes[:, None])).all(axis=0)
-        key = np.ravel_multi_index(tuple(np.where(inside, asked, 0)), tuple(sizes.tolist()))
+        labels = np.stack([np.asarray(quanta[name], dtype=np.int64) for name in self.quanta])
+        inside = ((labels >= 0) & (labels < sizes[:, None])).all(axis=0)
+        key = np.ravel_multi_index(tuple(np.where(inside, labels, 0)), tuple(sizes.tolist()))
         place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
         return np.where(inside & (keys[place] == key), order[place], -1)
 

@@ -74,10 +74,10 @@ class StateConstants:
                     f"uncertainty {error:g} of {name}: expected a number of at least 0 and a constant that is there"
                 )
         self._refuse_unknown_states()
-        found: dict[tuple[str, tuple[int, ...]], str] = {}
+        first_names: dict[tuple[str, tuple[int, ...]], str] = {}
         for name in self.couplings:
             kind_of_coupling(name)
-            first = found.setdefault((name.partition("[")[0].strip(), states_of_name(name)), name)
+            first = first_names.setdefault((name.partition("[")[0].strip(), states_of_name(name)), name)
             if first != name:
                 raise ValueError(f"{first} and {name} are one coupling; give it once")
         if self.symmetry and self.symmetry not in GROUPS:
@@ -131,15 +131,15 @@ class StateConstants:
         of_pairs: dict[tuple[int, ...], dict[str, str]] = {}
         for name in self.couplings:
             of_pairs.setdefault(self._states[name], {}).setdefault(kind_of_coupling(name), name)
-        found = []
+        notes = []
         for kinds in of_pairs.values():
             if len(kinds) > 2:
                 *others, last = kinds.values()
-                found.append(
+                notes.append(
                     f"{', '.join(others)} and {last} join the same two states: such couplings exist together in C1 and Ci only; where "
                     "the molecule has a symmetry, declare it for the states, and they are refused"
                 )
-        return tuple(found)
+        return tuple(notes)
 
     @property
     def _states(self) -> dict[str, tuple[int, ...]]:
@@ -168,10 +168,10 @@ class StateConstants:
 
         even: the axes, of "abc", about which a rotation is totally symmetric in the group.
         """
-        found: dict[tuple[int, ...], tuple[str, str]] = {}
+        taken: dict[tuple[int, ...], tuple[str, str]] = {}
         for name in self.couplings:
             kind = _class_of(kind_of_coupling(name), even)
-            first, other = found.setdefault(self._states[name], (name, kind))
+            first, other = taken.setdefault(self._states[name], (name, kind))
             if kind != other:
                 raise ValueError(
                     f"{first} and {name}: two states of a molecule of {group} have one of them or the other; G about two axes and "

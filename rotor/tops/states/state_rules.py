@@ -64,13 +64,13 @@ def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str
 
     A rotation is an axial vector, that an operation R multiplies by det R times R_xx.
     """
-    found = "abc"
+    even_axes = "abc"
     for operation in (*symmetry.rotations, *symmetry.improper):
         matrix = frame.axes @ operation.matrix @ frame.axes.T
         if np.abs(matrix - np.diag(np.diag(matrix))).max() < _ALONG:
             signs = np.diag(matrix) * np.linalg.det(matrix)
-            found = "".join(axis for axis, sign in zip("abc", signs, strict=True) if sign > 0 and axis in found)
-    return symmetry.point_group, found
+            even_axes = "".join(axis for axis, sign in zip("abc", signs, strict=True) if sign > 0 and axis in even_axes)
+    return symmetry.point_group, even_axes
 
 
 def refuse_forbidden_state_dipoles(
@@ -93,8 +93,8 @@ def refuse_forbidden_state_dipoles(
     ValueError
         With the component, its value and the states. What weights do not tell is taken as given.
     """
-    own = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
-    for (upper, lower), moment in (own | dict(states.dipoles)).items():
+    of_states = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
+    for (upper, lower), moment in (of_states | dict(states.dipoles)).items():
         first, second = (states.weights.get(v, spin_weights) for v in (upper, lower))
         for axis, value in enumerate(moment):
             if abs(value) > NOISE_DEBYE and not _joins_equals(axis, kind, first, second):
@@ -110,13 +110,19 @@ def _joins_equals(axis: int, kind: str, first: SpinWeights, second: SpinWeights)
     """Whether μ along one axis joins levels of equal weight alone, of two states with weights of one rule."""
     if first.rule != second.rule:
         return False
-    one, other = (dict(zip(of.classes, of.values, strict=True)) for of in (first, second))
+    first_weights, other = (dict(zip(weights.classes, weights.values, strict=True)) for weights in (first, second))
     if first.rule == "KaKc":
-        return all(one[a] == other[b] and one[b] == other[a] for a, b in _JOINED[axis])
+        return all(first_weights[a] == other[b] and first_weights[b] == other[a] for a, b in _JOINED[axis])
     if first.rule == "J":
-        return one["even"] == other["odd"] and one["odd"] == other["even"]
+        return first_weights["even"] == other["odd"] and first_weights["odd"] == other["even"]
     if first.rule == "K" and axis == _FIGURE.get(kind):  # along the axis K stays, and J of K = 0 changes by one
-        both = [(of.get("0even", of.get("0")), of.get("0odd", of.get("0"))) for of in (one, other)]
-        same = [[value for name, value in of.items() if not name.startswith("0")] for of in (one, other)]
+        both = [
+            (by_class.get("0even", by_class.get("0")), by_class.get("0odd", by_class.get("0")))
+            for by_class in (first_weights, other)
+        ]
+        same = [
+            [value for name, value in by_class.items() if not name.startswith("0")]
+            for by_class in (first_weights, other)
+        ]
         return both[0] == both[1][::-1] and same[0] == same[1]
     return True

@@ -63,25 +63,25 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     >>> dict(with_state_texts(top, states, "given").states.dipoles)
     {(1, 0): (0.0, 0.0, 1.47)}
     """
-    given = {key: text for key in KEYS if (text := texts.get(key)) is not None}
-    if not given:
+    stated = {key: text for key in KEYS if (text := texts.get(key)) is not None}
+    if not stated:
         return top
-    states, first = top.states, next(iter(given))
-    if "state_constants" in given:
-        states = _of("state_constants", lambda: StateConstants.parse(given["state_constants"], source))
+    states, first = top.states, next(iter(stated))
+    if "state_constants" in stated:
+        states = _parsed("state_constants", lambda: StateConstants.parse(stated["state_constants"], source))
     if states is None:
         raise ValueError(f"{first}: there is one state here; further ones need their constants too")
-    for key, text in given.items():
+    for key, text in stated.items():
         if key != "state_constants":
-            states = _of(key, partial(_changed, states, key, text, top))
-    changed = [WORDS[key] for key in given if key in WORDS and "state_constants" not in given]
+            states = _parsed(key, partial(_changed, states, key, text, top))
+    changed = [WORDS[key] for key in stated if key in WORDS and "state_constants" not in stated]
     said = [states.source, f"{', '.join(changed)} {source}" if changed else ""]
     whole = replace(states, source="; ".join(filter(None, said)))
     try:
         return replace(top, states=whole)
     except ValueError as error:
         of_dipole = [
-            key for key in ("state_dipoles", "state_weights") if key in given and str(error).startswith("dipole")
+            key for key in ("state_dipoles", "state_weights") if key in stated and str(error).startswith("dipole")
         ]
         raise ValueError(f"{[*of_dipole, first][0]}: {error}") from None
 
@@ -97,7 +97,7 @@ def _changed(states: StateConstants, key: str, text: str, top: Top) -> StateCons
     return replace(states, dipoles={**states.dipoles, **dipoles_of_text(text)})
 
 
-def _of(key: str, make: Callable[[], T]) -> T:
+def _parsed(key: str, make: Callable[[], T]) -> T:
     try:
         return make()
     except ValueError as error:
@@ -110,52 +110,52 @@ def dipoles_of_text(text: str) -> dict[tuple[int, int], Vector]:
     >>> dipoles_of_text("[1]=0,0,1.3 [0,1]=0,0,1.47 D")
     {(1, 1): (0.0, 0.0, 1.3), (1, 0): (0.0, 0.0, 1.47)}
     """
-    found: dict[tuple[int, int], Vector] = {}
+    dipoles: dict[tuple[int, int], Vector] = {}
     for states, part in _items(text, "[0,1] 0,0,1.47", 2):
         numbers = parse_grid(part, "D").tolist() if ":" not in part else []
         if len(numbers) != 3:
             raise ValueError(f"{part!r}: expected three numbers, along a, b, c in D")
         pair = (states[-1], states[0])
-        if pair in found:
+        if pair in dipoles:
             raise ValueError(f"{text!r}: the states {list(states)} are given twice; leave one out")
-        found[pair] = (numbers[0], numbers[1], numbers[2])
-    return found
+        dipoles[pair] = (numbers[0], numbers[1], numbers[2])
+    return dipoles
 
 
 def weights_of_text(text: str, top: Top) -> dict[int, SpinWeights]:
     """Spin weights by state, from `[0] even=1,odd=3 [1] even=3,odd=1`; "none" where all levels of a state are alike."""
-    found: dict[int, SpinWeights] = {}
+    weights: dict[int, SpinWeights] = {}
     for (state,), part in _items(text, "[1] even=3,odd=1", 1):
-        if state in found:
+        if state in weights:
             raise ValueError(f"{text!r}: state {state} is given twice; leave one out")
-        found[state] = SpinWeights() if part == "none" else _weights(part)
-        rule = found[state].rule
+        weights[state] = SpinWeights() if part == "none" else _weights(part)
+        rule = weights[state].rule
         if "none" not in (rule, top.spin_weights.rule) and rule != top.spin_weights.rule:
             raise ValueError(
                 f"{part!r}: weights by {rule}, and those of the top go by {top.spin_weights.rule}; expected one rule"
             )
-    return found
+    return weights
 
 
 def _weights(text: str) -> SpinWeights:
-    given: dict[str, int] = {}
+    values: dict[str, int] = {}
     for item in text.split(","):
         name, equals, number = (part.strip() for part in item.partition("="))
-        if not (name and equals and number.isdecimal()) or name in given:
+        if not (name and equals and number.isdecimal()) or name in values:
             raise ValueError(f"{item.strip()!r}: expected class=number, each class once, such as even=1, or none")
-        given[name] = int(number)
-    weights = SpinWeights.from_mapping(given)
-    if weights.to_mapping() != given:
+        values[name] = int(number)
+    weights = SpinWeights.from_mapping(values)
+    if weights.to_mapping() != values:
         raise ValueError(f"{text!r}: expected numbers without a common divisor, as those of state 0 have")
     return weights
 
 
 def _items(text: str, example: str, most: int) -> list[tuple[tuple[int, ...], str]]:
     """Numbers of states, rising, and what follows them."""
-    found = list(_ITEM.finditer(text))
-    if not found or _ITEM.sub("", text).strip(" ,;"):
+    items = list(_ITEM.finditer(text))
+    if not items or _ITEM.sub("", text).strip(" ,;"):
         raise ValueError(f"{text!r}: expected the state in square brackets and its value, such as {example}")
-    return [(_states(one["states"], example, most), one["text"].strip(" ,;")) for one in found]
+    return [(_states(item["states"], example, most), item["text"].strip(" ,;")) for item in items]
 
 
 def _states(text: str, example: str, most: int) -> tuple[int, ...]:
