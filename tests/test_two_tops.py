@@ -181,15 +181,9 @@ def test_mistakes_in_constants_of_two_tops_are_named(tmp_path, change, text):
         rotor.read(path)
 
 
-def test_a_plan_and_a_fit_of_two_tops(tmp_path, call):
+def test_a_spectrum_of_two_tops_names_five_species(tmp_path, call):
     path = tmp_path / "dimethyl.toml"
     path.write_text(FILE)
     code, output, _ = call("spectrum", str(path), "--jmax", "2", "--temperature", "10")
     assert code == 0
     assert "EE*" in output
-    names = [f"{name}_{side}" for side in ("upper", "lower") for name in ("j", "ka", "kc", "species", "vt")]
-    table = [",".join([*names, "frequency_mhz", "error_mhz"]), "1,0,1,AA,0,0,0,0,AA,0,7500,0.1"]
-    (tmp_path / "lines.csv").write_text("\n".join(table))
-    code, _, error = call("fit", str(tmp_path / "lines.csv"), "--start", str(path), "--free", "B")
-    assert code == 2
-    assert "two tops" in error

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.euler import checked_moments, kinetic_energy
 from rotor.classical.integrators.splitting import SymmetricTopSplitting
-from rotor.geometry.rotations import IDENTITY, exp, from_matrix, multiply, rotate
+from rotor.geometry.rotations import IDENTITY, conjugate, exp, from_matrix, multiply, rotate
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,18 +119,19 @@ class TurningTop:
 
     def energy(self, momentum: ArrayLike, p: ArrayLike, angle: ArrayLike) -> Floats:
         """H (n,) of momenta (n, 3) along the principal axes of the whole, p (n,) and angles (n,)."""
-        along, torsion = np.asarray(momentum, dtype=float) @ self.rest_axes, np.asarray(p, dtype=float)
-        relative = along - torsion[..., None] * self._axis
-        return np.asarray(
-            kinetic_energy(relative, relative / self.rest_moments) + torsion**2 / (2 * self.own) + self.potential(angle)
-        )
+        torsion, relative, velocity = self._relative(momentum, p)
+        return np.asarray(kinetic_energy(relative, velocity) + torsion**2 / (2 * self.own) + self.potential(angle))
 
     def angle_rate(self, momentum: ArrayLike, p: ArrayLike) -> Floats:
         """α' (n,) of momenta (n, 3) along the principal axes of the whole."""
-        along, torsion = np.asarray(momentum, dtype=float) @ self.rest_axes, np.asarray(p, dtype=float)
-        return np.asarray(
-            torsion / self.own - ((along - torsion[..., None] * self._axis) / self.rest_moments) @ self._axis
-        )
+        torsion, _, velocity = self._relative(momentum, p)
+        return np.asarray(torsion / self.own - velocity @ self._axis)
+
+    def _relative(self, momentum: ArrayLike, p: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """p (n,), and L - pλ and ω = J⁻¹(L - pλ) (n, 3) along the axes of J."""
+        torsion = np.asarray(p, dtype=float)
+        relative = np.asarray(momentum, dtype=float) @ self.rest_axes - torsion[..., None] * self._axis
+        return torsion, relative, relative / self.rest_moments
 
     def thermal(self, kt: float, count: int, *, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
         """L (n, 3), p (n,) and α (n,) of a gas at kT: L - pλ and p are Gaussian, α is drawn from exp(-V/kT) on a grid of 4096 angles."""
@@ -213,7 +214,7 @@ def turning_motion(
         _advance(body, moments, state, carry, torsion, alpha, interval / count, count)
         path.append((state.copy(), torsion.copy(), alpha.copy()))
     states, torsions, angles = (np.array(part) for part in zip(*path, strict=True))
-    back = multiply(states[..., 3:], to_rest * np.array([1.0, -1.0, -1.0, -1.0]))
+    back = multiply(states[..., 3:], conjugate(to_rest))
     return TurningMotion(body, t, states[..., :3] @ body.rest_axes.T, back, torsions, angles)
 
 
@@ -235,5 +236,5 @@ def _turn(body: TurningTop, state: Floats, p: Floats, alpha: Floats, time: float
     b = body._axis / body.rest_moments
     alpha += time * (p / body.reduced_moment - state[:, :3] @ b)
     turn = exp((-p * time)[:, None] * b)
-    state[:, :3] = rotate(turn * np.array([1.0, -1.0, -1.0, -1.0]), state[:, :3])
+    state[:, :3] = rotate(conjugate(turn), state[:, :3])
     state[:, 3:] = multiply(state[:, 3:], turn)

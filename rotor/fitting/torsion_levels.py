@@ -1,16 +1,15 @@
-"""Chosen levels of a molecule with an internal rotor, and their derivatives by its constants.
+"""Chosen levels of a molecule with internal rotors, with or without nuclear spins, and their derivatives by its constants.
 
-Blocks are those of `rotor.quantum.internal_rotation`, made once for the J in which a line has a level; each iteration solves them at other
-values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F and ∂E/∂ρ follow by the chain rule. The torsional
-functions that are the basis belong to the constants of the start; they are made anew where F, ρ or V3 move by more than a hundredth.
-
-Constants of principal axes (PAM) become F, ρ and the angle of ρ, by which everything else turns: blocks are made anew at each point, and
-
-    dE/dc = ∂E/∂c + ∂E/∂F ∂F/∂c + ∂E/∂ρ ∂ρ/∂c + ⟨∂H/∂angle⟩ ∂angle/∂c,        c = A, B, C, F0, delta.
+Blocks are those of `rotor.quantum.internal_rotation`, for the J (N with spins) that a label needs. Of one top in the rho-axis frame they
+are made once; each iteration solves them at other values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F and
+∂E/∂ρ follow by the chain rule. The torsional functions that are the basis belong to the constants of the start; they are made anew where F, ρ
+or V3 move by more than a hundredth. Constants of principal axes, of one top and of two, move the axes of ρ: their blocks are made anew at each
+point (`rotor.quantum.internal_rotation.chain_rule`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,26 +17,47 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.internal_rotation.model import RamModel, jacobian_of_principal_axes, model_of_principal_axes
+from rotor.quantum.basis.elements import Elements
+from rotor.quantum.internal_rotation.chain_rule import ANGLE, ChainRule, chain_rule, further_operators
+from rotor.quantum.internal_rotation.coupled_spins import CoupledLevels, coupled_levels
+from rotor.quantum.internal_rotation.levels import TurningTops, species_blocks, turning_model
+from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.internal_rotation.nuclei import BY_ANGLE, Nuclei
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 
 MOVED = 0.01  # relative change of a torsional constant from which the torsional functions are made anew
 TORSIONAL = ("F", "rho", "V3", "V6")
+SPECIES = {1: ("A", "E"), 2: ("AA", "AE", "EA", "EE", "EE*")}  # by the number of tops
 
 
 @dataclass(frozen=True)
 class LabelledSpecies:
-    """The labels of one species: their places among all, and columns J, v_t, Ka, Kc."""
+    """The labels of one species: their places among all, columns J (or N), v_t, Ka, Kc, and with spins the sums F1 ... F, doubled."""
 
-    sigma: int
+    name: str
     places: Ints
     keys: Ints
+    sums: Ints
 
     @property
     def vt_max(self) -> int:
         """The highest v_t of a label."""
         return int(self.keys[:, 1].max())
+
+    @property
+    def twice_f(self) -> Ints:
+        """Twice the total angular momenta that occur."""
+        return np.unique(self.sums[:, -1])
+
+    def rotations(self, twice_spins: int) -> Ints:
+        """The J (N) of the levels that labels are made of: |F - I| to F + I with spins."""
+        if not self.sums.size:
+            return np.unique(self.keys[:, 0])
+        ranges = [range(abs(f - twice_spins), f + twice_spins + 1, 2) for f in self.twice_f.tolist()]
+        return np.unique([twice_n // 2 for twice in ranges for twice_n in twice])
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,107 +66,136 @@ class TorsionLevels(LevelModel):
 
     names: tuple[str, ...]
     count: int
-    functions: int
-    by_energy: bool
+    constants: InternalRotationConstants
+    nuclei: Nuclei | None
     species: tuple[LabelledSpecies, ...]
-    _blocks: dict[int, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
+    _blocks: dict[str, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises MissingLevelsError for labels that no level has."""
         named = dict(zip(self.names, np.asarray(values_mhz).tolist(), strict=True))
-        if "F0" in named:
-            return self._of_principal_axes(named)
-        model = RamModel(named)
+        rotation = {name: value for name, value in named.items() if not is_torsional(name) and "(" not in name}
+        internal = {name: value for name, value in named.items() if is_torsional(name)}
+        model = turning_model(rotation, internal, self.constants)
+        chain = chain_rule(model, rotation | internal)
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
         for part in self.species:
-            found = self._blocks_of(part, model).solve(model.coefficients, part.vt_max, self.by_energy)
-            rows = _rows_of(found, part)
-            energies[part.places] = found.energies[rows]
-            slopes[part.places] = found.solved.slopes(found.rows[rows]) @ model.jacobian
+            name = part.name if part.name in model.species else "AE"  # EA of equivalent tops
+            energies[part.places], slopes[part.places] = self._of_species(part, name, model, chain, named)
         return energies, slopes
 
-    def _of_principal_axes(self, named: dict[str, float]) -> tuple[Floats, Floats]:
-        """Energies and derivatives of constants in principal axes."""
-        model = model_of_principal_axes(named)
-        known = list(model.values)
-        turned = jacobian_of_principal_axes(named)
-        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
-        for part in self.species:
-            blocks = self._new_blocks(part, model)
-            found = blocks.solve_once(model.coefficients, part.vt_max, self.by_energy)
-            rows = _rows_of(found, part)
-            energies[part.places] = found.energies[rows]
-            direct = found.slopes(found.rows[rows]) @ model.jacobian
-            by_angle = found.solved.slopes_of(
-                blocks.functions.elements([model.slope_by_angle(part.sigma)]), found.rows[rows]
-            )
-            total = np.zeros((len(rows), len(self.names)))
-            for i, name in enumerate(self.names):
-                if name in known:
-                    total[:, i] = direct[:, known.index(name)]
-            derived = np.column_stack([direct[:, known.index("F")], direct[:, known.index("rho")], by_angle[:, 0]])
-            chained = [self.names.index(name) for name in (*"ABC", "F0", "delta")]
-            total[:, chained] += derived @ turned
-            slopes[part.places] = total
-        return energies, slopes
+    def _of_species(
+        self, part: LabelledSpecies, name: str, model: TurningTops, chain: ChainRule, named: Mapping[str, float]
+    ) -> tuple[Floats, Floats]:
+        """Energies and derivatives of the labels of one species."""
+        levels = self._solved(part, name, model)
+        further = further_operators(model, name, chain)
+        elements = levels.functions.elements(list(further.values())) if further else None
+        if self.nuclei is None:
+            rows = _rows_of(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
+            values, direct = levels.energies[rows], _slopes_of_rotation(levels, levels.rows[rows], elements)
+            of_spins: dict[str, Floats] = {}
+        else:
+            coupled = self._with_spins(part, levels, model, chain, named)
+            names = ("n", "vt", "ka", "kc", *self.nuclei.sums)
+            rows = _rows_of(coupled.quanta, names, part, np.hstack([part.keys, part.sums]))
+            values, (direct, spins) = coupled.energies[rows], coupled.slopes(rows, elements)
+            of_spins = {constant.name: spins[:, i] for i, constant in enumerate(coupled.nuclei.constants)}
+        count = len(model.coefficients)
+        slopes = dict(zip(model.values, (direct[:, :count] @ model.jacobian).T, strict=True))
+        slopes |= dict(zip(further, direct[:, count:].T, strict=True)) | of_spins
+        for by_angle in (value for key, value in of_spins.items() if key.startswith(BY_ANGLE.format(""))):
+            slopes[ANGLE] = slopes[ANGLE] + by_angle
+        return values, chain.slopes(self.names, slopes, len(rows))
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
         """1: levels are called by what they mostly are, whatever the constants are."""
         return np.ones(self.count)
 
+    def _solved(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesLevels:
+        """The torsion-rotation levels of a species; with spins those up to the v_t of predictions, which are their basis."""
+        vt_max = max(part.vt_max, self.constants.vt_max if self.nuclei else 0)
+        by_energy = self.constants.names == "energy"
+        if isinstance(model, RamModel) and not model.angle:
+            return self._blocks_of(part, model).solve(model.coefficients, vt_max, by_energy)
+        return self._new_blocks(part, name, model).solve_once(model.coefficients, vt_max, by_energy)
+
+    def _with_spins(
+        self,
+        part: LabelledSpecies,
+        levels: SpeciesLevels,
+        model: TurningTops,
+        chain: ChainRule,
+        named: Mapping[str, float],
+    ) -> CoupledLevels:
+        """The levels coupled to the nuclei, whose constants have these values."""
+        assert self.nuclei is not None
+        nuclei = self.nuclei.with_values(named)
+        if ANGLE in chain.quantities:
+            nuclei = nuclei.with_slope_by_angle()
+        return coupled_levels(levels, nuclei, model.angle, model.has_plane, part.twice_f)
+
     def _blocks_of(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
         """The blocks of a species, made anew where the torsion has moved."""
         torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
-        known = self._blocks.get(part.sigma)
+        known = self._blocks.get(part.name)
         if known is None or (np.abs(torsion - known[0]) > MOVED * np.abs(known[0])).any():
-            self._blocks[part.sigma] = torsion, self._new_blocks(part, model)
-        return self._blocks[part.sigma][1]
+            self._blocks[part.name] = torsion, self._new_blocks(part, part.name, model)
+        return self._blocks[part.name][1]
 
-    def _new_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
-        """The blocks of the J in which a label lies."""
-        j = part.keys[:, 0]
-        return model.blocks(part.sigma, int(j.max()), jmin=int(j.min()), count=self.functions, needed=np.unique(j))
+    def _new_blocks(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesBlocks:
+        """The blocks of the J that labels need."""
+        j = part.rotations(self.nuclei.twice_total if self.nuclei else 0)
+        return species_blocks(model, name, int(j.min()), int(j.max()), self.constants.functions, j)
+
+
+def _slopes_of_rotation(levels: SpeciesLevels, rows: Ints, further: Elements | None) -> Floats:
+    """∂E/∂c (levels, terms and further operators) of levels without spins."""
+    terms = levels.slopes(rows)
+    return terms if further is None else np.hstack([terms, levels.solved.slopes_of(further, rows)])
 
 
 def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
-    """The model for labels (levels, k) by `constants.quanta`, A standing as 0 and E as 1.
+    """The model for labels (levels, k) by `constants.quanta`, species standing as `rotor.quantum.quanta.SPECIES_NUMBERS`.
 
     Raises MissingLevelsError for labels that no level has.
     """
     internal = constants.top.internal_rotation
     assert internal is not None
-    if internal.tops == 2:
-        raise ValueError("fits with internal rotation of two tops are not computed")
+    nuclei = Nuclei.of(constants.top, constants.effects) if constants.hyperfine else None
     columns = dict(zip(constants.quanta, labels.T, strict=True))
-    keys = np.column_stack([columns[name] for name in ("j", "vt", "ka", "kc")])
-    sigma = columns["species"]
-    wrong = ~np.isin(sigma, list(RamModel.species.values())) | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
+    keys = np.column_stack([columns[name] for name in ("j" if nuclei is None else "n", "vt", "ka", "kc")])
+    numbers = {SPECIES_NUMBERS[name]: name for name in SPECIES[internal.tops]}
+    strange = ~np.isin(columns["species"], list(numbers))
+    wrong = strange | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
     if wrong.any():
         places = np.flatnonzero(wrong)
         text = ", ".join(f"{name} = {columns[name][places[0]]}" for name in constants.quanta)
-        raise MissingLevelsError(f"there is no level with {text} (species 0 is A, 1 is E) in this model", places)
+        meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
+        raise MissingLevelsError(f"there is no level with {text} (species {meaning}) in this model", places)
+    sums = _doubled_sums(columns, nuclei, constants.halves)
     parts = [
-        LabelledSpecies(value, np.flatnonzero(sigma == value), keys[sigma == value])
-        for value in RamModel.species.values()
+        LabelledSpecies(name, here, keys[here], sums[here])
+        for number, name in numbers.items()
+        if len(here := np.flatnonzero(columns["species"] == number))
     ]
-    names = tuple(constants.values)
-    return TorsionLevels(
-        names,
-        len(labels),
-        internal.functions,
-        internal.names == "energy",
-        tuple(part for part in parts if len(part.places)),
-    )
+    return TorsionLevels(tuple(constants.values), len(labels), internal, nuclei, tuple(parts))
 
 
-def _rows_of(found: SpeciesLevels, part: LabelledSpecies) -> Ints:
+def _doubled_sums(columns: Mapping[str, Ints], nuclei: Nuclei | None, halves: frozenset[str]) -> Ints:
+    """Twice the sums F1 ... F (labels, sums) of labels whose half-integers are doubled; none without spins."""
+    if nuclei is None:
+        return np.zeros((len(columns["species"]), 0), dtype=np.int64)
+    return np.column_stack([columns[name] if name in halves else 2 * columns[name] for name in nuclei.sums])
+
+
+def _rows_of(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:
     """Places of the labelled levels among those of a species; MissingLevelsError for labels that no level has."""
-    quanta = found.quanta
-    rows = _rows(np.column_stack([quanta[name] for name in ("j", "vt", "ka", "kc")]), part.keys)
+    rows = _rows(np.column_stack([quanta[name] for name in names]), keys)
     if (rows < 0).any():
         missing = rows < 0
         raise MissingLevelsError(
-            f"there is no level of J = {part.keys[missing][0, 0]} with this label", part.places[missing]
+            f"there is no level of {names[0].upper()} = {keys[missing][0, 0]} with this label", part.places[missing]
         )
     return rows
 

@@ -327,7 +327,11 @@ def _solved_parts(
     for numbers in by_size.values():
         energies, vectors = eigenstates(np.stack([matrices[number] for number in numbers]))
         for number, e, v in zip(numbers, energies, vectors, strict=True):
-            labels = {"sectors": tuple(parts[number]), "functions": _named_functions(space, parts[number], v)}
+            labels = {
+                "sectors": tuple(parts[number]),
+                "functions": _named_functions(space, parts[number], v),
+                "vectors": v,
+            }
             solved[number] = Sector(space.sectors[parts[number][0]].twice_j, e, labels), v
     return [solved[number] for number in range(len(parts))], where
 

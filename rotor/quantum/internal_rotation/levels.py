@@ -268,27 +268,40 @@ def refuse_axes(top: Top) -> None:
 
 def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
     """The constants of the top and of what turns in it together."""
+    model = turning_model(top.constants.values, constants.values, constants)
+    dipole = zip("abc", top.dipole_abc_debye or (), strict=False)
+    if (
+        isinstance(model, TwoTops)
+        and model.axis
+        and (beside := [name for name, mu in dipole if mu and name != model.axis])
+    ):
+        raise ValueError(
+            f"dipole along {', '.join(beside)}: the tops are exchanged by C2 about {model.axis}, which leaves a dipole along "
+            f"{model.axis} alone; leave the others out, or give the constants by which the tops differ"
+        )
+    return model
+
+
+def turning_model(
+    rotation: Mapping[str, float], values: Mapping[str, float], constants: InternalRotationConstants
+) -> TurningTops:
+    """The same of values of the rotation and of the internal rotors, in the frame of these constants."""
     if constants.tops == 2:
-        model = two_tops(top.constants.values, constants.values)
-        beside = [
-            name for name, mu in zip("abc", top.dipole_abc_debye or (), strict=False) if mu and name != model.axis
-        ]
-        if model.axis and beside:
-            raise ValueError(
-                f"dipole along {', '.join(beside)}: the tops are exchanged by C2 about {model.axis}, which leaves a dipole along "
-                f"{model.axis} alone; leave the others out, or give the constants by which the tops differ"
-            )
-        return model
-    if constants.frame == "RAM":
-        return RamModel({**top.constants.values, **constants.values})
-    return model_of_principal_axes({**top.constants.values, **constants.values})
+        return two_tops(rotation, values)
+    return (
+        RamModel({**rotation, **values})
+        if constants.frame == "RAM"
+        else model_of_principal_axes({**rotation, **values})
+    )
 
 
-def species_blocks(model: TurningTops, name: str, jmin: int, jmax: int, count: int) -> SpeciesBlocks:
-    """The blocks of a species by name."""
+def species_blocks(
+    model: TurningTops, name: str, jmin: int, jmax: int, count: int, needed: Ints | None = None
+) -> SpeciesBlocks:
+    """The blocks of a species by name, of the J that are needed."""
     if isinstance(model, TwoTops):
-        return model.blocks(model.species[name], jmax, jmin=jmin, count=count)
-    return model.blocks(model.species[name], jmax, jmin=jmin, count=count)
+        return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
+    return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
 
 
 @dataclass(frozen=True)

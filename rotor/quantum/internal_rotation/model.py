@@ -153,15 +153,3 @@ def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:
     abc = [values[name] for name in "ABC"]
     top = rho_axis(abc, values["F0"], axis_of_angles(values["delta"]))
     return RamModel({**others, "F": top.f, "rho": top.rho}, angle=float(np.arctan2(top.rho_abc[1], top.rho_abc[0])))
-
-
-def jacobian_of_principal_axes(values: Mapping[str, float]) -> Floats:
-    """∂(F, ρ, angle)/∂(A, B, C, F0, delta), (3, 5), by central differences of their closed forms."""
-    names = (*"ABC", "F0", "delta")
-    jacobian = np.zeros((3, 5))
-    for i, name in enumerate(names):
-        step = 1e-5 if name == "delta" else 1e-5 * values[name]
-        up, down = (model_of_principal_axes({**values, name: values[name] + sign * step}) for sign in (1, -1))
-        ends = [np.array([model.values["F"], model.values["rho"], model.angle]) for model in (up, down)]
-        jacobian[:, i] = (ends[0] - ends[1]) / (2 * step)
-    return jacobian

@@ -31,8 +31,10 @@ from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS
 
+AXES = (j_z(), j_x(), j_y())  # P along a, b, c
 EACH = 9  # functions of each top that products are made of
 ALIKE = 1e-4  # largest difference of the directions (radian) and constants (relative) of equivalent tops: five digits of a file
+IN_PLANE = 1e-12  # of a component of ρ across the plane ab that is round-off
 Pair = tuple[Operator | None, Operator | None]  # operators of both torsions
 SPECIES = MappingProxyType({"AA": (0, 0), "AE": (0, 1), "EA": (1, 0), "EE": (1, 1), "EE*": (1, -1)})
 
@@ -121,7 +123,7 @@ class TwoTops:
     @property
     def has_plane(self) -> bool:
         """Whether both ρ lie in the plane ab."""
-        return not any(top.rho_abc[2] for top in self.tops)
+        return not any(abs(top.rho_abc[2]) > IN_PLANE for top in self.tops)
 
     def ground_energies(self, species: tuple[int, int], k_max: int) -> Floats:
         """Energies (K,) of the lowest product for K from -k_max to k_max, MHz."""
@@ -147,6 +149,7 @@ class TwoTops:
         count: int = DEFAULT_FUNCTIONS[2],
         each: int = EACH,
         waves: int = 10,
+        needed: Ints | None = None,
     ) -> SpeciesBlocks:
         """The blocks of a species.
 
@@ -162,6 +165,8 @@ class TwoTops:
             Functions of each top that products are made of.
         waves : int, optional
             k from -waves to waves of each top.
+        needed : array of int, optional
+            The J that are needed; by default all.
 
         Returns
         -------
@@ -184,15 +189,13 @@ class TwoTops:
             functions: TorsionRotation = ExchangedTops(product, jmin, jmax, folded, self.axis, partner)
         else:
             functions = TorsionRotation(product, jmin, jmax, folded)
-        return SpeciesBlocks(functions, self.terms(species))
+        chosen = None if needed is None else np.isin(functions.labels["J"], needed)
+        return SpeciesBlocks(functions, self.terms(species), chosen)
 
     def terms(self, species: tuple[int, int]) -> Mapping[str, tuple[Product, ...]]:
         """Sums of products by coefficient, in the order of `coefficients`."""
-        axes = (j_z(), j_x(), j_y())
         p = [p_alpha(sigma) for sigma in species]
-        along = [
-            _sum([value * axis for value, axis in zip(top.rho_abc, axes, strict=True) if value]) for top in self.tops
-        ]
+        along = self._along
         terms: dict[str, tuple[Product, ...]] = {name: products_of(name, 0) for name in self.rotation}
         for i, (top, sigma) in enumerate(zip(self.tops, species, strict=True)):
             square = p_alpha(sigma, 2)
@@ -202,7 +205,7 @@ class TwoTops:
             if not any(top.rho_abc):
                 terms[f"F{i + 1}"] = (Product(UNIT, _at(i, square)),)
             for n in (3, 6):
-                terms[f"V{n} {i + 1}"] = (Product(UNIT, _at(i, 0.5 * (UNIT - cosine(n // 3)))),)
+                terms[f"V{n}_{i + 1}"] = (Product(UNIT, _at(i, 0.5 * (UNIT - cosine(n // 3)))),)
         hindering = UNIT - cosine(1)
         terms["F12"] = (
             Product(2.0 * UNIT, _both(p[0], p[1])), Product(-2.0 * along[1], _at(0, p[0])), Product(-2.0 * along[0], _at(1, p[1])),
@@ -212,6 +215,31 @@ class TwoTops:
         real_sine = -1j * sine(1)
         terms["V12s"] = (Product(-0.5 * UNIT, _both(real_sine, real_sine)),)
         return terms
+
+    @property
+    def _along(self) -> list[Operator]:
+        """ρ_i·P of both tops."""
+        return [
+            _sum([value * axis for value, axis in zip(top.rho_abc, AXES, strict=True) if value]) for top in self.tops
+        ]
+
+    def slopes_by_rho(self, species: tuple[int, int]) -> dict[str, list[Product]]:
+        """∂H/∂ρ_ig = F_i (-2 p_i P_g + {ρ_i·P, P_g}) + F12 (-2 p_j P_g + {ρ_j·P, P_g}), by the names rho_1a, rho_1b, ...
+
+        Of a molecule with the plane ab those along c are left out: they vanish.
+        """
+        p, along, slopes = [p_alpha(sigma) for sigma in species], self._along, {}
+        for i, top in enumerate(self.tops):
+            for letter, axis in zip("abc", AXES[: 2 if self.has_plane else 3], strict=False):
+                slopes[f"rho_{i + 1}{letter}"] = [
+                    product
+                    for factor, j in ((top.f_mhz, i), (self.f12, 1 - i))
+                    for product in (
+                        Product(-2.0 * factor * axis, _at(j, p[j])),
+                        Product(2.0 * factor * half_anticommutator(along[j], axis)),
+                    )
+                ]
+        return slopes
 
     @property
     def coefficients(self) -> Floats:
@@ -257,11 +285,7 @@ def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> T
     >>> round(model.tops[0].f_mhz), round(model.f12), round(model.tops[0].rho_abc[0], 6)
     (158782, -6183, 0.052655)
     """
-    abc = np.array([rotation[name] for name in "ABC"])
-    axes = np.array([axis_of_angles(constants[f"delta_{i}"], constants.get(f"epsilon_{i}", 0.0)) for i in (1, 2)])
-    f0 = np.array([constants[f"F0_{i}"] for i in (1, 2)])
-    rho = axes * abc / f0[:, None]
-    f = np.linalg.inv(np.diag(1 / f0) - (axes * abc) @ axes.T / np.outer(f0, f0))
+    f, rho = torsional_kinetics(rotation, constants)
     first, second = (
         InternalTop(
             float(f[i, i]), constants[f"V3_{i + 1}"], (float(rho[i, 0]), float(rho[i, 1]), float(rho[i, 2])),
@@ -275,6 +299,14 @@ def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> T
         second = replace(first, rho_abc=(float(turned[0]), float(turned[1]), float(turned[2])))
     between = float(f[0, 1]), constants.get("V12", 0.0), constants.get("V12s", 0.0)
     return TwoTops(rotation, (first, second), *between, axis)
+
+
+def torsional_kinetics(rotation: Mapping[str, float], constants: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """F (2, 2) in MHz and ρ (2, 3) along a, b, c of two tops."""
+    abc = np.array([rotation[name] for name in "ABC"])
+    axes = np.array([axis_of_angles(constants[f"delta_{i}"], constants.get(f"epsilon_{i}", 0.0)) for i in (1, 2)])
+    f0 = np.array([constants[f"F0_{i}"] for i in (1, 2)])
+    return np.linalg.inv(np.diag(1 / f0) - (axes * abc) @ axes.T / np.outer(f0, f0)), axes * abc / f0[:, None]
 
 
 def _exchanging(first: InternalTop, second: InternalTop) -> str:
