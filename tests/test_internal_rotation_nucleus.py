@@ -208,5 +208,5 @@ def test_lines_with_spins_are_fitted_from_a_table(tmp_path, call):
 
 def test_a_tensor_component_across_the_mirror_plane_is_refused():
     top = turning_top("RAM", 0, "chi_aa(14N)=-4 chi_ac(14N)=1 MHz")
-    with pytest.raises(ValueError, match="chi_ac.*mirror"):
+    with pytest.raises(ValueError, match=r"chi_ac.*mirror"):
         rotor.api.solve_levels(top, 1, effects=rotor.api.effects_of(top, True))

@@ -1,10 +1,10 @@
 """Chosen levels of a molecule with internal rotors, with or without nuclear spins, and their derivatives by its constants.
 
 Blocks are those of `rotor.quantum.internal_rotation`, for the J (N with spins) that a label needs. Of one top in the rho-axis frame they
-are made once; each iteration solves them at other values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F and
-∂E/∂ρ follow by the chain rule. The torsional functions that are the basis belong to the constants of the start; they are made anew where F, ρ
-or V3 move by more than a hundredth. Constants of principal axes, of one top and of two, move the axes of ρ: their blocks are made anew at each
-point (`rotor.quantum.internal_rotation.chain_rule`).
+are made once; each iteration solves them at other values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F
+and ∂E/∂ρ follow by the chain rule. The torsional functions that are the basis belong to the constants of the start; they are made anew
+where F, ρ or V3 move by more than a hundredth. Constants of principal axes, of one top and of two, move the axes of ρ: their blocks are
+made anew at each point (`rotor.quantum.internal_rotation.chain_rule`).
 """
 
 from __future__ import annotations

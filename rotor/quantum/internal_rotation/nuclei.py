@@ -2,8 +2,8 @@
 
     H = Σ_i χ_i T²(u_i)·T²(I, I)/(2I(2I-1)) + Σ_i C_i Σ_gh (u_i)_gh ½{Φ_g, N_h}·I
 
-with the matrix u_i that a constant multiplies, such as (aa) or (bb) - (cc), in the axes of A, B, C: those of ρ in the RAM, principal axes,
-from which ρ lies at an angle, in the PAM. The torsional functions multiply each tensor by their overlaps.
+with the matrix u_i that a constant multiplies, such as (aa) or (bb) - (cc), in the axes of A, B, C: those of ρ in the RAM, principal
+axes, from which ρ lies at an angle, in the PAM. The torsional functions multiply each tensor by their overlaps.
 """
 
 from __future__ import annotations
