@@ -18,7 +18,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Given
 from rotor.table import Table
-from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, verb_of
+from rotor.verbs.verb import Place, Subject, Verb, Work, files_of, report_of, verb_of
 
 EXAMPLES = {
     "spectrum": (
@@ -121,11 +121,13 @@ class Result:
         """
         from rotor.formats.atomic_write import write_together
 
-        target, report = Path(path), self._report()
+        target = Path(path)
         outputs = [output for output in self.verb.outputs if target.name.endswith(output.suffixes) and not output.grows]
         if not outputs:
             known = ", ".join(dict.fromkeys(suffix for output in self.verb.outputs for suffix in output.suffixes))
             raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {known}")
+        head = {"command": f"rotor.{self.verb.name}", "input": self.subject.text}
+        report = report_of(self.verb, self.answer, head, self.given)
         write_together({target: files_of(self.verb, self.answer, report)[outputs[0].name]})
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
@@ -139,15 +141,6 @@ class Result:
         from rotor.scenes.plan import plan_of
 
         return plan_of(self.scene())
-
-    def _report(self) -> Report:
-        from rotor.version import version
-
-        shown = self.verb.read_shown(self.given)
-        head = {"rotor_version": version(), "command": f"rotor.{self.verb.name}", "input": self.subject.text}
-        content = {**head, **self.facts(), **self.verb.content(self.answer, shown)}
-        provenance: dict[str, Any] = {name: content[name] for name in ("command", "errors") if name in content}
-        return Report(content, shown, self.given, provenance)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

@@ -171,7 +171,7 @@ def test_wrong_input_is_one_line(call, arguments, words):
 def test_every_option_and_key_is_documented(call):
     for verb in ("cat", "convert"):
         _, out, _ = call(verb, "--help")
-        options = set(re.findall(r"--[a-z][a-z-]+", out.split("Options:")[1].split("Examples:")[0])) - {"--help"}
+        options = set(re.findall(r"--[a-z][a-z-]+", out.split("Arguments:")[1].split("Examples:")[0])) - {"--help"}
         part = (PAGES / f"{verb}.md").read_text(encoding="utf-8")
         assert {option for option in options if f"`{option}" not in part} == set()
     content = json.loads(call("cat", OCS, "--compare", OCS, "--json", "-")[1])

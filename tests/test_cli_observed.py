@@ -149,7 +149,7 @@ def test_model_over_a_spectrum(call, folder):
         (("--over", "s.txt", "--fit", "s.txt"), "both name a spectrum"),
         (("--free", "column"), "belongs to a fit"),
         (("--fit", "none.txt"), "none.txt"),
-        (("--fit", "s.txt", "--free", "colour"), "expected of column"),
+        (("--fit", "s.txt", "--free", "colour"), "expected each of column"),
         (("--fit", "s.txt", "--size", "1"), "without a beam"),
         (("--fit", "s.txt", "--column", "1,2,3"), "3 numbers for 1 species"),
         (("--fit", "s.txt", "--unit", "mag"), "intensity in 'mag'"),

@@ -14,12 +14,12 @@ import pytest
 
 import rotor
 from rotor.cli import run
-from rotor.cli.convert import _note_of_options, top_with_errors
 from rotor.formats.spcat.names.named_parameters import named_parameter_file
 from rotor.formats.spcat.predict import predict_file
 from rotor.formats.spcat.text.egy import format_egy, read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import format_par, read_par
+from rotor.verbs.convert import ConvertRequest, lost_options, top_with_errors
 
 ORACLES = Path(__file__).parent / "oracles"
 KINDS = sorted(path for path in ORACLES.glob("**/*.int") if path.with_suffix(".var").exists())
@@ -127,8 +127,8 @@ def test_what_of_the_option_line_is_lost_is_noted(tmp_path, capsys):
     file = read_par(given.with_suffix(".var"))
     same = replace(file, header=replace(file.header, nline=1), options=(replace(file.options[0], diag=3),))
     (tmp_path / "y.var").write_bytes(format_par(same))
-    _note_of_options(rotor.read(tmp_path / "x.toml"), str(tmp_path / "y.var"), "z.toml", 20)
-    assert capsys.readouterr().err == ""  # all three come back
+    again = ConvertRequest(str(tmp_path / "y.var"), 20)
+    assert lost_options(rotor.read(tmp_path / "x.toml"), again, "z.toml") == []  # all three come back
 
 
 SYMMETRIC = "inversion\n2 1 1\ns -1 1 0 20 0 {iax} {plus} {minus} 0 2 0 0\n100 298000.0 1\n1000 -111000.0 1\n"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import toy_format
+import toy_tool
 import toy_verb
 
 import rotor
@@ -61,6 +62,34 @@ def test_a_verb_is_two_files(ring, call, folder):
     assert (folder / "a.csv").read_bytes() == written
     content = json.loads(call("ring", "CO", "--json", "-")[1])
     assert [level["energy_mhz"] for level in content["levels"]] == [0.0, 505379.0]  # 4 B is above the cut of 1e6 MHz
+
+
+def test_a_verb_without_scenes_is_one_file(monkeypatch, call, folder):
+    """Options, help, errors, files and JSON of a verb on files follow from its declaration too."""
+    import rotor.cli
+
+    monkeypatch.setitem(sys.modules, "rotor.verbs.count", toy_tool)
+    monkeypatch.setitem(rotor.cli.VERBS, "count", "Words.")
+    (folder / "a.txt").write_text("one two three\n")
+    code, out, err = call("count", "a.txt", "--least", "4", "--out", "b.txt")
+    assert (code, out, err, (folder / "b.txt").read_text()) == (0, "words  1\n", "", "1")
+    assert json.loads(call("count", "a.txt", "--json", "-")[1]) == {
+        "rotor_version": rotor.__version__, "command": "rotor count a.txt --json -", "input": "a.txt", "words": 3, "files": [],
+    }  # fmt: skip
+    assert "--least N  Letters of a word at least [1].\n" in call("count", "--help")[1]
+    for words, number, said in (
+        ((), 2, "FILE is missing; --help shows what the command takes"),
+        (("a.txt", "--least", "10"), 2, "--least: 10: expected a whole number from 1 to 9"),
+        (("a.txt", "--least", "9"), 1, "a.txt: no word of 9 letters"),
+        (
+            ("a.txt", "--out", "a.txt"),
+            2,
+            "--out a.txt: is an input of this command; write the result under another name",
+        ),
+        (("a.txt", "--out", "a.csv"), 2, "--out a.csv: the name must end in .txt"),
+    ):
+        assert call("count", *words) == (number, "", f"error: {said}\n")
+    assert "count" not in SCENE_VERBS
 
 
 def test_a_format_is_one_file(monkeypatch, folder):

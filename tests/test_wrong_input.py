@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from rotor.cli.shared.options import file_option, folded, option, refuse_overwriting
+from rotor.cli.shared.options import folded
+from rotor.cli.shared.runner import refuse_overwriting
 
 CASE = Path(__file__).parent / "oracles" / "ocs"
 LINES = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,{},0.01\n"
@@ -31,13 +31,6 @@ def files(call):
     return call
 
 
-@dataclass(frozen=True)
-class Drawn:
-    plot: str | None = file_option(".png")
-    plot_title: str | None = option(None)
-    source: str | None = option(None)
-
-
 def contents() -> dict[str, bytes]:
     return {name: Path(name).read_bytes() for name in sorted(os.listdir())}
 
@@ -45,7 +38,7 @@ def contents() -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("convert a.var ./a.var", "TARGET ./a.var: is an input of this command"),
+        ("convert a.var ./a.var", "TARGET a.var: is an input of this command"),
         ("convert a.int a.var", "TARGET a.var: is an input of this command"),
         ("cat a.cat --range 1:2Hz --out ./a.cat", "--out a.cat: is an input of this command"),
         ("cat a.cat --measured a.cat --out a.cat", "--out a.cat: is an input of this command"),
@@ -116,10 +109,11 @@ def test_the_message_names_what_is_wrong(files, words, said):
 def test_a_title_may_be_the_name_of_a_file(files):
     """A title is a text: the name of the picture that is drawn again is no input."""
     Path("a.png").touch()
-    made = Drawn("a.png", "a.png", None)
-    refuse_overwriting([made])
+    written = {"--plot": Path("a.png")}
+    refuse_overwriting(written, {"source": "water"})
     with pytest.raises(ValueError, match=r"--plot a\.png: is an input"):
-        refuse_overwriting([made, Drawn(None, None, "a.png")])
+        refuse_overwriting(written, {"source": "a.png"})
+    assert files("levels", "CO", "--plot", "a.png", "--plot-title", "a.png")[0] == 0
 
 
 def test_examples_of_help_fit_a_terminal(call):

@@ -1,4 +1,4 @@
-"""The command line: one file a verb; what they share is in `inputs`, `report` and `output`.
+"""The command line: verbs as they are declared in `rotor.verbs` and here, and one runner for all.
 
 docs/command_line.md and docs/verbs are the contract: options, columns, JSON keys, error texts, exit codes. Nothing heavy is imported
 before a verb has looked at what it was given.
@@ -16,14 +16,17 @@ from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
 from rotor.cli.shared import process
-from rotor.cli.shared.options import PlainCommand, PlainGroup, folded
+from rotor.cli.shared.options import PlainGroup, folded
 from rotor.cli.shared.output import ComputationError, release_files
-from rotor.verbs.names import declared_verbs, verb_of
+from rotor.verbs.names import declared_verbs
+
+if TYPE_CHECKING:
+    from rotor.verbs.verb import Verb
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
@@ -55,10 +58,9 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "accuracy": "What accuracy costs in a scene: errors and times.",
 }
 VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # what is new says itself what it is
-FILES = {"run": "run_scene"}  # of verbs that this module has a function for
-OTHERWISE = {"emission": "rotor.cli.shared.observed_verb"}  # verbs with options of the command line alone
+FILES = {"run": "run_scene"}  # a verb whose name is that of a function of this module
 ONE_THREAD = frozenset(
-    {"spectrum", "levels", "raman", "thermo", "emission", "fit"}
+    {"spectrum", "levels", "raman", "thermo", "emission", "fit", "identify"}
 )  # small blocks; set before numpy is loaded
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
@@ -114,8 +116,12 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
         if listed and VERBS[verb]:
             app.command(verb, short_help=VERBS[verb])(_listed)
             continue
-        command, class_, examples = _command(verb)
-        app.command(verb, cls=class_, short_help=VERBS[verb] or verb_of(verb).about, epilog=folded(examples))(command)
+        from rotor.cli.shared.command import PanelCommand, command_of
+
+        declared, carry_out = declaration(verb)
+        app.command(verb, cls=PanelCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
+            command_of(declared, carry_out)
+        )
     return app
 
 
@@ -123,19 +129,13 @@ def _listed() -> None:
     """A verb in a list of verbs."""
 
 
-def _command(name: str) -> tuple[Any, Any, str]:
-    """The function behind a verb, the class of its command, and its examples."""
-    if find_spec(f"rotor.verbs.{name}") is None:
-        module = import_module(f"rotor.cli.{FILES.get(name, name)}")
-        return module.command, PlainCommand, module.EXAMPLES
-    from rotor.cli.shared.command import PanelCommand, command_of
+def declaration(name: str) -> tuple[Verb, Any]:
+    """A verb as it is declared, and what carries it out."""
     from rotor.cli.shared.runner import run_verb
 
-    if name in OTHERWISE:
-        module = import_module(OTHERWISE[name])
-        return command_of(module.VERB, module.run), PanelCommand, module.VERB.examples
-    verb = verb_of(name)
-    return command_of(verb, run_verb), PanelCommand, verb.examples
+    folder = "cli" if find_spec(f"rotor.verbs.{name}") is None else "verbs"
+    module = import_module(f"rotor.{folder}.{FILES.get(name, name)}")
+    return module.VERB, getattr(module, "run_declared", run_verb)
 
 
 def _print_version(asked: bool) -> None:

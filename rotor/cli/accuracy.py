@@ -9,12 +9,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import json_option
-from rotor.cli.shared.options import argument, file_option, grouped, option
-from rotor.cli.shared.output import Files, Table, deliver, json_text, note, show_facts, show_table
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import REQUIRED, check_fields, declared
+from rotor.requests.readers import Quantity, Text
+from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import Row, WorkPrecision
@@ -28,52 +26,53 @@ Examples:
 
 
 @dataclass(frozen=True)
-class Options:
-    """The scene, and what is written."""
+class AccuracyRequest:
+    """The scene, and how long its sweeps may take."""
 
-    scene: str = argument(..., help="A scene file.")
-    seconds: str = option(
-        "120", metavar="S", help="Of the processor, for all sweeps together; what is beyond is left out."
+    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
+    seconds: float = declared(
+        120.0,
+        Quantity("s", above=0, metavar="S"),
+        "Of the processor, for all sweeps together; what is beyond is left out",
     )
-    csv: str | None = file_option(".csv", help="All settings with error and time.")
-    plot: str | None = file_option(".png", ".pdf", ".svg", help="Error against time, one panel a knob.")
-    json: str | None = json_option()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
-    """What accuracy costs in a scene: each numerical knob swept, error against a finer reference, processor time."""
-    from rotor.scenes.scene_file import read_scene
+@dataclass(frozen=True)
+class Swept:
+    """A scene, and errors and times of its knobs."""
 
-    seconds = inputs.positive("--seconds", options.seconds, "s")
-    files = Files.of(options)
-    scene = read_scene(options.scene)
-    found = _swept(scene, options, seconds)
-    if "--plot" in files.paths and not found.rows:
-        raise ValueError(f"--plot: there is nothing to draw: {'; '.join(found.remarks)}")
-    content = _content(found, options, files, context.obj)
-    deliver(files, _writers(found, scene, content), lambda: json_text(content), lambda: _show(scene, found))
+    path: str
+    scene: Scene
+    found: WorkPrecision
+
+    def facts(self) -> dict[str, Any]:
+        """Every setting, by the keys of docs/verbs."""
+        return {"scene": self.path, **self.found.provenance, "settings": [asdict(row) for row in self.found.rows]}
 
 
-def _swept(scene: Scene, options: Options, seconds: float) -> WorkPrecision:
+def answer(request: AccuracyRequest, work: Work) -> Swept:
     """The whole table; what there is of it is printed before an interrupt ends the command."""
     from rotor.scenes.accuracy_sweep import work_precision
+    from rotor.scenes.scene_file import read_scene
 
+    scene, folder = read_scene(request.scene), Path(request.scene).parent
     so_far: list[WorkPrecision] = []
     try:
-        with _progress() as show:
-            return work_precision(
-                scene,
-                folder=Path(options.scene).parent,
-                limit_seconds=seconds,
-                progress=show,
-                on_knob=so_far.append,
+        with _progress() as shown:
+            found = work_precision(
+                scene, folder=folder, limit_seconds=request.seconds, progress=shown, on_knob=so_far.append
             )
     except KeyboardInterrupt:
-        note("interrupted: the knobs swept so far follow, no file is written")
+        work.note("interrupted: the knobs swept so far follow, no file is written")
         if so_far:
-            _show(scene, so_far[-1])
+            show(Swept(request.scene, scene, so_far[-1]), None)
         raise
+    if "plot" in work.files and not found.rows:
+        raise ValueError(f"--plot: there is nothing to draw: {'; '.join(found.remarks)}")
+    return Swept(request.scene, scene, found)
 
 
 @contextmanager
@@ -88,35 +87,30 @@ def _progress() -> Iterator[Callable[[str, str], object]]:
         yield lambda knob, setting: status.update(f"{knob}: {setting}")
 
 
-def _content(found: WorkPrecision, options: Options, files: Files, command: str) -> dict[str, Any]:
-    import rotor
+def draw(answer: Swept, path: Path, report: Report) -> None:
+    """Error against time, one panel a knob."""
+    from rotor.plots.work_precision import plot_work_precision
+    from rotor.scenes.accuracy_panels import panels_of
 
-    head = {"rotor_version": rotor.__version__, "command": command, "scene": options.scene}
-    return {**head, **found.provenance, "settings": [asdict(row) for row in found.rows], "files": files.names}
-
-
-def _writers(found: WorkPrecision, scene: Scene, content: dict[str, Any]) -> dict[str, Callable[[Path], None]]:
-    def rows(path: Path) -> None:
-        """The table as a file."""
-        from rotor.formats import write
-
-        write(found, path)
-
-    def plot(path: Path) -> None:
-        """The picture as a file."""
-        from rotor.plots.work_precision import plot_work_precision
-        from rotor.scenes.accuracy_panels import panels_of
-
-        facts = {name: content[name] for name in ("command", "scene", "references")}
-        plot_work_precision(
-            panels_of(found), path, title=scene.title or f"a scene of the kind {scene.kind}", facts=facts
-        )
-
-    return {"--csv": rows, "--plot": plot}
+    facts = {name: report.content[name] for name in ("command", "scene", "references")}
+    plot_work_precision(panels_of(answer.found), path, title=_title(answer.scene), facts=facts)
 
 
-def _show(scene: Scene, found: WorkPrecision) -> None:
-    print(scene.title or f"a scene of the kind {scene.kind}")
+def write_rows(answer: Swept, path: Path, report: Report) -> None:
+    """The table as a file."""
+    from rotor.formats import write
+
+    write(answer.found, path)
+
+
+def _title(scene: Scene) -> str:
+    return scene.title or f"a scene of the kind {scene.kind}"
+
+
+def show(answer: Swept, _: Any) -> None:
+    """Print a table for each knob, and what they are held against."""
+    found = answer.found
+    print(_title(answer.scene))
     for (knob, error_of, unit), rows in found.curves().items():
         print()
         heading = f"error ({unit})" if unit else "error"
@@ -130,3 +124,19 @@ def _show(scene: Scene, found: WorkPrecision) -> None:
 
 def _cells(row: Row) -> list[str]:
     return [row.setting, "*" if row.own else "", f"{row.error:.2g}", f"{row.seconds:.2g}"]
+
+
+VERB = Tool(
+    name="accuracy",
+    about="What accuracy costs in a scene: each numerical knob swept, error against a finer reference, processor time.",
+    examples=EXAMPLES,
+    request=AccuracyRequest,
+    of="scene",
+    answer=answer,
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "All settings with error and time", write_rows),
+        Output("plot", PICTURES, "Error against time, one panel a knob", draw),
+    ),
+    stepwise=True,
+)

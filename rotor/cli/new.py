@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import typer
-
-from rotor.cli.shared.options import argument, file_option, grouped, option
-from rotor.cli.shared.output import Files, write_text
+from rotor.cli.shared.output import write_text
+from rotor.requests.field import declared
+from rotor.requests.readers import Flag, Text
+from rotor.verbs.names import SCENE_VERBS
+from rotor.verbs.verb import Output, Tool, Work
 
 EXAMPLES = """\b
 Examples:
@@ -18,32 +20,40 @@ Examples:
 
 
 @dataclass(frozen=True)
-class Options:
+class NewRequest:
     """Which scene."""
 
-    kind: str | None = argument(
-        help="spectrum, levels, raman, thermo, tumble, gas, fluid, stark, zeeman, align, fit or emission."
-    )
-    schema: bool = option(False, "--schema", help="The JSON Schema of scene files instead, for editors.")
-    out: str | None = file_option(".toml", ".json", help="Write it into a file.")
+    kind: str | None = declared(None, Text(), ", ".join(SCENE_VERBS), option="KIND")
+    schema: bool = declared(False, Flag(), "The JSON Schema of scene files instead, for editors")
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
-    """A scene file with every key, commented: what to simulate, to be edited and run."""
+@dataclass(frozen=True)
+class New:
+    """The text of a file; written: whether into a file."""
+
+    text: str
+    written: bool
+
+    def facts(self) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+def answer(request: NewRequest, work: Work) -> New:
+    """The scene, or the schema."""
     from rotor.scenes.scene import KINDS
     from rotor.scenes.template import template
 
-    if (options.kind is None) != options.schema:
+    if (request.kind is None) != request.schema:
         raise ValueError(f"expected either a kind of scene, one of {', '.join(KINDS)}, or --schema")
-    text = _schema() if options.kind is None else template(options.kind)
-    files = Files()
-    files.ask("--out", options.out, (".toml", ".json"))
-    if options.out is not None and Path(options.out).exists():
-        raise ValueError(f"--out {options.out}: is there already; remove it, or give another name")
-    if not files.paths:
-        print(text, end="")
-    files.write({"--out": lambda path: write_text(Path(path), text)})
+    return New(_schema() if request.kind is None else template(request.kind), "out" in work.files)
+
+
+def check(_: NewRequest, outputs: dict[str, tuple[Path, ...]], __: Any) -> None:
+    """ValueError for a file that is there: a scene that was edited is not lost."""
+    for path in outputs.get("out", ()):
+        if path.exists():
+            raise ValueError(f"--out {path}: is there already; remove it, or give another name")
 
 
 def _schema() -> str:
@@ -52,3 +62,23 @@ def _schema() -> str:
     from rotor.scenes.scene_file import json_schema
 
     return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+VERB = Tool(
+    name="new",
+    about="A scene file with every key, commented: what to simulate, to be edited and run.",
+    examples=EXAMPLES,
+    request=NewRequest,
+    answer=answer,
+    text=None,
+    show=lambda answer, report: None if answer.written else print(answer.text, end=""),
+    outputs=(
+        Output(
+            "out",
+            (".toml", ".json"),
+            "Write it into a file",
+            lambda answer, path, report: write_text(path, answer.text),
+        ),
+    ),
+    check=check,
+)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rotor.cli.shared.inputs import json_option
-from rotor.cli.shared.options import argument, grouped
-from rotor.cli.shared.output import Files, deliver, json_text, show_facts
+from rotor.reports.screen import show_facts
+from rotor.requests.field import REQUIRED, declared
+from rotor.requests.readers import Text
+from rotor.verbs.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.requests.plan import LeftOut, Plan
@@ -23,31 +22,38 @@ Examples:
 
 
 @dataclass(frozen=True)
-class Options:
+class PlanRequest:
     """The scene."""
 
-    scene: str = argument(..., help="A scene file.")
-    json: str | None = json_option()
+    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
-    """Before a scene is run: method, basis, counts, seconds and memory, and the effects left out by size."""
-    import rotor
+@dataclass(frozen=True)
+class Planned:
+    """A scene and its plan."""
+
+    path: str
+    scene: Scene
+    plan: Plan
+
+    def facts(self) -> dict[str, Any]:
+        """The plan, by the keys of docs/verbs."""
+        return {"scene": self.path, **self.plan.facts()}
+
+
+def answer(request: PlanRequest, work: Work) -> Planned:
+    """The plan of the scene."""
     from rotor.scenes.scene_file import read_scene
 
-    files = Files()
-    files.ask_json(options.json)
-    scene = read_scene(options.scene)
-    plan = scene.plan(folder=Path(options.scene).parent)
-    head = {"rotor_version": rotor.__version__, "command": context.obj, "scene": options.scene}
-    content = {**head, **plan.facts(), "files": files.names}
-    deliver(files, {}, lambda: json_text(content), lambda: _show(scene, plan))
+    scene = read_scene(request.scene)
+    return Planned(request.scene, scene, scene.plan(folder=Path(request.scene).parent))
 
 
-def _show(scene: Scene, plan: Plan) -> None:
+def show(answer: Planned, _: Any) -> None:
+    """Print the plan."""
     from rotor.requests.plan import larger_ones
 
+    scene, plan = answer.scene, answer.plan
     print(scene.title or f"a scene of the kind {scene.kind}")
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
@@ -65,3 +71,14 @@ def _show(scene: Scene, plan: Plan) -> None:
 def _text(one: LeftOut) -> str:
     size: Any = "not estimated" if one.size is None else f"about {one.size:.1g} {one.unit}"
     return f"{one.name}: {size}; {one.basis}"
+
+
+VERB = Tool(
+    name="plan",
+    about="Before a scene is run: method, basis, counts, seconds and memory, and the effects left out by size.",
+    examples=EXAMPLES,
+    request=PlanRequest,
+    of="scene",
+    answer=answer,
+    show=show,
+)

@@ -8,30 +8,22 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rotor.checks import require_whole
-from rotor.cli.shared.inputs import json_option
-from rotor.cli.shared.options import argument, grouped, option
-from rotor.cli.shared.output import (
-    ComputationError,
-    Files,
-    Table,
-    deliver,
-    json_with_rows,
-    note,
-    plain,
-    show_facts,
-    show_table,
-)
+from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
+from rotor.cli.shared.workers import MOST_WORKERS
+from rotor.reports.screen import Table, json_with_rows, show_facts, show_table
+from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
+from rotor.requests.fill import Given
+from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
+from rotor.verbs.verb import Place, Tool, report_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    import typer
 
     from rotor.scenes.scene import Scene, SceneResult
     from rotor.scenes.sweep import SweepResult
@@ -49,38 +41,45 @@ Examples:
   rotor run sweep.toml --dask tcp://head:8786"""
 
 
+SWEEP = "Sweep"
+
+
 @dataclass(frozen=True)
 class Options:
     """The scene, and where its files go."""
 
-    scene: str = argument(..., help="A scene file.")
-    out: str = option(".", metavar="FOLDER", help="From which the files that are written are counted.")
-    workers: int | None = option(None, metavar="N", help="Spread the points of a sweep, or the work, over N processes.")
-    dask: str | None = option(
-        None, metavar="ADDRESS", help="Spread them over the workers of a Dask scheduler instead: tcp://head:8786."
+    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
+    out: str = declared(".", Text(metavar="FOLDER"), "From which the files that are written are counted", panel=OUTPUT)
+    workers: int | None = declared(
+        None, Whole(1, MOST_WORKERS), "Spread the points of a sweep, or the work, over N processes", panel=NUMERICS
     )
-    dask_tls: str | None = option(
+    dask: str | None = declared(
         None,
-        metavar="CA,CERT,KEY",
-        help="Of an encrypted cluster: PEM files of the authority, the certificate, its key.",
+        Text(metavar="ADDRESS"),
+        "Spread them over the workers of a Dask scheduler instead: tcp://head:8786",
+        panel=NUMERICS,
     )
-    record: str | None = option(
-        None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
+    dask_tls: str | None = declared(
+        None,
+        Text(metavar="CA,CERT,KEY"),
+        "Of an encrypted cluster: PEM files of the authority, the certificate, its key",
+        panel=NUMERICS,
     )
-    retry_failed: bool = option(False, "--retry-failed", help="Of a sweep: run again the points that failed before.")
-    errors: bool = option(False, "--errors", help="Print the table of errors: each source with its size.")
-    json: str | None = json_option()
+    record: str | None = declared(
+        None, Text(metavar="FILE"), "What is done; by default SCENE.sweep.jsonl in the folder of --out", panel=SWEEP
+    )
+    retry_failed: bool = declared(False, Flag(), "Run again the points that failed before", panel=SWEEP)
+    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", panel=OUTPUT)
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
+def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Run a scene: write the files that it names, and report; a sweep goes on where it stopped."""
-    from rotor.cli.shared.workers import MOST_WORKERS
+    from rotor.cli.shared.runner import refuse_overwriting
     from rotor.scenes.run import refuse_outside
     from rotor.scenes.scene_file import read_scene
     from rotor.scenes.sweep import is_sweep
 
-    require_whole("--workers", options.workers, 1, MOST_WORKERS)
+    options: Options = verb.read(Given(typed, "option"), Place())[0]
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)
@@ -92,7 +91,8 @@ def command(context: typer.Context, options: Options) -> None:
         raise ValueError("--errors: is of one scene; a sweep has the errors of each point in its files")
     refuse_outside(scene, options.out)
     files = Files()
-    files.ask_json(options.json)
+    files.ask_json(typed.get("json"))
+    refuse_overwriting(files.paths, {"scene": options.scene})
     with _workers(options, scene) as pool:
         if swept:
             _sweep(scene, options, files, pool, context.obj)
@@ -156,37 +156,20 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
         raise ComputationError(str(error)) from error
     for remark in _notes(result):
         note(remark)
-    if find_spec(f"rotor.verbs.{scene.kind}") is not None:
-        _deliver(result, options, files, command)
-        return
-    content = _content(result, options, command)
-    text = lambda: json_with_rows(result.table, "rows", content)  # noqa: E731
-
-    def show() -> None:
-        """The report, and the table of errors."""
-        _show(result)
-        _show_errors(content, options)
-
-    deliver(files, {}, text, show)
-
-
-def _show_errors(content: Mapping[str, Any], options: Options) -> None:
-    if options.errors:
-        from rotor.reports.error_table import show_errors
-
-        show_errors(content)
+    _deliver(result, options, files, command)
 
 
 def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
     """What the verb of the scene prints, and the files and seconds of the run."""
-    from rotor.cli.shared.runner import report_of
     from rotor.plots.view import WHOLE
+    from rotor.reports.error_table import show_errors
     from rotor.scenes.structures import given_of
     from rotor.verbs.verb import verb_of
 
     scene, verb = result.scene, verb_of(result.scene.kind)
     head = {"command": command, "input": options.scene, "scene": options.scene, "kind_of_scene": scene.kind}
-    report = report_of(verb, result.answer, head, given_of(scene, verb), WHOLE)
+    with answering():
+        report = report_of(verb, result.answer, head, given_of(scene, verb), WHOLE)
     content = {**report.content, **_of_run(result)}
 
     def show() -> None:
@@ -196,7 +179,8 @@ def _deliver(result: SceneResult, options: Options, files: Files, command: str) 
         verb.show(result.answer, report)
         files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
         show_facts([("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)])
-        _show_errors(content, options)
+        if options.errors:
+            show_errors(content)
 
     deliver(files, {}, lambda: verb.json(result.answer, content), show)
 
@@ -210,40 +194,6 @@ def _notes(result: SceneResult) -> list[str]:
     top = getattr(result.request, "top", None)
     facts = result.answer.facts()
     return list(dict.fromkeys([*(top.notes if top is not None else ()), *facts.get("notes", ())]))
-
-
-def _content(result: SceneResult, options: Options, command: str) -> dict[str, Any]:
-    import rotor
-
-    head = {
-        "rotor_version": rotor.__version__,
-        "command": command,
-        "scene": options.scene,
-        "kind_of_scene": result.scene.kind,
-    }
-    names = [str(path) for path in result.files]
-    accuracy = None if result.reached is None else asdict(result.reached)
-    return {**head, **result.answer.facts(), "accuracy": accuracy, "seconds": result.seconds, "files": names}
-
-
-def _show(result: SceneResult) -> None:
-    scene, facts = result.scene, result.answer.facts()
-    print(scene.title or f"a scene of the kind {scene.kind}")
-    single = {
-        name: value for name, value in plain(facts).items() if isinstance(value, int | float | str) and value != ""
-    }
-    show_facts(
-        [
-            *((name, f"{value:.10g}" if isinstance(value, float) else str(value)) for name, value in single.items()),
-            ("rows", str(len(result.table))),
-            ("files", ", ".join(map(str, result.files)) or "none: [outputs] names none"),
-            ("seconds", f"{result.seconds:.3g}"),
-            *_accuracy(result),
-        ]
-    )
-    if not result.files and len(result.table):
-        print()
-        show_table(_some_rows(result.table))
 
 
 def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
@@ -330,3 +280,14 @@ def _failures(result: SweepResult, record: str) -> str:
 
 def _show_sweep(result: SweepResult) -> None:
     show_table(_some_rows(result))
+
+
+VERB = Tool(
+    name="run",
+    about="Run a scene: write the files that it names, and report; a sweep goes on where it stopped.",
+    examples=EXAMPLES,
+    request=Options,
+    of="scene",
+    answer=lambda request, work: None,
+    show=lambda answer, report: None,
+)

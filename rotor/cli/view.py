@@ -5,14 +5,12 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rotor.checks import require_whole
-from rotor.cli.shared import inputs
-from rotor.cli.shared.options import argument, file_option, grouped, option
-from rotor.cli.shared.output import note
+from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
+from rotor.verbs.observed_file import PANEL
+from rotor.verbs.verb import Output, Report, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service
@@ -26,82 +24,118 @@ Examples:
 
 
 @dataclass(frozen=True)
-class Options:
+class ViewRequest:
     """Spectrum, molecules, and how they are shown."""
 
-    source: str = argument(
-        ..., metavar="SPECTRUM", help="A spectrum: text, FITS or .npy; or the session file of one (.view.json)."
+    source: str = declared(
+        REQUIRED, Text(), "A spectrum: text, FITS or .npy; or the session file of one (.view.json)", option="SPECTRUM"
     )
-    molecules: list[str] | None = argument(
-        None, metavar="MOLECULE", help='Species to predict: names, files, SMILES:..., "A=9 B=3 C=2 GHz".'
+    molecules: tuple[str, ...] = declared(
+        (), Names(), 'Species to predict: names, files, SMILES:..., "A=9 B=3 C=2 GHz"', option="MOLECULE"
     )
-    lines: str | None = option(None, metavar="FILE", help="Assigned lines of the first molecule: .lin, .csv, .cat.")
-    session: str | None = option(None, metavar="FILE", help="Session file; SPECTRUM.view.json if left out.")
-    temperature: str = option("300", metavar="T", help="Temperature of the molecules (K).")
-    axis_unit: str | None = option(None, metavar="UNIT", help="Unit of the spectral axis of a text: MHz, GHz, cm-1.")
-    unit: str | None = option(None, metavar="UNIT", help="Unit of the intensities: K, mK, V, absorbance, Jy/beam.")
-    noise: str | None = option(None, metavar="X", help="Noise of a channel; estimated from line-free channels.")
-    export: str | None = file_option(".html", help="Write one page with the data inside, and start no server.")
-    port: int = option(0, metavar="N", help="Port on this machine; 0 takes any that is free.")
-    no_browser: bool = option(False, "--no-browser", help="Print the address; open no browser.")
+    lines: str | None = declared(None, Text(metavar="FILE"), "Assigned lines of the first molecule: .lin, .csv, .cat")
+    session: str | None = declared(
+        None, Text(metavar="FILE"), "Session file; SPECTRUM.view.json if left out", panel=OUTPUT
+    )
+    temperature_k: float = declared(
+        300.0,
+        Quantity("K", above=0, metavar="T"),
+        "Temperature of the molecules (K)",
+        option="--temperature",
+        panel=CONDITIONS,
+    )
+    axis_unit: str | None = declared(
+        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1", panel=PANEL
+    )
+    unit: str | None = declared(
+        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, V, absorbance, Jy/beam", panel=PANEL
+    )
+    noise: float | None = declared(
+        None, Quantity(), "Noise of a channel; estimated from line-free channels", panel=PANEL
+    )
+    port: int = declared(0, Whole(0, 65535), "Port on this machine; 0 takes any that is free", panel=OUTPUT)
+    no_browser: bool = declared(False, Flag(), "Print the address; open no browser", panel=OUTPUT)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
-    """A spectrum, its prediction and its assignment in the browser; on this machine only."""
-    require_whole("--port", options.port, 0, 65535)
+@dataclass(frozen=True)
+class Opened:
+    """A session, and the page that it is written into, if any."""
+
+    request: ViewRequest
+    service: Service
+    page: Path | None
+
+    def facts(self) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+def answer(request: ViewRequest, work: Work) -> Opened:
+    """Open the session; it is given up when the command has ended."""
     from rotor.viewer.assets import bokeh_js
     from rotor.viewer.opening import open_session
 
     bokeh_js()  # says what to install, before anything is read
-    if options.export is not None:
-        _refuse_path(options.export)
+    page = work.files.get("export", (None,))[0]
     service = open_session(
-        options.source,
-        options.molecules or (),
-        lines=options.lines,
-        session=options.session,
-        temperature_k=inputs.positive("--temperature", options.temperature, "K"),
-        axis_unit=options.axis_unit,
-        unit=options.unit,
-        noise=None if options.noise is None else inputs.parsed("--noise", options.noise, float),
-        save=options.export is None,
-        note=note,
+        request.source,
+        request.molecules,
+        lines=request.lines,
+        session=request.session,
+        temperature_k=request.temperature_k,
+        axis_unit=request.axis_unit,
+        unit=request.unit,
+        noise=request.noise,
+        save=page is None,
+        note=work.note,
     )
-    try:
-        _export(service, Path(options.export)) if options.export is not None else _serve(service, options)
-    finally:
-        service.session.release()
+    work.at_end(service.session.release)
+    return Opened(request, service, page)
 
 
-def _refuse_path(path: str) -> None:
-    """ValueError for a name that is not that of a page."""
-    if not path.lower().endswith(".html"):
-        raise ValueError(f"--export {path}: the name must end in .html")
-
-
-def _export(service: Service, path: Path) -> None:
+def export(answer: Opened, path: Path, _: Report) -> None:
     """Write the page with its data."""
-    from rotor.formats.atomic_write import open_atomic
     from rotor.viewer.export_page import export_page
 
-    with open_atomic(path, "w", encoding="utf-8") as handle:
-        handle.write(export_page(service))
-    print(f"{path}: {len(service.spectrum)} points, {len(service.session.state.lines)} assigned lines")
+    path.write_text(export_page(answer.service), encoding="utf-8")
 
 
-def _serve(service: Service, options: Options) -> None:
+def show(answer: Opened, _: Report) -> None:
+    """Print what the page has, or serve the session until the process is interrupted."""
+    service = answer.service
+    if answer.page is None:
+        _serve(service, answer.request)
+    else:
+        print(f"{answer.page}: {len(service.spectrum)} points, {len(service.session.state.lines)} assigned lines")
+
+
+def _serve(service: Service, request: ViewRequest) -> None:
     """Serve the session until the process is interrupted."""
     from rotor.viewer.server import ViewServer
 
-    server = ViewServer(service, options.port)
+    server = ViewServer(service, request.port)
 
     def started(address: str) -> None:
         """Say where the page is, and open it."""
         print(f"{address}\nsession: {service.session.path}; Ctrl-C ends", flush=True)
-        if not options.no_browser and sys.stdout.isatty():
+        if not request.no_browser and sys.stdout.isatty():
             import webbrowser
 
             webbrowser.open(address)
 
     server.run(started)
+
+
+VERB = Tool(
+    name="view",
+    about="A spectrum, its prediction and its assignment in the browser; on this machine only.",
+    examples=EXAMPLES,
+    request=ViewRequest,
+    answer=answer,
+    text=None,
+    show=show,
+    outputs=(Output("export", (".html",), "Write one page with the data inside, and start no server", export),),
+)

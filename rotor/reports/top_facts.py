@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotor.tops.facts import estimated_errors_mhz, formula_of, top_facts
+from rotor.tops.facts import estimated_errors_mhz, formula_of
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -24,18 +24,6 @@ WITH_HYPERFINE = ("spectrum", "levels", "emission", "raman", "thermo", "stark", 
 
 NOTHING_SEEN = "nothing that the molecule shows signs of; further states of vibration are not those of these constants"
 NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitude are not known; a geometry shows them"
-
-
-def begin(command: str, text: str) -> dict[str, Any]:
-    """The first keys of every JSON: version, command line, and the input as given."""
-    from rotor.version import version
-
-    return {"rotor_version": version(), "command": command, "input": text}
-
-
-def describe(top: Top, text: str, command: str) -> dict[str, Any]:
-    """Everything about a top but its partition function, by the keys of docs/verbs."""
-    return {**begin(command, text), **top_facts(top)}
 
 
 def error_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:

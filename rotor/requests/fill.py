@@ -61,7 +61,9 @@ def read_instance(structure: Any, given: Given, subject: Any = None) -> Any:
     """An instance of a dataclass whose fields are all declared."""
     missing = [one for one in own_fields(structure).values() if one.default is REQUIRED and not given.has(one)]
     if missing:
-        raise ValueError(f"the key {missing[0].called(given.style)!r} is missing")
+        name = missing[0].called(given.style)
+        texts = f"the key {name!r} is missing", f"{name} is missing; --help shows what the command takes"
+        raise ValueError(texts[given.style == "option"])
     with called(structure, given.style):
         return structure(**read_fields(structure, given, subject))
 

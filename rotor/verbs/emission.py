@@ -14,11 +14,12 @@ from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, with_option
-from rotor.requests.field import CONDITIONS, OUTPUT, Field, all_fields, declared
+from rotor.requests.field import OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Given, read_instance, written_fields
-from rotor.requests.readers import Names, Quantity, Text, Whole
+from rotor.requests.readers import Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
+from rotor.verbs.emission_observed import OBSERVED
 from rotor.verbs.molecule import (
     FIELDS,
     STATES,
@@ -29,6 +30,7 @@ from rotor.verbs.molecule import (
     top_of,
     with_some_dipole,
 )
+from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.tables import Section, entries_of, said
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb
@@ -43,14 +45,9 @@ Examples:
   rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10
   rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv
   rotor emission CO HCN --band ALMA3 --column 1e18,1e15 --excitation 40,10 --width 300 --redshift 2.3
-  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16"""
-
-EXAMPLES_OBSERVED = (
-    EXAMPLES
-    + """
+  rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16
   rotor emission CH3OH HCN --over spectrum.fits --column 1e16,1e14 --velocity 4 --plot pages.pdf
   rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width"""
-)
 _OF_ONE = ("isotopes", "spin_constants", "spins", *STATES)  # what belongs to a single molecule
 _OWN = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
 _PROVENANCE = ("molecules", "source", "range_mhz")
@@ -71,19 +68,6 @@ class EmitterInput:
     partition: str | None = declared(
         None, Text(metavar="FILE"), "Q(T) of a .cat file: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", "partition",
         example="300=108.87,75=27.46",
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class SeveralInput:
-    """Which molecules, on the command line."""
-
-    names: tuple[str, ...] = declared(
-        (), Names(), "Molecules: names, files, SMILES:..., .cat files of JPL and CDMS", option="SOURCE"
-    )
-    partition: str | None = declared(
-        None, Text(metavar="FILE"), "Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", option="--partition",
-        panel=CONDITIONS,
     )  # fmt: skip
 
 
@@ -189,11 +173,6 @@ def _of_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
         EmitterInput, Given({name: table[name] for name in names & table.keys()}, "key")
     )
     return read_molecule(Given(values, "key")), emitter
-
-
-def is_catalogue(source: Any) -> bool:
-    """Whether a source is a catalogue of lines."""
-    return isinstance(source, str) and source.lower().endswith((".cat", ".cat.gz"))
 
 
 def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
@@ -368,4 +347,5 @@ VERB = Verb(
         "conditions.range": "115:116GHz",
         "outputs.csv": "emission.csv",
     },
+    other=OBSERVED,
 )

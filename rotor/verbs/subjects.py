@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rotor.requests.field import Field
 from rotor.requests.fill import Given, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.verb import Place, Subject, SubjectKind
+from rotor.verbs.verb import Note, Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -60,6 +60,18 @@ class OneMolecule(SubjectKind):
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of the molecule, files counted from the folder of the scene."""
         return saved_molecule(subject.molecules[0], folder)
+
+
+def top_of_word(
+    source: str,
+    note: Note,
+    isotopes: Sequence[str] = (),
+    prepare: Callable[[Top, Reading], Top] = lambda top, reading: top,
+) -> Top:
+    """The top of a source on the command line; note: takes remarks."""
+    values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
+    reading = Reading(read_molecule(Given(values, "option")), "option", ".", note)
+    return prepare(top_of(reading), reading)
 
 
 def _molecule_type() -> Any:

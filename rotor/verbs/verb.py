@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotor.reports.screen import json_text, json_with_rows
 from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
@@ -17,6 +18,7 @@ from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
 from rotor.verbs.names import declared_verbs as declared_verbs
 from rotor.verbs.names import verb_of as verb_of
+from rotor.version import version
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -62,7 +64,8 @@ class Subject:
 @dataclass(frozen=True, eq=False, repr=False)
 class Work:
     """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
-    remarks. progress: whether a terminal shows it. provenance: of files that grow.
+    remarks. progress: whether a terminal shows it. provenance: of files that grow. view: of the picture. at_end: takes what is done at the
+    end of a command.
     """
 
     executor: Executor | None = None
@@ -71,6 +74,8 @@ class Work:
     note: Note = silent
     progress: bool = False
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    view: Any = None
+    at_end: Callable[[Callable[[], object]], object] = lambda end: None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,7 +108,7 @@ class Output:
     """A file that a verb writes. name: of the key in [outputs] and of the option. write: by default the table itself, by its suffix.
 
     of: the table that is written. empty: why there is nothing to write. grows: the answer itself writes it. many: repeatable.
-    scene: whether scenes have it too.
+    scene: whether scenes have it too. required: a verb that is there to write this file.
     """
 
     name: str
@@ -115,6 +120,7 @@ class Output:
     grows: bool = False
     many: bool = False
     scene: bool = True
+    required: bool = False
 
     @property
     def flag(self) -> str:
@@ -188,7 +194,10 @@ class SubjectKind:
         return content
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+NOTHING = SubjectKind()
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verb:
     """One verb.
 
@@ -204,6 +213,8 @@ class Verb:
     withheld: of files that are named, why some are not written. failure: why an answer that is shown is no result.
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
     these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
+    stepwise: it shows every step from the first one on. other: a verb that takes the place of this one where an option that it alone has is
+    typed.
     """
 
     name: str
@@ -238,6 +249,9 @@ class Verb:
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
     read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     records: Callable[[Any], Table | None] | None = None
+    stepwise: bool = False
+    other: Tool | None = None
+    has_scenes: ClassVar[bool] = True
 
     def load_numerics(self) -> Any:
         """How accuracy is chosen, swept and planned; the knobs of the fields alone where nothing else is named."""
@@ -256,6 +270,26 @@ class Verb:
         """The declared inputs that the command line has options for."""
         inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
         return {name: one for name, one in inputs.items() if one.flag and not one.hidden}
+
+    @cached_property
+    def parameters(self) -> dict[str, Field]:
+        """The inputs of the command line: the options, and those of the verb that may take the place."""
+        return self.options if self.other is None else {**self.other.options, **self.options}
+
+    def by_what(self, typed: Collection[str]) -> Verb:
+        """The verb for what was typed, by identity: the other one where an option that it alone has is typed.
+
+        Raises ValueError for what that has not.
+        """
+        other = self.other
+        if other is None or not any(name in typed for name in other.options.keys() - self.options.keys()):
+            return self
+        for name, one in self.options.items():
+            if name in typed and name not in other.options:
+                raise ValueError(f"{one.flag}: expected without {other.instead}")
+        if "save_scene" in typed:
+            raise ValueError(f"--save-scene: {other.instead} are no part of a scene; expected without them")
+        return other
 
     def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
         """The request that was asked for, and of what.
@@ -284,8 +318,6 @@ class Verb:
 
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The content as JSON text, with all rows."""
-        from rotor.reports.screen import json_text, json_with_rows
-
         table = self.table(answer) if self.records is None else self.records(answer)
         return (
             json_text({**content, self.rows: content.get(self.rows)})
@@ -296,6 +328,53 @@ class Verb:
     def output(self, name: str) -> Output:
         """A file by its name."""
         return next(one for one in self.outputs if one.name == name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Unshown:
+    """No options of printing."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Tool(Verb):
+    """A verb that works on files, lists or a browser: no scene says it, and what its report shows is a part of its request.
+
+    of: the field that is the input of the JSON and of files. text: the JSON, where it is not the facts; None: there is none. instead:
+    the options by which it takes the place of another verb, in words.
+    """
+
+    table: Callable[[Any], Any] = lambda answer: None
+    rows: str = ""
+    outputs: tuple[Output, ...] = ()
+    subject: SubjectKind = NOTHING
+    shown: type = Unshown
+    drawn: str | None = None
+    scaled: bool = False
+    sound: bool = False
+    of: str = ""
+    text: Callable[[Any, Mapping[str, Any]], str] | None = lambda answer, content: json_text(content)
+    instead: str = ""
+    has_scenes: ClassVar[bool] = False
+
+    def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
+        """The request; its own field is the subject."""
+        request = read_instance(self.request, given)
+        source = getattr(request, self.of, "")
+        return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
+
+    def json(self, answer: Any, content: Mapping[str, Any]) -> str:
+        """The facts, or what stands for them."""
+        return "" if self.text is None else self.text(answer, content)
+
+
+def report_of(
+    verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any = None, executor: Executor | None = None
+) -> Report:
+    """What the report, the JSON and the files are made from. head: command or scene, and input."""
+    shown = verb.read_shown(given)
+    content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
+    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}}
+    return Report(content, shown, given, provenance, view, bool(getattr(shown, "sources", False)), executor)
 
 
 def check_early(structure: type, given: Given) -> None:

@@ -6,16 +6,15 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import typer
 
 from rotor.cli.shared.options import PlainCommand
-from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, Field
+from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, REQUIRED, Field
 from rotor.requests.readers import Flag
-from rotor.verbs.verb import Extra, Output, Verb
+from rotor.verbs.verb import Extra, Output, Tool, Verb
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
@@ -34,6 +33,7 @@ class Parameter:
     kind: Any = str
     off: bool = False
     many: bool = False
+    required: bool = False
 
     @property
     def name(self) -> str:
@@ -42,19 +42,21 @@ class Parameter:
 
 
 def parameters_of(verb: Verb) -> list[Parameter]:
-    """Every option of a verb."""
-    found = [_input(one) for one in verb.options.values()]
+    """Every option of a verb; those of a tool are few, and --help shows all."""
+    found = [_input(one) for one in verb.parameters.values()]
     found += [_extra(one) for one in verb.extras]
     found += [_file(one) for one in verb.outputs]
-    found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
-    found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
+    if not isinstance(verb, Tool) or verb.text is not None:
+        found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
+    if verb.has_scenes:
+        found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
     if any(one.name == "plot" for one in verb.outputs) and verb.drawn is not None:
         found += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
     if verb.workers:
         found.append(
             Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS)
         )
-    return found
+    return found if verb.has_scenes else [replace(one, common=True) for one in found]
 
 
 def _left_out(verb: Verb) -> set[str]:
@@ -77,14 +79,15 @@ def _input(one: Field) -> Parameter:
     metavar = one.metavar or one.reader.metavar
     off = isinstance(one.reader, Flag) and one.reader.off
     return Parameter(
-        one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many
-    )
+        one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many,
+        one.default is REQUIRED,
+    )  # fmt: skip
 
 
 def _default_text(one: Field) -> str:
     if one.typed is not None:
         return str(one.typed)
-    if one.default is None or one.default is False or one.default is True or one.default in ((), "", {}):
+    if one.default in (None, REQUIRED) or isinstance(one.default, bool) or one.default in ((), "", {}):
         return ""
     return one.reader.show(one.default)
 
@@ -97,7 +100,7 @@ def _extra(one: Extra) -> Parameter:
 
 
 def _file(one: Output) -> Parameter:
-    return Parameter(one.name, one.flag, one.help, "FILE", OUTPUT, True, many=one.many)
+    return Parameter(one.name, one.flag, one.help, "FILE", OUTPUT, True, many=one.many, required=one.required)
 
 
 def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]], None]) -> Callable[..., None]:
@@ -126,7 +129,8 @@ def _signature_of(one: Parameter) -> inspect.Parameter:
     kind: Any = bool if one.kind is bool else list[str] if one.many else str
     if not one.flag.startswith("-"):
         words = molecules_and_files if one.flag == "SOURCE" else None
-        default = typer.Argument(None, show_default=False, metavar=one.flag, help=f"{one.help}.", autocompletion=words)
+        first: Any = ... if one.required else None
+        default = typer.Argument(first, show_default=False, metavar=one.flag, help=f"{one.help}.", autocompletion=words)
     else:
         names = f"{one.flag}/--no-{one.flag[2:]}" if one.off else one.flag
         settings: dict[str, Any] = {} if one.kind is bool else {"metavar": one.metavar}
@@ -157,25 +161,6 @@ def _texts(by_name: Mapping[str, Parameter], typed: Mapping[str, Any]) -> Iterat
         if any(isinstance(text, str) and not text.strip() for text in texts):
             raise ValueError(f"{one.flag}: the text given is empty; expected one that is not, or leave it out")
         yield one.identity, tuple(value) if one.many else value
-
-
-def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) -> None:
-    """ValueError where a file that one option writes is a file that another option, or the source, names as what is read.
-
-    written: by option. typed: everything that may name a file that is read.
-    """
-    texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
-    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and _is_file(text)}
-    for name, path in written.items():
-        if os.path.realpath(path) in inputs:
-            raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return Path(text).is_file()
-    except (OSError, ValueError):  # a text that no path can be: too long, or with a zero byte
-        return False
 
 
 class PanelCommand(PlainCommand):

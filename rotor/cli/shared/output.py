@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from rotor.cli.shared.options import files_asked
 from rotor.reports.screen import Table as Table
 from rotor.reports.screen import json_text as json_text
 from rotor.reports.screen import json_with_rows as json_with_rows
@@ -28,6 +26,11 @@ _HELD = ExitStack()  # locks of the files that the command will write
 def release_files() -> None:
     """Give up the locks of the files of a command that has ended."""
     _HELD.close()
+
+
+def at_end(done: Callable[[], object]) -> None:
+    """What is done when the command has ended."""
+    _HELD.callback(done)
 
 
 class ComputationError(Exception):
@@ -58,15 +61,6 @@ class Files:
 
     paths: dict[str, Path] = field(default_factory=dict)
     screen: set[str] = field(default_factory=set)  # options whose text goes to standard output: --json -
-
-    @classmethod
-    def of(cls, group: Any) -> Files:
-        """The files that a group of options asks for, the JSON of its field `json` among them."""
-        files = cls()
-        for name, path, suffixes in files_asked(group):
-            files.ask(name, path, suffixes)
-        files.ask_json(group.json)
-        return files
 
     @property
     def names(self) -> list[str]:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared import process
-from rotor.cli.shared.command import refuse_overwriting
-from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
+from rotor.cli.shared.output import ComputationError, Files, answering, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
 from rotor.reports.progress import elapsed_time
-from rotor.requests.fill import Given
-from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of
+from rotor.requests.fill import Given, renaming
+from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of, report_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -21,19 +21,22 @@ if TYPE_CHECKING:
     import typer
 
 
-OWN_PROGRESS = ("fluid", "fit")  # verbs that show every step or iteration from the first one on
-
-
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb with the texts that were typed, by identity."""
-    typed, given = with_files(verb, typed), Given(with_extras(verb, typed), "option")
+    verb = verb.by_what(typed)
+    there = {name: typed[name] for name in typed.keys() & places_of(verb)}
+    inputs = {name: value for name, value in typed.items() if name not in there}
+    given, there = Given(with_extras(verb, inputs), "option"), with_files(verb, there)
     shown = verb.read_shown(given)
-    with as_typed(verb, typed):
-        files, growing = asked_files(verb, typed), growing_files(verb, typed)
-        refuse_overwriting({**files.paths, **growing.paths}, inputs_of(verb, typed))
-    view = picture_settings(verb, typed, "--plot" in files.paths)
+    with as_typed(verb, there):
+        files, growing = files_of_options(verb, there), files_of_options(verb, there, grows=True)
+        if written := {**files.paths, **growing.paths}:
+            refuse_overwriting(written, inputs)
+    view = picture_settings(verb, there, "--plot" in files.paths)
     request, subject = verb.read(given, Place(".", note))
-    outputs = by_name(files, growing)
+    if missing := next((one.flag for one in verb.outputs if one.required and one.name not in there), ""):
+        raise ValueError(f"{missing} is missing; --help shows what the command takes")
+    outputs = by_name(verb, files, growing)
     request = request if verb.adapt is None else verb.adapt(request, outputs, given)
     if "--json" in files.screen:
         outputs["json"] = ()
@@ -42,22 +45,23 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     if verb.short(request):
         process.leave_compiler_out()
     head = {"command": str(context.obj), "input": subject.text}
-    with working(verb, typed) as executor:
-        with answering() if verb.sound else naming(verb):
-            work = Work(executor, shown, outputs, note, True, head)
-            with nullcontext() if verb.name in OWN_PROGRESS else elapsed_time("computing"):
-                answer = answer_of(verb, request, work)
-        report = report_of(verb, answer, head, given, view, executor)
+    with working(verb, there.get("workers", 1)) as executor:
+        with answering() if verb.sound else naming(verb), reaching():
+            work = Work(executor, shown, outputs, note, True, head, view, at_end)
+            with nullcontext() if verb.stepwise else elapsed_time("computing"):
+                answer = verb.answer(request, work)
+        with answering():
+            report = report_of(verb, answer, head, given, view, executor)
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):
             note(text)
         withhold(verb, answer, files)
         report.content["files"] = [*growing.names, *files.names]  # type: ignore[index]
-        writers = {flag_of(verb, name): write for name, write in files_of(verb, answer, report).items()}
+        writers = {verb.output(name).flag: write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
-            named = by_name(files, growing)
-            written = {name: value for name, value in typed.items() if name not in outputs or name in named}
-            writers["--save-scene"] = scene_writer(verb, request, subject, given, written)
+            named = by_name(verb, files, growing)
+            kept = {name: value for name, value in there.items() if name not in outputs or name in named}
+            writers["--save-scene"] = scene_writer(verb, request, subject, given, kept)
         with naming(verb), reaching():
             deliver(
                 files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
@@ -75,12 +79,6 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
         show_errors(report.content)
 
 
-def answer_of(verb: Verb, request: Any, work: Work) -> Any:
-    """The answer; one that was not reached is no mistake of the user."""
-    with reaching():
-        return verb.answer(request, work)
-
-
 @contextmanager
 def reaching() -> Iterator[None]:
     """Inside, an answer that is not reached is no mistake of the user."""
@@ -90,17 +88,10 @@ def reaching() -> Iterator[None]:
         raise ComputationError(str(error)) from error
 
 
-def report_of(
-    verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any, executor: Executor | None = None
-) -> Report:
-    """What the report, the JSON and the files are made from. head: command or scene, and input."""
-    from rotor.version import version
-
-    shown = verb.read_shown(given)
-    with answering():
-        content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}}
-    return Report(content, shown, given, provenance, view, bool(getattr(shown, "sources", False)), executor)
+def places_of(verb: Verb) -> set[str]:
+    """The options that say where results go, not what is computed: files, pictures, processes."""
+    files = {one.name for one in verb.outputs} | {one.option for one in verb.extras if one.files is not None}
+    return files | {"json", "save_scene", "workers", *PLOT_NAMES}
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,7 +113,7 @@ def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
         for one in verb.extras:
             if (
                 one.files is not None
-                and any(flag == flag_of(verb, name) for name in one.files(""))
+                and any(flag == verb.output(name).flag for name in one.files(""))
                 and one.option in typed
             ):
                 raise ValueError(f"{one.option} {text}") from None
@@ -132,14 +123,14 @@ def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
 def withhold(verb: Verb, answer: Any, files: Files) -> None:
     """Leave out the files that are not written, with a note."""
     reasons: dict[str, list[str]] = {}
-    for name, reason in verb.withheld(answer, list(by_name(files))).items():
-        reasons.setdefault(reason, []).append(files.paths.pop(flag_of(verb, name)).name)
+    for name, reason in verb.withheld(answer, list(by_name(verb, files))).items():
+        reasons.setdefault(reason, []).append(files.paths.pop(verb.output(name).flag).name)
     for reason, names in reasons.items():
         note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
 
 def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts, options that stand for others replaced by what they mean."""
+    """The texts of inputs alone, options that stand for others replaced by what they mean."""
     values = {name: value for name, value in typed.items() if name in verb.fields}
     for one in verb.extras:
         if one.option not in typed or one.read is None:
@@ -155,50 +146,44 @@ def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def inputs_of(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """What was typed and may name a file that is read."""
-    outputs = {one.name for one in verb.outputs} | {"json", "save_scene", *PLOT_NAMES}
-    return {name: value for name, value in typed.items() if name not in outputs}
-
-
-def verb_name(option: str) -> str:
-    """The name of a file by its option, as it is derived from it."""
-    return option.strip().removeprefix("--").replace("-", "_")
-
-
-def flag_of(verb: Verb, name: str) -> str:
-    """The option of a file by its name."""
-    return verb.output(name).flag
-
-
-def asked_files(verb: Verb, typed: Mapping[str, Any]) -> Files:
-    """The files to write when all is done, each with a suffix that can be written."""
+def files_of_options(verb: Verb, typed: Mapping[str, Any], grows: bool = False) -> Files:
+    """The files to write when all is done, each with a suffix that can be written; or those that grow while the answer is made."""
     files = Files()
-    _ask(files, verb, typed, grows=False)
-    files.ask("--save-scene", typed.get("save_scene"), (".toml",))
-    files.ask_json(typed.get("json"))
-    return files
-
-
-def growing_files(verb: Verb, typed: Mapping[str, Any]) -> Files:
-    """The files that grow while the answer is made."""
-    files = Files()
-    _ask(files, verb, typed, grows=True)
-    return files
-
-
-def _ask(files: Files, verb: Verb, typed: Mapping[str, Any], grows: bool) -> None:
     for one in verb.outputs:
         for number, path in enumerate(_paths(typed.get(one.name)) if one.grows == grows else ()):
             files.ask(one.flag + " " * number, path, one.suffixes)
+    if not grows:
+        files.ask("--save-scene", typed.get("save_scene"), (".toml",))
+        files.ask_json(typed.get("json"))
+    return files
 
 
-def by_name(*groups: Files) -> dict[str, tuple[Path, ...]]:
+def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) -> None:
+    """ValueError where a file that one option writes is a file that another option, or the source, names as what is read.
+
+    written: by option. typed: everything that may name a file that is read.
+    """
+    texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
+    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and _is_file(text)}
+    for name, path in written.items():
+        if os.path.realpath(path) in inputs:
+            raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # a text that no path can be: too long, or with a zero byte
+        return False
+
+
+def by_name(verb: Verb, *groups: Files) -> dict[str, tuple[Path, ...]]:
     """The paths of files by the names of their outputs."""
+    names = {"--save-scene": "save_scene", "--json": "json", **{one.flag: one.name for one in verb.outputs}}
     found: dict[str, tuple[Path, ...]] = {}
     for files in groups:
         for option, path in files.paths.items():
-            name = {"trajectory": "trajectories"}.get(verb_name(option), verb_name(option))
+            name = names[option.strip()]
             found[name] = (*found.get(name, ()), path)
     return found
 
@@ -216,14 +201,13 @@ def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
 
 @contextmanager
 def naming(verb: Verb) -> Iterator[None]:
-    """Inside, a ValueError that names a field of the request names its option."""
-    from rotor.requests.fill import renaming
-
-    with renaming({one.name: one.flag for one in verb.fields.values() if one.flag}):
+    """Inside, a ValueError that names a field of the request names its option; a tool has checked its own when it was made."""
+    fields = verb.fields.values() if verb.has_scenes else ()
+    with renaming({one.name: one.flag for one in fields if one.flag}):
         yield
 
 
-def working(verb: Verb, typed: Mapping[str, Any]) -> Any:
+def working(verb: Verb, workers: Any) -> Any:
     """The executor that --workers asks for; None of a verb that has no such option."""
     if not verb.workers:
         return nullcontext()
@@ -231,7 +215,7 @@ def working(verb: Verb, typed: Mapping[str, Any]) -> Any:
     from rotor.requests.readers import Whole
 
     try:
-        count = Whole().read(typed.get("workers", 1))
+        count = Whole().read(workers)
     except ValueError as error:
         raise ValueError(f"--workers: {error}") from None
     executor: Executor | Any = pool(count, verb.workers.split()[0])

@@ -4,55 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.cli.shared import inputs
-from rotor.cli.shared.options import option
-from rotor.cli.shared.output import ComputationError, note
 from rotor.table import counted
+from rotor.verbs.molecule import with_some_dipole
+from rotor.verbs.subjects import top_of_word
+from rotor.verbs.verb import NoAnswerError, Note
 
 if TYPE_CHECKING:
     import numpy as np
 
     from rotor.formats.spcat.compare import Comparison
     from rotor.formats.spcat.text.catalogue import Catalogue
+    from rotor.verbs.cat import CatRequest
 
 FORMAT_K = 300.0  # intensities of the 80-column format are those at 300 K
 DIFFERENCES = ("frequency_mhz", "lgint", "energy_lower_cm")
 UNLIKE = 0.05  # a temperature of intensities further off than this is pointed out
-
-
-@dataclass(frozen=True)
-class CompareOptions:
-    """What a catalogue is compared with."""
-
-    compare: str | None = option(
-        None, metavar="OTHER", help="Another .cat, an .int, or a molecule to predict: what differs in OTHER."
-    )
-    temperature: str | None = option(
-        None, metavar="T", help="Of the intensities of FILE, for a molecule (K; by default what FILE says, else 300)."
-    )
-    isotope: list[str] | None = option(
-        None, metavar="1=2H", help="Another isotope of the molecule to predict, by atom number or element; repeatable."
-    )
-    as_spcat: bool = option(
-        False,
-        "--as-spcat",
-        help="OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum.",
-    )
-    full_basis: bool = option(
-        False,
-        "--full-basis",
-        help="OTHER, an .int, is predicted with every K in the basis, whatever KNMIN and KNMAX say.",
-    )
-
-    @property
-    def other(self) -> str:
-        """What it is compared with: the file or the molecule, with its isotopes."""
-        return ", ".join([self.compare or "", *(self.isotope or [])])
 
 
 @dataclass(frozen=True)
@@ -63,37 +34,31 @@ class Compared:
     temperature_k: float | None = None
     temperature_source: str | None = None
 
+    @cached_property
+    def likely_temperature_k(self) -> float:
+        """The temperature at which the intensities are most alike; nan where they do not say."""
+        from rotor.formats.spcat.compare import likely_temperature_k
 
-def refuse_without_molecule(options: CompareOptions) -> None:
-    """--temperature and --isotope belong to a molecule that is predicted, --as-spcat and --full-basis to an .int file."""
-    for flag, on in (("--as-spcat", options.as_spcat), ("--full-basis", options.full_basis)):
-        if on and not (options.compare or "").lower().endswith(".int"):
-            raise ValueError(f"{flag}: expected with --compare and an .int file to predict")
-    given = {"--temperature": options.temperature, "--isotope": options.isotope}
-    name = next((name for name, value in given.items() if value), None)
-    if name is None:
-        return
-    if options.compare is None or options.compare.lower().endswith((".cat", ".cat.gz", ".int")):
-        raise ValueError(f"{name}: expected with --compare and a molecule to predict; a file has its own")
+        return likely_temperature_k(self.comparison, self.temperature_k or FORMAT_K)
 
 
-def beside(lines: Catalogue, file: str, options: CompareOptions, chosen: Any) -> Compared:
-    """The lines of a file beside those of OTHER; chosen(catalogue) picks those of its lines that the options mean."""
+def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
+    """The lines of a file beside those of OTHER that the request means."""
     from rotor.formats.spcat.compare import compare, within
     from rotor.formats.spcat.predict import predict_file
 
-    other = options.compare or ""
+    other = request.compare or ""
     if not len(lines):
-        raise ComputationError("--compare: no lines are left to compare")
+        raise NoAnswerError("--compare: no lines are left to compare")
     if other.lower().endswith((".cat", ".cat.gz")):
-        return Compared(compare(lines, chosen(read_catalogue(other))))
+        return Compared(compare(lines, request.chosen(read_catalogue(other))))
     if other.lower().endswith(".int"):
-        prediction = predict_file(other, as_spcat=options.as_spcat, full_basis=options.full_basis)
+        prediction = predict_file(other, as_spcat=request.as_spcat, full_basis=request.full_basis)
         for text in prediction.notes:
             note(text)
-        return Compared(compare(lines, chosen(prediction.catalogue)))
-    kelvin, source = temperature_of(file, options.temperature)
-    found = compare(lines, chosen(predicted(lines, other, options.isotope, kelvin)))
+        return Compared(compare(lines, request.chosen(prediction.catalogue)))
+    kelvin, source = temperature_of(request.file, request.temperature)
+    found = compare(lines, request.chosen(predicted(lines, request, kelvin, note)))
     reference = found.reference
     range_mhz = (float(reference.frequency_mhz.min()), float(reference.frequency_mhz.max()))
     return Compared(within(found, range_mhz, float(reference.lgint.min())), kelvin, source)
@@ -108,10 +73,10 @@ def read_catalogue(path: str) -> Catalogue:
     return read_cat(path)
 
 
-def temperature_of(file: str, given: str | None) -> tuple[float, str]:
+def temperature_of(file: str, given: float | None) -> tuple[float, str]:
     """The temperature of a catalogue's intensities in K, and where it is from: an option, the file beside it, the format."""
     if given is not None:
-        return inputs.positive("--temperature", given, "K"), "given (--temperature)"
+        return given, "given (--temperature)"
     beside = Path(f"{file}.provenance.json")
     if beside.is_file():
         try:
@@ -123,18 +88,18 @@ def temperature_of(file: str, given: str | None) -> tuple[float, str]:
     return FORMAT_K, "the format's"
 
 
-def predicted(lines: Catalogue, source: str, isotopes: Sequence[str] | None, kelvin: float) -> Catalogue:
+def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) -> Catalogue:
     """Lines of a molecule to the highest J of the catalogue, down to its weakest line and somewhat beyond its range."""
-    import rotor
     from rotor.formats.line_tables import catalogue
     from rotor.formats.spcat.compare import in_mhz
+    from rotor.spectra.lines import line_list
 
-    top = inputs.with_dipole(source, isotopes)
+    source = request.compare or ""
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
     frequency, _ = in_mhz(lines)
     reach = 1000.0 + 0.01 * float(frequency.max())  # lines that lie elsewhere with other constants are found too
-    made = rotor.api.line_list(
-        top,
+    made = line_list(
+        top_of_word(source, note, request.isotope, with_some_dipole),
         temperature_k=kelvin,
         jmax=highest,
         min_lgint=float(lines.lgint.min()) - 1.0,
@@ -143,21 +108,21 @@ def predicted(lines: Catalogue, source: str, isotopes: Sequence[str] | None, kel
     )
     note(f"{source}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")
     if not len(made):
-        raise ComputationError(f"--compare: {source} has no lines in the range of the catalogue")
+        raise NoAnswerError(f"--compare: {source} has no lines in the range of the catalogue")
     return catalogue(made)
 
 
 def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, Any]:
     """Matched, missing and extra lines and the differences, ours (OTHER) minus the catalogue."""
-    from rotor.formats.spcat.compare import agreement, likely_temperature_k
+    from rotor.formats.spcat.compare import agreement
 
     found = compared.comparison
     met = agreement(found)
-    record = {
+    return {
         "other": other,
         "temperature_k": compared.temperature_k,
         "temperature_source": compared.temperature_source,
-        "likely_temperature_k": likely_temperature_k(found, compared.temperature_k or FORMAT_K),
+        "likely_temperature_k": compared.likely_temperature_k,
         "spins_collapsed": found.collapsed,
         "matched": len(found.of_ours),
         "missing": len(found.missing),
@@ -169,15 +134,17 @@ def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, A
         "missing_lines": [line_record(found.reference, row) for row in found.missing[:shown].tolist()],
         "extra_lines": [line_record(found.ours, row) for row in found.extra[:shown].tolist()],
     }
-    _point_out_temperature(record)
-    return record
 
 
-def _point_out_temperature(record: dict[str, Any]) -> None:
-    kelvin, likely = record["temperature_k"], record["likely_temperature_k"]
-    if kelvin is not None and math.isfinite(likely) and abs(likely / kelvin - 1) > UNLIKE:
-        text = f"the intensities of the catalogue are most like those at {likely:.3g} K, not {kelvin:g} K"
-        note(f"{text}; if it was made at that temperature, give --temperature {likely:.3g}")
+def temperature_note(compared: Compared | None) -> list[str]:
+    """A remark where the intensities of a catalogue are like those at another temperature than that of the prediction."""
+    if compared is None or compared.temperature_k is None:
+        return []
+    kelvin, likely = compared.temperature_k, compared.likely_temperature_k
+    if not math.isfinite(likely) or abs(likely / kelvin - 1) <= UNLIKE:
+        return []
+    text = f"the intensities of the catalogue are most like those at {likely:.3g} K, not {kelvin:g} K"
+    return [f"{text}; if it was made at that temperature, give --temperature {likely:.3g}"]
 
 
 def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:

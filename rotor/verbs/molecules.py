@@ -8,11 +8,10 @@ from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rotor.cli.shared.inputs import json_option
-from rotor.cli.shared.options import argument, grouped
-from rotor.cli.shared.output import Files, Table, deliver, plain, show_facts, show_table
+from rotor.reports.screen import Table, plain, show_facts, show_table
+from rotor.requests.field import declared
+from rotor.requests.readers import Text
+from rotor.verbs.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile
@@ -28,32 +27,44 @@ Examples:
 
 
 @dataclass(frozen=True)
-class Options:
+class MoleculesRequest:
     """Which molecules are listed."""
 
-    name: str | None = argument(help="Only this one, with all its sources.")
-    json: str | None = json_option()
+    name: str | None = declared(None, Text(), "Only this one, with all its sources", option="NAME")
 
 
-@grouped()
-def command(context: typer.Context, options: Options) -> None:
-    """Molecules known by name: kind, κ, dipole, and where the numbers are from."""
-    files = Files.of(options)
-    whole = options.name is not None or options.json is not None
-    records = [record(path, symmetry=whole) for path in _paths(options.name)]
-    text = "[\n" + ",\n".join(dumps(one, ensure_ascii=False, allow_nan=False) for one in records) + "\n]\n"
-    deliver(files, {}, lambda: text, lambda: _show(records, alone=options.name is not None))
+@dataclass(frozen=True)
+class Molecules:
+    """A record for each molecule. alone: one that was named."""
+
+    records: list[dict[str, Any]]
+    alone: bool
+
+    def facts(self) -> dict[str, Any]:
+        """Nothing beside the records."""
+        return {}
 
 
-def _show(records: list[dict[str, Any]], alone: bool) -> None:
-    if alone:
-        show_facts(_facts(records[0]))
-    else:
-        show_table(
-            Table(
-                "", _COLUMNS, [_row(one) for one in records], frozenset({"name", "also", "kind", "unverified", "from"})
-            )
-        )
+def answer(request: MoleculesRequest, work: Work) -> Molecules:
+    """The records, with the symmetry of the geometries where it is shown."""
+    alone = request.name is not None
+    whole = alone or "json" in work.files
+    return Molecules([record(path, symmetry=whole) for path in _paths(request.name)], alone)
+
+
+def json_of(answer: Molecules, _: Any) -> str:
+    """A list with a record a line."""
+    lines = (dumps(one, ensure_ascii=False, allow_nan=False) for one in answer.records)
+    return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def show(answer: Molecules, _: Any) -> None:
+    """Print the table, or everything about one."""
+    if answer.alone:
+        show_facts(_facts(answer.records[0]))
+        return
+    left = frozenset({"name", "also", "kind", "unverified", "from"})
+    show_table(Table("", _COLUMNS, [_row(one) for one in answer.records], left))
 
 
 def _paths(name: str | None) -> list[Path]:
@@ -185,3 +196,14 @@ def _serves_text(serves: dict[str, Any]) -> str:
         else f"measured lines within {error:g} MHz and three of their errors"
     )
     return f"{', '.join(limits)}: {known}"
+
+
+VERB = Tool(
+    name="molecules",
+    about="Molecules known by name: kind, κ, dipole, and where the numbers are from.",
+    examples=EXAMPLES,
+    request=MoleculesRequest,
+    answer=answer,
+    text=json_of,
+    show=show,
+)

@@ -1,0 +1,242 @@
+"""`rotor cat`: a catalogue shown, filtered, drawn, with measured lines merged in, or compared with another list."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports.screen import Table, json_text, show_facts, show_table
+from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
+from rotor.verbs.comparing import (
+    Compared,
+    beside,
+    comparison_facts,
+    comparison_record,
+    line_record,
+    read_catalogue,
+    temperature_note,
+)
+from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+
+if TYPE_CHECKING:
+    from rotor.formats.spcat.text.catalogue import Catalogue
+
+EXAMPLES = """\b
+Examples:
+  rotor cat c018003.cat --range 0:1000GHz --min-lgint -5
+  rotor cat predicted.cat --measured c060503.cat.gz --out merged.cat
+  rotor cat c060503.cat.gz --compare OCS
+  rotor cat c052009.cat.gz --compare CH3Cl --isotope Cl=37Cl --plot difference.png
+  rotor cat case.cat --compare case.int --json difference.json"""
+
+
+COMPARED = "Comparison"
+
+
+@dataclass(frozen=True)
+class CatRequest:
+    """Which lines are shown, and what they are compared with."""
+
+    file: str = declared(REQUIRED, Text(metavar="FILE"), "Catalogue (.cat, .cat.gz)", option="FILE")
+    range_mhz: tuple[float, float] = declared(
+        INFINITE, Range("MHz"), "First and last frequency (MHz)", option="--range"
+    )
+    min_lgint: float | None = declared(
+        None,
+        Quantity(least=-300, most=300),
+        "Leave out lines with log10(nm² MHz) below",
+        option="--min-lgint",
+        none="none",
+    )
+    measured: str | None = declared(None, Text(metavar="FILE"), "Catalogue whose measured lines are merged in")
+    compare: str | None = declared(
+        None,
+        Text(metavar="OTHER"),
+        "Another .cat, an .int, or a molecule to predict: what differs in OTHER",
+        panel=COMPARED,
+    )
+    temperature: float | None = declared(
+        None,
+        Quantity("K", above=0, metavar="T"),
+        "Of the intensities of FILE, for a molecule (K; by default what FILE says, else 300)",
+        panel=COMPARED,
+    )
+    isotope: tuple[str, ...] = declared(
+        (),
+        Names("1=2H"),
+        "Another isotope of the molecule to predict, by atom number or element; repeatable",
+        panel=COMPARED,
+    )
+    as_spcat: bool = declared(
+        False,
+        Flag(),
+        "OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum",
+        panel=COMPARED,
+    )
+    full_basis: bool = declared(
+        False,
+        Flag(),
+        "OTHER, an .int, is predicted with every K in the basis, whatever KNMIN and KNMAX say",
+        panel=COMPARED,
+    )
+    top_lines: int = declared(20, Whole(0), "How many lines are shown", option="--top", panel=OUTPUT)
+
+    def __post_init__(self) -> None:
+        """--temperature and --isotope belong to a molecule that is predicted, --as-spcat and --full-basis to an .int file."""
+        check_fields(self)
+        other = (self.compare or "").lower()
+        for name in ("as_spcat", "full_basis"):
+            if getattr(self, name) and not other.endswith(".int"):
+                raise ValueError(f"{name}: expected with --compare and an .int file to predict")
+        for name in ("temperature", "isotope"):
+            if getattr(self, name) and (not other or other.endswith((".cat", ".cat.gz", ".int"))):
+                raise ValueError(f"{name}: expected with --compare and a molecule to predict; a file has its own")
+
+    def chosen(self, lines: Catalogue) -> Catalogue:
+        """The lines in the range and above the cut."""
+        import numpy as np
+
+        from rotor.formats.spcat.compare import in_mhz
+
+        frequency, _ = in_mhz(lines)
+        least = -np.inf if self.min_lgint is None else self.min_lgint
+        return lines.take((frequency >= self.range_mhz[0]) & (frequency <= self.range_mhz[1]) & (lines.lgint >= least))
+
+
+@dataclass(frozen=True)
+class CatAnswer:
+    """Lines, and how another list differs from them."""
+
+    request: CatRequest
+    lines: Catalogue
+    compared: Compared | None
+
+    def facts(self) -> dict[str, Any]:
+        """What the lines are, by the keys of docs/verbs."""
+        import numpy as np
+
+        from rotor.formats.spcat.compare import in_mhz
+
+        lines, (frequency, _) = self.lines, in_mhz(self.lines)
+        facts = {
+            "line_count": len(lines),
+            "measured": int(np.count_nonzero(lines.tag < 0)),
+            "tags": sorted({abs(tag) for tag in lines.tag.tolist()}),
+            "range_mhz": [frequency.min(), frequency.max()] if len(lines) else None,
+        }
+        if self.compared is not None:
+            other = ", ".join([self.request.compare or "", *self.request.isotope])
+            facts["compared"] = comparison_record(self.compared, other, self.request.top_lines)
+        return facts
+
+
+def answer(request: CatRequest, work: Work) -> CatAnswer:
+    """The lines that are left, and the comparison where one is requested."""
+    if request.compare is not None and work.view.vertical is not None:
+        raise ValueError("--plot-vertical: a comparison shows both lists whole; expected without --compare")
+    lines = request.chosen(read_catalogue(request.file))
+    if request.measured is not None:
+        from rotor.formats.spcat.compare import with_measured_lines
+
+        lines = with_measured_lines(lines, read_catalogue(request.measured))
+    return CatAnswer(request, lines, None if request.compare is None else beside(lines, request, work.note))
+
+
+def write_lines(answer: CatAnswer, path: Path, report: Report) -> None:
+    """The lines as a catalogue."""
+    from rotor.formats.spcat.text.cat import write_cat
+
+    write_cat(answer.lines, path)
+
+
+def draw(answer: CatAnswer, path: Path, report: Report) -> None:
+    """Sticks of the lines, measured ones in another colour; or both lists of a comparison, with the differences."""
+    name, command = Path(answer.request.file).name, str(report.content["command"])
+    if answer.compared is not None:
+        from rotor.plots.comparison import plot_comparison
+
+        names = name, Path(report.content["compared"]["other"]).name
+        plot_comparison(answer.compared.comparison, path, names=names, view=report.view, command=command)
+        return
+    from rotor.plots.catalogue import plot_catalogue
+
+    plot_catalogue(answer.lines, path, title=name, view=report.view, command=command)
+
+
+def json_of(answer: CatAnswer, content: dict[str, Any]) -> str:
+    """The facts with every line."""
+    return json_text({**content, "lines": [line_record(answer.lines, row) for row in range(len(answer.lines))]})
+
+
+def show(answer: CatAnswer, report: Report) -> None:
+    """Print what the lines are and the strongest of them, or what a comparison found."""
+    lines, content, shown = answer.lines, report.content, answer.request.top_lines
+    print(content["input"])
+    first, last = content["range_mhz"] or (math.nan, math.nan)
+    count = f"{len(lines)}, {content['measured']} of them measured"
+    show_facts(
+        [
+            ("lines", count + (f", from {first:.4f} to {last:.4f} MHz" if len(lines) else "")),
+            ("species", ", ".join(map(str, content["tags"])) or "none"),
+        ]
+    )
+    if answer.compared is None:
+        _show_strongest("", lines, shown)
+        return
+    print()
+    show_facts(comparison_facts(content["compared"]))
+    found = answer.compared.comparison
+    _show_strongest("missing there: ", found.reference.take(found.missing), shown)
+    _show_strongest("only there: ", found.ours.take(found.extra), shown)
+
+
+def _show_strongest(title: str, lines: Catalogue, shown: int) -> None:
+    if len(lines) and shown:
+        print()
+        table = _table(lines, shown)
+        show_table(replace(table, title=title + table.title))
+
+
+def _table(lines: Catalogue, shown: int) -> Table:
+    """The strongest lines in order of frequency."""
+    import numpy as np
+
+    from rotor.formats.spcat.compare import in_mhz
+
+    strongest = np.sort(np.argsort(-lines.lgint, kind="stable")[:shown])
+    frequency, error = in_mhz(lines)
+    rows = []
+    for row in strongest.tolist():
+        record = line_record(lines, row)
+        numbers = [f"{frequency[row]:.4f}", f"{error[row]:.4f}", f"{record['lgint']:.4f}"]
+        labels = [" ".join(f"{q:2d}" for q in record[side]) for side in ("quanta_upper", "quanta_lower")]
+        seen = "yes" if record["tag"] < 0 else ""
+        rows.append((*numbers, f"{record['energy_lower_cm']:.4f}", str(record["g_upper"]), seen, *labels))
+    columns = ("frequency (MHz)", "error", "lgint", 'E" (cm-1)', "g'", "measured", "upper", "lower")
+    title = "all lines" if len(rows) == len(lines) else f"the {len(rows)} strongest of {len(lines)} lines"
+    return Table(f"{title}, in order of frequency", columns, rows)
+
+
+VERB = Tool(
+    name="cat",
+    about="A catalogue as a table; or how another list differs from it.",
+    examples=EXAMPLES,
+    request=CatRequest,
+    of="file",
+    answer=answer,
+    table=lambda answer: answer.lines,
+    text=json_of,
+    show=show,
+    outputs=(
+        Output("out", (".cat", ".cat.gz"), "Write the lines that are left (.cat, .cat.gz)", write_lines),
+        Output("csv", (".csv",), "Write the lines that are left as CSV"),
+        Output("parquet", (".parquet",), "Write the lines that are left as Parquet"),
+        Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw),
+    ),
+    notes=lambda answer: temperature_note(answer.compared),
+    nothing=lambda answer: "" if len(answer.lines) else "no lines are left to draw",
+    drawn="MHz",
+)

@@ -1,0 +1,225 @@
+"""`rotor catalogue`: a local catalogue of lines in one file: add sources, list species, look into a range."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
+from rotor.verbs.verb import Output, Tool, Work
+
+if TYPE_CHECKING:
+    from rotor.table import Table as Columns
+
+ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
+EXAMPLES = """\b
+Examples:
+  rotor catalogue add cdms/ jpl/ library --catalogue lines.rotorcat
+  rotor catalogue add 1H2-16O__POKAZATEL.states --catalogue lines.rotorcat --licence "CC BY-SA 4.0"
+  rotor catalogue list --catalogue lines.rotorcat
+  rotor catalogue show CO "HC3N, v7=1" --catalogue lines.rotorcat --range 84:116GHz --csv lines.csv"""
+
+
+ADDED = "What is added"
+
+
+@dataclass(frozen=True)
+class CatalogueRequest:
+    """What is done with which catalogue."""
+
+    action: str = declared(REQUIRED, Text(ACTIONS), "add, list or show", option="ACTION")
+    words: tuple[str, ...] = declared(
+        (), Names(), "add: files (.cat, .states, .par), folders or 'library'; show: species, all without", option="WORD"
+    )
+    catalogue: str = declared("lines.rotorcat", Text(metavar="FILE"), "The catalogue")
+    catdir: str | None = declared(
+        None, Text(metavar="FILE"), "Table of species with Q(T); those beside .cat files", panel=ADDED
+    )
+    licence: str = declared("", Text(), "Licence of what is added", panel=ADDED)
+    citation: str = declared("", Text(), "Citation of what is added", panel=ADDED)
+    database: str = declared("", Text(metavar="NAME"), "Database of what is added", panel=ADDED)
+    range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Frequencies of show (MHz)", option="--range")
+    top_lines: int = declared(
+        20, Whole(0), "How many lines are shown, the strongest at 300 K", option="--top", panel=OUTPUT
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.action == ADD and not self.words:
+            raise ValueError("add: expected files, folders or 'library', such as 'rotor catalogue add cdms/ library'")
+
+
+@dataclass(frozen=True)
+class Added:
+    """Sources that were added to a catalogue, and faults of others."""
+
+    catalogue: str
+    added: list[Any]
+    faults: list[Any]
+
+    def facts(self) -> dict[str, Any]:
+        """Sources and faults, by the keys of docs/verbs."""
+        return {
+            "catalogue": self.catalogue,
+            "added": [{"source": one.source, "species": one.species, "lines": one.lines} for one in self.added],
+            "faults": [{"source": one.source, "fault": one.fault} for one in self.faults],
+        }
+
+    def show(self) -> None:
+        """Print how much was added."""
+        total = f"{sum(one.lines for one in self.added)} lines from {len(self.added)} sources"
+        show_facts([("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))])
+
+
+def add(request: CatalogueRequest, work: Work) -> Added:
+    """Add sources; faults are reported, and the others added."""
+    from rotor.formats.catalogue.build import SourceFacts, add_sources
+
+    facts = SourceFacts(request.database, request.licence, request.citation)
+    progress = (lambda name: print(f"\r{name[-70:]:70s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
+    report = add_sources(request.catalogue, request.words, facts, catdir=request.catdir, progress=progress)
+    if progress:
+        print(file=sys.stderr)
+    faults = [one for one in report if one.fault]
+    for one in faults:
+        work.note(f"left out: {one.fault}")
+    return Added(request.catalogue, [one for one in report if not one.fault], faults)
+
+
+@dataclass(frozen=True)
+class Listed:
+    """The species of a catalogue, and the number of its lines."""
+
+    catalogue: str
+    table: Columns
+    count: int
+
+    def facts(self) -> dict[str, Any]:
+        """A record for each species."""
+        columns = {name: column.tolist() for name, column in self.table.columns.items()}
+        records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        return {"catalogue": self.catalogue, "lines": self.count, "species": records}
+
+    def show(self) -> None:
+        """Print the species by name."""
+        names = ("name", "formula", "tag", "database", "lines", "source", "date")
+        rows = [tuple(map(str, row)) for row in zip(*(self.table.columns[name] for name in names), strict=True)]
+        show_facts([("catalogue", self.catalogue), ("lines", str(self.count)), ("species", str(len(rows)))])
+        if rows:
+            print()
+            show_table(Table("species, by name", names, rows, frozenset({*names} - {"tag", "lines"})))
+
+
+def list_species(request: CatalogueRequest, work: Work) -> Listed:
+    """The species of the catalogue."""
+    from rotor.formats.catalogue.database import LineCatalogue
+
+    with LineCatalogue(request.catalogue) as catalogue:
+        return Listed(request.catalogue, catalogue.species(), len(catalogue))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Lines of a range, rising in frequency."""
+
+    request: CatalogueRequest
+    rows: list[tuple[Any, ...]]
+    species: int
+
+    def facts(self) -> dict[str, Any]:
+        """A record for each line."""
+        lines = [dict(zip(_COLUMNS, row, strict=True)) for row in self.rows]
+        return {"catalogue": self.request.catalogue, "lines": lines}
+
+    def show(self) -> None:
+        """Print the strongest at 300 K in order of frequency."""
+        show_facts([("catalogue", self.request.catalogue), ("lines", f"{len(self.rows)} of {self.species} species")])
+        if self.rows and self.request.top_lines:
+            print()
+            show_table(_table(self.rows, self.request.top_lines))
+
+
+def find_lines(request: CatalogueRequest, work: Work) -> Found:
+    """Lines of a range."""
+    from rotor.formats.catalogue.database import LineCatalogue
+
+    with LineCatalogue(request.catalogue) as catalogue:
+        species = catalogue.species_between(*request.range_mhz, list(request.words))
+    return Found(request, _line_rows(species), len(species))
+
+
+_COLUMNS = (
+    "species",
+    "frequency_mhz",
+    "error_mhz",
+    "log_intensity_300k",
+    "energy_lower_k",
+    "g_upper",
+    "einstein_a_per_s",
+    "upper",
+    "lower",
+)
+
+
+def _line_rows(species: Sequence[Any]) -> list[tuple[Any, ...]]:
+    """A row for each line, rising in frequency."""
+    import numpy as np
+
+    rows: list[tuple[Any, ...]] = []
+    for one in species:
+        low, high = one.partition.range_k
+        intensity = np.log10(one.intensity_nm2_mhz(min(max(300.0, low), high)))
+        numbers = (one.frequency_mhz, one.error_mhz, intensity, one.energy_lower_k, one.g_upper, one.einstein_a_per_s)
+        texts = (one.upper.tolist(), one.lower.tolist())
+        rows += [(one.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
+    return sorted(rows, key=lambda row: row[1])
+
+
+def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
+    strongest = sorted(sorted(range(len(rows)), key=lambda i: -rows[i][3])[:shown])
+    cells = [
+        (r[0], f"{r[1]:.4f}", f"{r[2]:.4f}", f"{r[3]:.4f}", f"{r[4]:.2f}", f"{r[5]:g}", f"{r[6]:.3e}", r[7], r[8])
+        for r in (rows[i] for i in strongest)
+    ]
+    heads = ("species", "frequency (MHz)", "error", "lg I(300 K)", "E_l (K)", "g_u", "A (1/s)", "upper", "lower")
+    title = "all lines" if len(cells) == len(rows) else f"the {len(cells)} strongest of {len(rows)} lines"
+    return Table(f"{title}, in order of frequency", heads, cells, frozenset({"species"}))
+
+
+def write_csv(answer: Listed | Found, path: Path, _: Any) -> None:
+    """The species, or the lines."""
+    if isinstance(answer, Listed):
+        from rotor.formats import write
+
+        write(answer.table, path)
+        return
+    with path.open("w", encoding="utf-8", newline="") as handle:
+        writer = csv.writer(handle, lineterminator="\n")
+        writer.writerow(_COLUMNS)
+        writer.writerows(answer.rows)
+
+
+def check(request: CatalogueRequest, outputs: Any, _: Any) -> None:
+    """ValueError for a table of what adds."""
+    if request.action == ADD and "csv" in outputs:
+        raise ValueError("--csv: writes what list and show print; expected without add")
+
+
+VERB = Tool(
+    name="catalogue",
+    about="A local catalogue of spectral lines: add sources, list its species, show lines of a range.",
+    examples=EXAMPLES,
+    request=CatalogueRequest,
+    of="catalogue",
+    answer=lambda request, work: {ADD: add, LIST: list_species, SHOW: find_lines}[request.action](request, work),
+    show=lambda answer, report: answer.show(),
+    outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV", write_csv),),
+    check=check,
+    stepwise=True,
+)

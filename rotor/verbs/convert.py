@@ -1,0 +1,236 @@
+"""`rotor convert`: constants from one format into another, SPFIT's files to TOML and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.readers import Text, Whole
+from rotor.tops.facts import top_facts
+from rotor.verbs.molecule import refuse_weights_of_another_kind
+from rotor.verbs.subjects import top_of_word
+from rotor.verbs.verb import Note, Output, Tool, Work, silent
+
+if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+    from rotor.formats.spcat.text.int_file import IntensityFile
+    from rotor.tops.top import Top
+
+EXAMPLES = """\b
+Examples:
+  rotor convert case.var constants.toml
+  rotor convert constants.toml case.par --kmax 60
+  rotor convert water water.var
+  rotor convert NH3 ammonia.par && rotor convert NH3 ammonia.int"""
+
+
+@dataclass(frozen=True)
+class ConvertRequest:
+    """What is read, and how far a file of SPFIT goes."""
+
+    source: str = declared(REQUIRED, Text(), "File (.par, .var, .int, .toml, ...) or name", option="SOURCE")
+    kmax: int = declared(99, Whole(0, 359), "Highest K of a .par or .var (KNMAX), highest F of an .int", panel=OUTPUT)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Converted:
+    """The top of the source, and what writes it. target: the file as named."""
+
+    request: ConvertRequest
+    top: Top
+    target: str
+    write: Callable[[Path], None]
+
+    def facts(self) -> dict[str, Any]:
+        """The top, as `rotor info` states it."""
+        return top_facts(self.top)
+
+
+def answer(request: ConvertRequest, work: Work) -> Converted:
+    """Read the source, and see that the target can hold it."""
+    target = str(work.files["target"][0])
+    top = top_with_errors(request.source, work.note)
+    write = writer_of(top, request, target, work.note)
+    for text in lost_options(top, request, target):
+        work.note(text)
+    return Converted(request, top, target, write)
+
+
+def _further(top: Top) -> str:
+    """What goes with the constants of the first state, in words."""
+    states = f"; {top.states.count} states" if top.states else ""
+    spins = f"; spins {', '.join(top.spin_constants.twice)}" if top.spin_constants else ""
+    return states + spins
+
+
+def refuse_overwriting(request: ConvertRequest, outputs: Mapping[str, Any], _: Any) -> None:
+    """The .var, .par and .int beside an .int, which are read with it, are not written over."""
+    source, target = Path(request.source), outputs["target"][0]
+    beside = [source.with_suffix(suffix) for suffix in (".var", ".par")] if source.suffix.lower() == ".int" else []
+    if source.is_file() and target.resolve() in {one.resolve() for one in beside}:
+        raise ValueError(f"TARGET {target}: is an input of this command; write the result under another name")
+
+
+def parameters_of(source: str) -> Path:
+    """The file of a source, for an .int file that of the parameters beside it."""
+    path = Path(source)
+    if path.suffix.lower() != ".int":
+        return path
+    from rotor.formats.spcat.predict import parameters_beside
+
+    return parameters_beside(path)
+
+
+def top_with_errors(source: str, note: Note = silent) -> Top:
+    """The top a source means; of a .var file the errors of its parameters are the constants' uncertainties."""
+    path = parameters_of(source)
+    if path.suffix.lower() != ".var" or not path.exists():
+        return top_of_word(source, note)
+
+    from rotor.formats.read_write import read_spcat_top
+    from rotor.formats.spcat.hamiltonian.codes import constants_of
+    from rotor.formats.spcat.hamiltonian.states import has_one_state
+    from rotor.formats.spcat.text.par import read_par
+
+    file, top = read_par(path), read_spcat_top(path, errors=True)
+    return replace(top, constants=constants_of(file, errors=True)) if has_one_state(file) else top
+
+
+def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:
+    """What writes the top in the format that the target's suffix names; what that cannot say is refused or noted."""
+    suffix = Path(target).suffix
+    if suffix.lower() == ".toml":
+        from rotor.formats.molecules.molecule_writer import write_molecule_file
+
+        file = molecule_file(top, request.source, Path(target).stem)
+        return lambda path: write_molecule_file(file, path)
+
+    from rotor.tops.top import without_internal_rotation
+
+    without_internal_rotation(top, f"a {suffix} file")
+    if top.level_table is not None:
+        note(f"a {suffix} file has no place for the table of level energies, which count before the constants")
+    if suffix.lower() == ".int":
+        from rotor.formats.spcat.text.int_file import write_int
+
+        intensities = _intensities(top, request.kmax)
+        return lambda path: write_int(intensities, path)
+
+    from rotor.formats.spcat.names.named_parameters import named_parameter_file
+    from rotor.formats.spcat.text.par import write_par
+
+    moments = [top.dipole_abc_debye or (0.0, 0.0, 0.0), *(top.states.dipoles.values() if top.states else ())]
+    if any(map(any, moments)):
+        dipole = ", ".join(f"{mu:g}" for mu in moments[0])
+        note(f"a {suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
+    parameters = named_parameter_file(top, request.kmax)
+    return lambda path: write_par(parameters, path)
+
+
+def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
+    """The file of a top; ValueError where it would be refused when it is read. stem: its name, where the top has none."""
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+
+    sources = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
+    sources = {table: text or f"converted from {Path(source).name}" for table, text in sources.items()}
+    if not top.dipole_abc_debye:
+        del sources["dipole"]
+    file = MoleculeFile(
+        name=top.name or stem,
+        constants=top.constants,
+        covariance=top.covariance,
+        dipole_abc_debye=top.dipole_abc_debye,
+        spin_weights=top.spin_weights,
+        states=top.states,
+        internal_rotation=top.internal_rotation,
+        spin_constants=top.spin_constants,
+        polarizability_abc_angstrom3=top.polarizability_abc_angstrom3,
+        magnetic=top.magnetic,
+        sources=sources,
+    )
+    _refuse_unreadable(file, source)
+    return file
+
+
+def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
+    """ValueError where a .toml of this top would be refused when read, as for dipoles or couplings that the spin weights forbid."""
+    from rotor.formats.molecules.molecule_file import parse_molecule_file
+    from rotor.formats.molecules.molecule_writer import molecule_file_text
+    from rotor.formats.read_write import top_of_file
+    from rotor.quantum.effects.of_top import effects_of
+
+    try:
+        top = top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
+        refuse_weights_of_another_kind(top)
+        if top.spin_constants is not None:
+            effects_of(top, True)  # weights that count a total spin of the file a second time
+    except ValueError as reason:
+        raise ValueError(
+            f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "
+            "that joins levels of unlike weight makes no line unless they mix), or predict from the files themselves"
+        ) from None
+
+
+def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
+    """A remark on what of the options of SPFIT's files is not taken along and comes back otherwise: DIAG, KNMAX, NLINE."""
+    path = parameters_of(request.source)
+    if path.suffix.lower() not in (".par", ".var") or not path.is_file() or target.lower().endswith(".int"):
+        return []
+    from rotor.formats.spcat.text.par import read_par
+
+    file, kind = read_par(path), top.constants.kind
+    kmax = 0 if kind == "linear" else request.kmax
+    written = {"DIAG": 3 if kind == "asymmetric" else 0, "KNMAX": kmax, "NLINE": 1}
+    knmax = min(line.knmax for line in file.options)
+    given = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": file.header.nline}
+    lost = [f"{name} = {value}" for name, value in given.items() if value != written[name]]
+    if not lost:
+        return []
+    others = ", ".join(f"{name} = {value}" for name, value in written.items())
+    what = "are not part of a .toml" if target.lower().endswith(".toml") else "are not taken along"
+    return [
+        f"{', '.join(lost)} of {path.name} {what}: a .par or .var written of these constants has {others}; "
+        "K above KNMAX is left out by SPCAT (--kmax)"
+    ]
+
+
+def _intensities(top: Top, highest: int) -> IntensityFile:
+    """The .int file at 300 K, F to `highest`, with Q summed over the levels and spins of the top."""
+    from rotor.formats.spcat.model import intensity_file
+    from rotor.formats.spcat.text.int_file import Request
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.thermodynamics import partition_function
+
+    count = top.states.count if top.states else 1
+    q = partition_function(top, 300.0, effects=effects_of(top, bool(top.spin_constants))).q
+    request = Request(tag=0, qrot=q, fend=min(highest, 99), str0=-12.0, str1=-12.0, maxv=count - 1)
+    return intensity_file(top, request)
+
+
+def show(answer: Converted, _: Any) -> None:
+    """Print what was written."""
+    print(f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}")
+
+
+VERB = Tool(
+    name="convert",
+    about="Constants, spins, states, dipoles and weights into another format; nothing is converted but the format.",
+    examples=EXAMPLES,
+    request=ConvertRequest,
+    of="source",
+    answer=answer,
+    show=show,
+    outputs=(
+        Output(
+            "target", (".toml", ".par", ".var", ".int"), "File to write: .toml, .par, .var or .int",
+            lambda answer, path, report: answer.write(path), option="TARGET", required=True,
+        ),
+    ),
+    check=refuse_overwriting,
+)  # fmt: skip

@@ -1,0 +1,198 @@
+"""`rotor identify`: which species an observed spectrum needs, ranked by evidence, and the lines that stay unidentified."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
+from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
+from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
+from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+
+if TYPE_CHECKING:
+    from rotor.observed.identify import Identification
+    from rotor.observed.model import Sight
+    from rotor.observed.species import SpeciesLines
+    from rotor.observed.spectrum import ObservedSpectrum
+
+EXAMPLES = """\b
+Examples:
+  rotor identify spectrum.fits --catalogue lines.rotorcat --plot pages.pdf
+  rotor identify spectrum.txt --catalogue cdms/ --velocity 2.7 --width 1 --beam 0.5 --size 0.5
+  rotor identify cube.fits --pixel 32,40 --catalogue lines.rotorcat --json -"""
+
+
+@dataclass(frozen=True)
+class IdentifyRequest:
+    """The spectrum, the candidates, and how they are looked for."""
+
+    file: str = declared(REQUIRED, Text(), "Spectrum: FITS or text", option="FILE")
+    catalogue: tuple[str, ...] = declared(
+        (), Names("FILE"), "Local catalogue, folder of .cat, or .cat; repeatable", option="--catalogue"
+    )
+    range_mhz: tuple[float, float] = declared(
+        INFINITE, Range("MHz"), "Frequencies that are used (MHz)", option="--range"
+    )
+    velocity_km_s: float | None = declared(
+        None,
+        Quantity("km/s", metavar="V"),
+        "Velocity of the source (km/s); estimated without",
+        option="--velocity",
+        panel=CONDITIONS,
+    )
+    fwhm_km_s: float | None = declared(
+        None,
+        Quantity("km/s", metavar="W"),
+        "Full width of the lines (km/s); estimated without",
+        option="--width",
+        panel=CONDITIONS,
+    )
+    background_k: float = declared(
+        2.725, Quantity("K", metavar="T"), "Temperature behind the source (K)", option="--background", panel=CONDITIONS
+    )
+    redshift: float = declared(0.0, Quantity(metavar="Z"), "Redshift of the source", panel=CONDITIONS)
+    model_error: float = declared(0.1, Quantity(least=0, most=1), "Error of the model as a fraction of the brightness")
+    most: int = declared(60, Whole(1), "Species at most")
+    spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not self.catalogue:
+            raise ValueError(
+                "catalogue: expected a local catalogue ('rotor catalogue add'), a folder of .cat files, or a .cat file"
+            )
+
+
+@dataclass(frozen=True)
+class Identified:
+    """The spectrum, and the species that it needs."""
+
+    observed: ObservedSpectrum
+    sight: Sight
+    found: Identification
+
+    def facts(self) -> dict[str, Any]:
+        """Spectrum and species, by the keys of docs/verbs."""
+        return {"spectrum": json_of(self.observed), **self.found.facts()}
+
+
+def answer(request: IdentifyRequest, work: Work) -> Identified:
+    """The species by evidence."""
+    from rotor.observed.identify import IdentifyChoices, identify
+
+    choices = IdentifyChoices(
+        velocity_km_s=request.velocity_km_s,
+        fwhm_km_s=request.fwhm_km_s,
+        model_error=request.model_error,
+        most_species=request.most,
+        size_arcsec=request.spectrum.size_arcsec,
+    )
+    observed = request.spectrum.read(request.file, request.range_mhz)
+    sight = request.spectrum.sight(observed, request.background_k, request.redshift)
+    candidates = _candidates(request.catalogue, padded(observed, request.redshift))
+    progress = (lambda name: print(f"\r{name[:60]:60s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
+    found = identify(observed, candidates, sight, choices, progress=progress)
+    if progress:
+        print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
+    return Identified(observed, sight, found)
+
+
+def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
+    """Species with lines in the range, of catalogues, folders and files."""
+    from rotor.formats.catalogue.cat_species import read_cat_species
+    from rotor.formats.catalogue.catdir import is_catdir
+    from rotor.formats.catalogue.database import LineCatalogue
+
+    out: list[SpeciesLines] = []
+    for source in sources:
+        path = Path(source)
+        if not path.exists():
+            raise ValueError(f"--catalogue {source}: no such file or folder")
+        if path.is_dir() or path.name.lower().endswith((".cat", ".cat.gz")):
+            every = sorted(path.rglob("*.cat*")) if path.is_dir() else [path]
+            species = [read_cat_species(file) for file in every if not is_catdir(file)]
+            out += [one.between(*range_mhz) for one in species if len(one.between(*range_mhz))]
+            if path.is_dir() and not every:
+                raise ValueError(f"--catalogue {source}: no .cat file in this folder")
+        else:
+            with LineCatalogue(path) as catalogue:
+                out += catalogue.species_between(*range_mhz)
+    return out
+
+
+def draw(answer: Identified, path: Path, report: Report) -> None:
+    """Pages with the fitted model."""
+    from rotor.plots.overlay import plot_overlay
+
+    components = [one.component for one in answer.found.species]
+    marked = [one.frequency_mhz for one in answer.found.unidentified]
+    plot_overlay(
+        answer.observed, components, path, sight=answer.sight, unidentified_mhz=marked, provenance=report.command
+    )
+
+
+def show(answer: Identified, _: Report) -> None:
+    """Print the spectrum, the species by evidence and the unidentified lines."""
+    show_facts(spectrum_facts(answer.observed))
+    found = answer.found
+    chi = "" if found.fit is None else f", χ²/ν = {found.fit.reduced_chi_squared:.3g}"
+    show_facts(
+        [
+            ("candidates", str(found.candidates)),
+            ("begun with", f"velocity {found.velocity_km_s:.2f} km/s, width {found.fwhm_km_s:.2f} km/s"),
+            ("species", f"{len(found.species)}{chi}"),
+        ]
+    )
+    if found.species:
+        print()
+        show_table(_species_table(found))
+    print()
+    if not found.unidentified:
+        print("no unidentified line above 5 standard deviations")
+        return
+    rows = [
+        (f"{one.frequency_mhz:.3f}", f"{one.peak_k:.3g}", f"{one.deviations:.1f}", ", ".join(one.candidates) or "none")
+        for one in sorted(found.unidentified, key=lambda one: one.frequency_mhz)
+    ]
+    heads = ("frequency (MHz)", "T_B (K)", "σ", "candidates with a line there")
+    show_table(Table(f"{len(rows)} unidentified lines", heads, rows, frozenset({"candidates with a line there"})))
+
+
+def _species_table(found: Identification) -> Table:
+    rows = [
+        (
+            one.component.species.name,
+            f"{one.signal:.0f}",
+            f"{one.visible}/{one.expected}",
+            f"{one.component.column_per_cm2:.2e}",
+            f"{one.component.excitation_k:.0f}",
+            f"{one.component.velocity_km_s:.2f}",
+            f"{one.component.fwhm_km_s:.2f}",
+            ", ".join(one.rivals),
+        )
+        for one in found.species
+    ]
+    heads = ("species", "Δχ²", "lines seen", "N (1/cm²)", "T (K)", "v (km/s)", "Δv (km/s)", "or")
+    return Table("species by evidence", heads, rows, frozenset({"species", "or"}))
+
+
+VERB = Tool(
+    name="identify",
+    about="Which species an observed spectrum needs, by evidence; unidentified lines.",
+    examples=EXAMPLES,
+    request=IdentifyRequest,
+    of="file",
+    answer=answer,
+    table=lambda answer: answer.found,
+    show=show,
+    outputs=(
+        Output("csv", (".csv",), "Write the species as CSV"),
+        Output("plot", PICTURES, "Draw pages of panels with the model over the spectrum", draw),
+    ),
+    stepwise=True,
+)

@@ -1,0 +1,196 @@
+"""Options of verbs that read an observed spectrum, and what they make of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.requests.field import CONDITIONS, declared
+from rotor.requests.readers import INFINITE, Names, Numbers, Quantity, Text, Whole
+from rotor.verbs.molecule import with_some_dipole
+from rotor.verbs.subjects import top_of_word
+from rotor.verbs.verb import Note, silent
+
+if TYPE_CHECKING:
+    from rotor.observed.model import Sight
+    from rotor.observed.species import SpeciesLines
+    from rotor.observed.spectrum import ObservedSpectrum
+
+PANEL = "Observed spectrum"
+
+
+@dataclass(frozen=True)
+class SeveralInput:
+    """Which molecules, on the command line."""
+
+    names: tuple[str, ...] = declared(
+        (), Names(), "Molecules: names, files, SMILES:..., .cat files of JPL and CDMS", option="SOURCE"
+    )
+    partition: str | None = declared(
+        None, Text(metavar="FILE"), "Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", option="--partition",
+        panel=CONDITIONS,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpectrumFile:
+    """What the file of a spectrum does not state, and what is done before it is used."""
+
+    rest_mhz: float | None = declared(
+        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
+    )
+    unit: str | None = declared(
+        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam", panel=PANEL
+    )
+    axis_unit: str | None = declared(
+        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, km/s", panel=PANEL
+    )
+    frame: str | None = declared(
+        None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE", panel=PANEL
+    )
+    noise: float | None = declared(
+        None, Quantity(), "Noise of a channel; estimated from line-free channels", panel=PANEL
+    )
+    beam_arcsec: tuple[float, ...] | None = declared(
+        None,
+        Numbers("arcsec", (1, 2), "30 or 30,25", metavar="A[,B]"),
+        "Widths of the beam at half maximum (arcsec)",
+        option="--beam",
+        panel=PANEL,
+    )
+    size_arcsec: float | None = declared(
+        None, Quantity("arcsec", metavar="A"), "Width of the source at half maximum (arcsec); needs --beam", option="--size",
+        panel=PANEL,
+    )  # fmt: skip
+    baseline: int | None = declared(None, Whole(0), "Subtract a baseline of this order", panel=PANEL)
+    row: int | None = declared(None, Whole(), "Which spectrum of a table, from 1", panel=PANEL)
+    pixel: tuple[float, ...] | None = declared(
+        None, Numbers(counts=(2,), example="32,40", metavar="X,Y"), "Which spectrum of a cube, from 1", panel=PANEL
+    )
+
+    @property
+    def beam(self) -> tuple[float, float] | None:
+        """Both widths of the beam."""
+        return None if self.beam_arcsec is None else (self.beam_arcsec[0], self.beam_arcsec[-1])
+
+    def read(self, file: str, range_mhz: tuple[float, float] = INFINITE) -> ObservedSpectrum:
+        """The spectrum in K, its baseline subtracted, and cut to a range."""
+        from rotor.formats.spectra.axis import ReadChoices
+        from rotor.formats.spectra.read import read_spectrum
+        from rotor.observed.spectrum import in_kelvin, without_baseline
+
+        pixel = None if self.pixel is None else (int(self.pixel[0]), int(self.pixel[1]))
+        choices = ReadChoices(
+            axis_unit=self.axis_unit,
+            unit=self.unit,
+            rest_mhz=self.rest_mhz,
+            frame=self.frame,
+            noise=self.noise,
+            beam_arcsec=self.beam,
+            row=self.row,
+            pixel=pixel,
+        )
+        spectrum = in_kelvin(read_spectrum(file, choices), self.beam)
+        if range_mhz != INFINITE:
+            spectrum = spectrum.between(*range_mhz)
+        return spectrum if self.baseline is None else without_baseline(spectrum, self.baseline)
+
+    def sight(self, spectrum: ObservedSpectrum, background_k: float, redshift: float) -> Sight:
+        """What is between the source and the spectrum."""
+        from rotor.observed.model import Sight
+
+        beam = spectrum.beam_arcsec or self.beam
+        return Sight(background_k, None if beam is None else (beam[0] * beam[1]) ** 0.5, redshift)
+
+
+def species_of(
+    words: Sequence[str],
+    catalogue: str | None,
+    range_mhz: tuple[float, float],
+    partition: str | None = None,
+    note: Note = silent,
+) -> list[SpeciesLines]:
+    """Species by words: .cat files, names of a local catalogue where one is given, else molecules of the library; one each.
+
+    Raises ValueError for a word that means several species of the catalogue.
+    """
+    if catalogue is None:
+        return [_species_of_word(word, range_mhz, partition, note) for word in words]
+    from rotor.formats.catalogue.database import LineCatalogue
+
+    out = []
+    with LineCatalogue(catalogue) as opened:
+        for word in words:
+            if is_catalogue(word):
+                out.append(_species_of_word(word, range_mhz, partition, note))
+                continue
+            matches = opened.species_between(*range_mhz, [word])
+            if len(matches) != 1:
+                listed = ", ".join(
+                    f"{one.identity.get('tag', '')} {one.name} ({one.identity.get('database', '')})"
+                    for one in matches[:6]
+                )
+                raise ValueError(
+                    f"{word}: {len(matches)} species of {catalogue} with lines in the range: {listed}; name one by its tag or full name"
+                )
+            out += matches
+    return out
+
+
+def is_catalogue(source: Any) -> bool:
+    """Whether a source is a catalogue of lines."""
+    return isinstance(source, str) and source.lower().endswith((".cat", ".cat.gz"))
+
+
+def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str | None, note: Note) -> SpeciesLines:
+    if is_catalogue(word):
+        from rotor.formats.catalogue.cat_species import read_cat_with
+
+        if not Path(word).is_file():
+            raise ValueError(f"{word}: no such file")
+        return read_cat_with(Path(word), partition)
+    from rotor.observed.species import species_of_lines
+    from rotor.spectra.lines import line_list
+
+    top = top_of_word(word, note, prepare=with_some_dipole)
+    lines = line_list(top, temperature_k=300.0, min_lgint=-12.0, range_mhz=range_mhz)
+    return species_of_lines(lines, top.name or word)
+
+
+def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.0) -> tuple[float, float]:
+    """Rest frequencies whose lines may be in a spectrum: its range and what velocities may move into it."""
+    factor = km_s / 299792.458
+    first, last = (float(spectrum.frequency_mhz[i]) * (1 + redshift) for i in (0, -1))
+    return first * (1 - factor), last * (1 + factor)
+
+
+def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
+    """The spectrum as lines of a report."""
+    import numpy as np
+
+    first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]
+    rows = [
+        (
+            "spectrum",
+            f"{spectrum.source}: {len(spectrum)} channels from {first:.6f} to {last:.6f} MHz, frame {spectrum.frame}",
+        ),
+        ("noise", f"{float(np.median(spectrum.noise)):.4g} {spectrum.unit} a channel"),
+    ]
+    return rows + [("", text) for text in spectrum.notes]
+
+
+def json_of(spectrum: ObservedSpectrum) -> dict[str, Any]:
+    """The spectrum by the keys of docs/verbs."""
+    import numpy as np
+
+    return {
+        "source": spectrum.source,
+        "channels": len(spectrum),
+        "range_mhz": [float(spectrum.frequency_mhz[0]), float(spectrum.frequency_mhz[-1])],
+        "frame": spectrum.frame,
+        "noise_k": float(np.median(spectrum.noise)),
+        "beam_arcsec": None if spectrum.beam_arcsec is None else list(spectrum.beam_arcsec),
+        "notes": list(spectrum.notes),
+    }
