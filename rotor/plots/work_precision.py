@@ -114,7 +114,7 @@ def _draw(axes: Any, panel: Panel) -> list[Places]:
         drawn.append(list(zip(curve, errors, strict=True)))
     axes.set(xscale="log", yscale="log", xlabel="processor time (s)", ylabel=f"error of {panel.of}")
     axes.margins(x=0.25, y=0.15)
-    _at_least_a_decade(axes)
+    _scale(axes)
     if any(point.error == 0.0 for point in points):
         axes.text(0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=6.5, color=GREY)
     axes.set_title(panel.title, loc="left")
@@ -133,17 +133,25 @@ def _legend_above(axes: Any, count: int) -> None:
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=6 + 12 * math.ceil(count / columns))
 
 
-def _at_least_a_decade(axes: Any) -> None:
-    """Times that are alike stay alike: the axis of time spans a factor of ten at least, with labels at powers of ten and few others."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
+def _scale(axes: Any) -> None:
+    """Times that are alike stay alike: the axis of time spans a factor of ten at least."""
     low, high = axes.get_xlim()
     if high < 10.0 * low:
         middle = math.sqrt(low * high)
         axes.set_xlim(middle / math.sqrt(10.0), middle * math.sqrt(10.0))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(numticks=8))
-        axis.set_minor_formatter(NullFormatter())
+    _label(axes.xaxis, axes.get_xlim())
+    _label(axes.yaxis, axes.get_ylim())
+
+
+def _label(axis: Any, limits: tuple[float, float]) -> None:
+    """Label powers of ten, and 2 and 5 times these where the axis spans less than two decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    short = limits[1] < 100.0 * limits[0]
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if short else (1.0,), numticks=8))
+    if short:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str, str], joined: bool) -> list[float]:

@@ -32,6 +32,7 @@ SHORT_SECONDS, ROUNDS = 1.0, 5  # settings that are shorter are timed in so many
 KNOWN_SECONDS = 0.1  # below which one call does not say how much longer the next one takes
 LEAST_SCATTER = 0.1  # of a time: processor time depends on what else uses memory and caches
 LEAST_SECONDS = 5e-3  # of one timing: shorter calls are repeated in it
+JUMP = 8.0  # a setting that takes so many times as long as the coarser one may have compiled a kernel
 COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated
 USUAL_LIMIT = 120.0  # seconds of processor time for all knobs together
 
@@ -173,7 +174,8 @@ def sweep(
             break
         progress(knob.name, setting.label)
         try:
-            answer, seconds, both = timed(lambda asked=setting.request: knob.answer(asked), warm=bool(done))  # type: ignore[misc]
+            usual = done[-1][2] if done else None
+            answer, seconds, both = timed(lambda asked=setting.request: knob.answer(asked), usual)  # type: ignore[misc]
         except ValueError as error:
             refused.append(setting.label)
             why = str(error)
@@ -208,13 +210,15 @@ def _next_seconds(taken: list[float]) -> float:
     return taken[-1] * max(taken[-1] / taken[-2], 1.0)
 
 
-def timed(call: Callable[[], Any], warm: bool = True) -> tuple[Any, float, float]:
+def timed(call: Callable[[], Any], usual: float | None = 0.0) -> tuple[Any, float, float]:
     """The answer of a call, its processor time in seconds, and that of all calls that were made.
 
-    warm: False where the call may load modules or compile; a short one is made once more then, and the first time does not count.
+    usual: seconds of the coarser setting, None for the first one, 0 where a single call is enough. A call may load modules or compile
+    if it is the first one or takes JUMP times as long as the coarser setting; it is made once more then, and its first time does not count.
     """
     answer, first = _once(call)
-    if warm or first >= COMPILING_SECONDS:
+    compiles = usual is None or (usual > 0 and first > max(JUMP * usual, KNOWN_SECONDS))
+    if not compiles or first >= COMPILING_SECONDS:
         return answer, first, first
     answer, again = _once(call)
     return answer, again, first + again
