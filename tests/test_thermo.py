@@ -243,3 +243,14 @@ def test_weights_that_alternate_with_j_do_not_stop_the_sum(constants, weights):
     top = Top.from_constants(constants, spin_weights=weights)
     found = partition_function(top, 300.0)
     assert found.q == pytest.approx(classical_partition_function(top, 300.0), rel=0.01)  # quantum correction ~ B/kT
+
+
+def test_a_looser_error_costs_no_sum_that_a_tighter_one_does_without():
+    """Glycolaldehyde at 100 K: the limit with corrections serves errors to 1e-4, so it serves 0.1 too, where the sum would be short."""
+    from rotor.thermodynamics.level_sums import NOT_SUMMED, level_sums
+
+    top = rotor.read("CH2OHCHO")
+    for error in (1e-1, 1e-2, 1e-3, 1e-4):
+        sums = level_sums(top, [top.spin_weights], [10.0, 100.0], error)[0]
+        assert sums.jmax[0] > 0
+        assert sums.jmax[1] == NOT_SUMMED

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 STRIDE = 8  # J are solved by so many at a time
 LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
+LOOSE = 1e-3  # a looser error makes sums shorter, which is no reason to sum what the limit gave for a tighter one
 MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
 MOST_J_DISTORTED = {
     "asymmetric": 800
@@ -150,7 +151,8 @@ def level_sums(
     longest = ladder.longest
     expected = _last_j(top, temperatures, relative_error)
     errors = np.array([classical_limit(top, each).errors(temperatures)[:kinds].max(axis=0) for each in weights])
-    limit_serves = (expected > LONG_SUM) & (errors <= relative_error) | (expected > longest) & (errors <= at_worst)
+    long_sum = _last_j(top, temperatures, min(relative_error, LOOSE)) > LONG_SUM
+    limit_serves = long_sum & (errors <= relative_error) | (expected > longest) & (errors <= at_worst)
     limit_serves &= ladder.semi_rigid
     ladder.reach(temperatures[~limit_serves.all(axis=0)].max(initial=0.0))
     sums = []
