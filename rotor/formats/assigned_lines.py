@@ -9,7 +9,7 @@ error behind each other are a blend, as in a .lin), `excluded` (yes for a line t
 components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Lines in an electric field have `m_upper`,
 `m_lower` and `field_kv_per_cm` (or `field_v_per_cm`). Of a catalogue the lines measured in a
 laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of spins, where the
-file has them, are put together at their mean by intensity.
+file has them, are put together at their mean by intensity. A .lne is a line list of westerfit.
 """
 
 from __future__ import annotations
@@ -41,11 +41,12 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
+from rotor.formats.westerfit import read_line_table
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, SPECIES_NUMBERS, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
-SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
+SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz", ".lne")
 QUANTA = {
     "linear": ("j",),
     "spherical": ("j",),
@@ -89,13 +90,17 @@ def read_assigned_lines(
         raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
     if text.endswith(".csv"):
         found, notes = _from_csv(path, names, halves)
+    elif text.endswith(".lne"):
+        found, notes = _from_westerfit(path, names, halves), []
     else:
         plain = "v" not in names and names[0] != "n"
         read = _from_lin if text.endswith(".lin") else _from_catalogue if plain else _from_full_catalogue
         found, notes = read(path, names)
         found = with_halves(found, halves)
     if not len(found):
-        raise ValueError(f"{path}: no lines in it" + ("" if text.endswith((".lin", ".csv")) else " that are measured"))
+        raise ValueError(
+            f"{path}: no lines in it" + ("" if text.endswith((".lin", ".csv", ".lne")) else " that are measured")
+        )
     return found, notes
 
 
@@ -109,10 +114,12 @@ def with_halves(lines: Assignments, halves: Collection[str]) -> Assignments:
 
 
 def names_sums(path: str | os.PathLike[str], count: int) -> bool:
-    """Whether the lines of a .csv or .lin file name sums with spins: a column of F, or more than `count` quantum numbers a state."""
+    """Whether the lines of a file name sums with spins: a column of F, J unlike N (.lne), or more than `count` quantum numbers a state."""
     text = os.fspath(path).lower()
     if text.endswith(".csv"):
         return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _table_of(path)[0])
+    if text.endswith(".lne"):
+        return any((labels[:, 0] != 2 * labels[:, 1]).any() for labels in read_line_table(path)[:2])
     if not text.endswith(".lin"):
         return False
     lines = without_v(without_zeros_behind(read_lin(path, count), count), count)
@@ -148,6 +155,32 @@ def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assig
         blend=blends[used], wavenumber=(lines.error < 0)[used], source=Path(path).name,
     )  # fmt: skip
     return with_excluded_lines(listed, lines), notes
+
+
+def _from_westerfit(path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]) -> Assignments:
+    """The lines of a line list of westerfit."""
+    columns = {"f": 0, "j": 1, "n": 1, "ka": 2, "kc": 3, "species": 4, "vt": 5}
+    if not set(names) <= set(columns):
+        raise ValueError(
+            f"{path}: a line list of westerfit has N, Ka, Kc, species, v_t and one F; the start has {', '.join(names)}"
+        )
+    *labels, frequency, error = read_line_table(path)
+    for side in labels:
+        if "f" in names and "f" not in halves and (side[:, 0] % 2).any():
+            raise ValueError(f"{path}: J is a half-integer; the spin to start from is whole")
+        if "f" not in halves:
+            side[:, 0] //= 2
+    upper, lower = (side[:, [columns[name] for name in names]] for side in labels)
+    return assignments(
+        names,
+        upper,
+        lower,
+        frequency,
+        error,
+        blend=_equal_lines(frequency, error),
+        source=Path(path).name,
+        halves=halves,
+    )
 
 
 def _from_csv(

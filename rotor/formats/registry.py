@@ -80,6 +80,12 @@ FORMATS = (
         recognises="rotor.formats.lamda:is_lamda_file",
     ),
     Format("input and output of XIAM", (".xi", ".xo", ".xo.gz"), "rotor.formats.xiam:read_xiam"),
+    Format(
+        "input of westerfit",
+        (".inp",),
+        "rotor.formats.westerfit:read_westerfit",
+        recognises="rotor.formats.westerfit:is_westerfit_file",
+    ),
     Format("molecule file", (".toml",), "rotor.formats.read_write:read_top_file"),
     Format(
         "comma-separated values",
