@@ -72,7 +72,7 @@ def success(rows: list[Row]) -> Any:
             axes.set_xlabel(title)
             axes.set_xlim(-0.5, len(groups) - 0.5)
             axes.axhline(90, color=GREY, lw=0.6, ls=":")
-        figure.axes[0].set_ylabel("strongest species found (%)")
+        figure.axes[0].set_ylabel("Strongest species found (%)")
         figure.axes[0].set_ylim(0, 103)
         return figure
 
@@ -87,7 +87,7 @@ def diagram(rows: list[Row]) -> Any:
         for one in groups:
             axes.annotate(f" {one['of']}", (100 * one["stated"], 100 * one["share"]), fontsize=7, va="top", ha="left")
         axes.plot([0, 100], [0, 100], color=GREY, lw=0.6, ls=":")
-        axes.set(xlabel="stated probability (%)", ylabel="right (%)", xlim=(45, 101), ylim=(0, 103))
+        axes.set(xlabel="Stated probability (%)", ylabel="Right (%)", xlim=(45, 101), ylim=(0, 103))
         return figure
 
 
@@ -117,7 +117,7 @@ def isotopologues(result: dict[str, Any]) -> Any:
         axes.bar(x, [-row["wrong"] for row in rows], width=0.5, color=ORANGE, label="wrong")
         axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right", fontsize=7)
         axes.axhline(0, color="black", lw=0.5)
-        axes.set_ylabel("species")
+        axes.set_ylabel("Species")
         axes.set_ylim(top=1.45 * max(len(row["species"]) for row in rows))
         axes.legend(fontsize=7, ncols=2, loc="upper left")
         return figure

@@ -150,8 +150,8 @@ def picture(curves: dict[str, list[tuple[float, float]]], path: Path) -> None:
     axes = figure.add_subplot()
     for name, points in curves.items():
         axes.loglog([ms for _, ms in points], [max(error, 1e-13) for error, _ in points], "o-", label=name)
-    axes.set_xlabel("time of the processor (ms)")
-    axes.set_ylabel("largest error of ⟨cos²θ⟩")
+    axes.set_xlabel("Processor time (ms)")
+    axes.set_ylabel("Largest error of ⟨cos²θ⟩")
     axes.set_title("OCS from J = 0, 50 fs, 4001 times", loc="left")
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)

@@ -166,8 +166,8 @@ def picture(path: Path) -> None:
         axes.axhline(1.0, color="#555555", linewidth=0.7)
         axes.axhline(1e-4, color="#555555", linewidth=0.7, linestyle="--")
         axes.set_xlim(left=0)
-        axes.set_xlabel("milliseconds of processor time of the whole fit (numbers: iterations)")
-        axes.set_ylabel("largest error of 15 constants\n(standard errors)")
+        axes.set_xlabel("Processor time of the whole fit (ms); numbers: iterations")
+        axes.set_ylabel("Largest error of 15 constants\n(standard errors)")
         axes.legend(frameon=False)
     save(figure, path, "Fits: accuracy against time", facts)
 

@@ -319,9 +319,9 @@ def draw(table: dict[str, Any], picture: Path) -> None:
     guide = np.array([0.5, 4.0])
     anchor = table["rotor"]["1.0"]["rms"]
     left.loglog(guide, anchor * guide**2, "k:", lw=1, label="order 2")
-    left.set_xlabel("step / fs")
-    left.set_ylabel("rms of the total energy / kT per degree")
-    right.set_xlabel("processor seconds per ps, one core")
+    left.set_xlabel("Step (fs)")
+    left.set_ylabel("Error of the total energy per degree, rms (kT)")
+    right.set_xlabel("Processor time per ps on one core (s)")
     left.set_title("216 SPC/E, reaction field, constant energy")
     right.set_title("what accuracy costs")
     for axes, ticks in ((left, [0.25, 0.5, 1, 2, 3, 4, 6]), (right, [0.1, 0.2, 0.5, 1, 2, 4])):

@@ -205,8 +205,8 @@ def picture(found: dict[str, dict[str, tuple[float, float]]], path: Path) -> Non
         for method, x, y in zip(METHODS, seconds, errors, strict=True):
             above = 5 if method == "first-order" else -11
             axes.annotate(method, (x, y), xytext=(4, above), textcoords="offset points", fontsize=8)
-    axes.set_xlabel("time for all levels (s)")
-    axes.set_ylabel("largest error of a level (MHz)")
+    axes.set_xlabel("Processor time for all levels (s)")
+    axes.set_ylabel("Largest error of a level (MHz)")
     axes.margins(x=0.25, y=0.15)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)

@@ -159,8 +159,8 @@ def plot(rows: list[dict[str, float]], path: Path) -> None:
         steps, mixed, errors, fmt="s", ms=4, capsize=2, color="black", label="the mixture itself, with its error"
     )
     axes.set(
-        xlabel="step (fs)",
-        ylabel="$T_\\mathrm{rot}/T_\\mathrm{trans}$",
+        xlabel="Step (fs)",
+        ylabel="Temperature ratio $T_\\mathrm{rot}/T_\\mathrm{trans}$",
         title="SPC/E water at constant energy; lines: one libration of 112 rad/ps",
     )
     axes.legend(frameon=False, loc="lower left")

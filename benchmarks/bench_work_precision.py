@@ -122,8 +122,8 @@ def draw(table: dict[str, Curve], picture: Path) -> None:
         size = 14 if marker == "*" else 5
         axes.loglog(error, cost, color=color, marker=marker, ms=size, ls=dashes.get(name[-1], "-."), label=name)
     axes.invert_xaxis()
-    axes.set_xlabel("attitude error after 1000 periods / rad")
-    axes.set_ylabel("time per period / µs, one core")
+    axes.set_xlabel("Error of the attitude after 1000 periods (rad)")
+    axes.set_ylabel("Time per period on one core (µs)")
     axes.set_title("Free asymmetric top: what accuracy costs")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, ncols=2)

@@ -152,6 +152,7 @@ if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these 
     from rotor.plots.heat_capacity import Panel as Panel
     from rotor.plots.heat_capacity import heat_capacity_figure as heat_capacity_figure
     from rotor.plots.over import loomis_wood_figure as loomis_wood_figure
+    from rotor.plots.picture import use_style as use_style
     from rotor.plots.polhodes import polhode_figure as polhode_figure
     from rotor.plots.stark import stark_figure as stark_figure
     from rotor.plots.structure import structure_figure as structure_figure

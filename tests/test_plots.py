@@ -125,3 +125,73 @@ def test_nothing_to_draw_is_an_error(water, tmp_path):
         plot_spectrum(water, tmp_path / "a.png", range_mhz=(1.0, 2.0))
     assert not list(tmp_path.iterdir())
     assert math.isinf(water.range_mhz[1])
+
+
+def test_a_picture_on_axes_of_the_user_is_that_of_its_own_figure(water):
+    from matplotlib.figure import Figure
+
+    axes = Figure(layout="constrained").subplots(1, 2)
+    assert rotor.plot(water, ax=axes[1]) is axes[1].figure
+    own = rotor.plot(water).axes[0]
+    drawn, true = (each.collections[0].get_segments() for each in (axes[1], own))
+    np.testing.assert_array_equal(drawn, true)
+    assert not axes[0].collections  # nothing is drawn beside it
+    assert axes[1].get_xlabel() == own.get_xlabel()
+    rotor.plot(rotor.api.solve_levels("water", 3), ax=axes[0])
+    assert axes[0].collections
+
+
+def test_axes_are_refused_for_a_picture_of_several_panels():
+    from matplotlib.figure import Figure
+
+    answer = rotor.api.answer_stark(rotor.api.StarkRequest(rotor.read("OCS"), (0.0, 10.0)))
+    with pytest.raises(ValueError, match=r"ax: the picture of a StarkAnswer is a figure of its own"):
+        rotor.plot(answer, ax=Figure().subplots())
+
+
+@pytest.mark.parametrize(
+    ("molecule", "words"),
+    [
+        ("water", ["para, spin weight 1", "ortho, spin weight 3"]),
+        ("NH3", ["ortho, K = 3n", "para, other K", "missing (spin weight 0)"]),
+        ("OCS", []),
+    ],
+)
+def test_spin_species_of_levels_have_a_legend(molecule, words):
+    figure = rotor.plot(rotor.api.answer_levels(rotor.api.LevelsRequest(rotor.read(molecule), jmax=3)))
+    assert [text.get_text() for legend in figure.legends for text in legend.get_texts()] == words
+
+
+def test_both_inversion_states_of_ammonia_are_named():
+    figure = rotor.plot(rotor.api.answer_levels(rotor.api.LevelsRequest(rotor.read("NH3"), jmax=2)))
+    assert any("0,1" in text.get_text() for text in figure.axes[0].texts)
+
+
+def test_lines_of_one_transition_are_named_by_their_spins_alone():
+    from rotor.quantum.effects.of_top import effects_of
+
+    top = rotor.read("HCN")
+    axes = rotor.plot(rotor.api.line_list(top, jmax=1, temperature_k=300.0, effects=effects_of(top, True))).axes[0]
+    assert axes.get_title(loc="right") == "1 – 0"
+    assert {text.get_text() for text in axes.texts} == {f"$F = {f} – 1$" for f in (0, 1, 2)}
+
+
+def test_every_free_level_of_a_stark_map_is_named():
+    request = rotor.api.StarkRequest(rotor.read("indole"), (0.0, 2.0, 4.0))
+    answer = rotor.api.answer_stark(request)
+    named = ", ".join(text.get_text() for text in rotor.plot(answer).axes[0].texts).split(", ")
+    assert sorted(named) == sorted(set(answer.states.label.tolist()))
+
+
+@pytest.mark.parametrize(
+    ("pulse", "title", "peak"),
+    [
+        (rotor.api.GaussianPulse(1e13, 0.05), "Intensity\n(TW/cm²)", "10"),
+        (rotor.api.DipolePulse(100.0, 1.0), "Field\n(kV/cm)", "100"),
+    ],
+)
+def test_pulses_have_a_scale(pulse, title, peak):
+    trace = rotor.api.align(rotor.read("OCS"), [pulse], np.linspace(0.0, 10.0, 20), temperature_k=1.0)
+    axes = rotor.plot(trace).axes[0]
+    assert axes.get_ylabel() == title
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["0", peak]

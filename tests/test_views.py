@@ -29,7 +29,7 @@ DRAWN = {
     "levels": (("levels", "water", "--jmax", "3"), 0, ("1:2", "0:300"), (0.4, 2.8), (0, 300)),
     "raman": (("raman", "N2", "--jmax", "12"), 0, ("0:3THz", "0:1e-30"), (0, 100.069), (0, 1e-30)),
     "thermo": (("thermo", "CO", "--temperature", "10,100"), 0, ("20:80K", "0:2"), (20, 80), (0, 2)),
-    "stark": (("stark", "OCS", *OCS), 0, ("20:80kV/cm", "-1:2"), (14.6, 81.2), (-1, 2)),
+    "stark": (("stark", "OCS", *OCS), 0, ("20:80kV/cm", "-1:2"), (16.67, 81.2), (-1, 2)),
     "align": (("align", "OCS", *PULSE), 1, ("5:20ps", "0.2:0.6"), (5, 20), (0.2, 0.6)),
     "gas": (("gas", *GAS), 1, ("0:2ps", "-1:1"), (0, 2), (-1, 1)),
     "fluid": (("fluid", *BOX), 0, ("1:3fs", "0:900"), (0.001, 0.003), (0, 900)),
@@ -75,7 +75,7 @@ def test_the_part_asked_for_is_drawn(call, folder, catalogue, figures, verb):
     options = ("--plot-title", "cost: 5$ or 6$", "--plot-range", across, "--plot-vertical", up)
     code, _, err = call(*command, "--plot", "a.svg", *options)
     assert (code, err) == (0, "") or (code == 0 and err.startswith("note: "))
-    axes = [one for one in figures[0].axes if verb != "fluid" or "temperature" in one.get_ylabel()][panel]
+    axes = [one for one in figures[0].axes if verb != "fluid" or "Temperature" in one.get_ylabel()][panel]
     assert axes.get_xlim() == pytest.approx(horizontal, rel=1e-4)  # of cm-1 in 3 THz; columns and names have a margin
     assert axes.get_ylim() == pytest.approx(vertical, rel=1e-12)
     assert "cost: 5$ or 6$" in Path("a.svg").read_text(encoding="utf-8")  # no formula between the signs

@@ -238,6 +238,6 @@ def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
         linewidth=0.8,
         label=f"{diagram.excitation_k:.1f} ± {diagram.excitation_error_k:.1f} K",
     )
-    axes.set_xlabel("$E_u/k$ (K)")
-    axes.set_ylabel(r"ln($N_u/g_u$ cm²)")
+    axes.set_xlabel("Energy of the upper level $E_u/k$ (K)")
+    axes.set_ylabel(r"Population ln($N_u/g_u$ cm²)")
     axes.legend(frameon=False, fontsize=8)

@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from rotor import units
 from rotor.alignment.align import AlignmentTrace
-from rotor.alignment.pulse import Kick
+from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, DipolePulse, Kick
 from rotor.arrays import Floats
-from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.picture import GREY, checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.stark import COLOURS
 from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (7.2, 4.6)
-NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ₂D⟩"}
+NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ$_{2D}$⟩"}
+NARROW = 1 / 300  # of the times shown: shorter pulses are drawn as a line at their middle
+PER_TW = 1e12  # W/cm²
 
 
 def alignment_figure(trace: AlignmentTrace, *, classical: Mapping[str, Floats] | None = None, title: str = "") -> Any:
@@ -74,17 +77,32 @@ def plot_alignment(
 
 
 def _pulses(axes: Any, trace: AlignmentTrace) -> None:
+    """Pulses in TW/cm² or kV/cm, from 0 to the peak; relative to their own peaks where a kick or both kinds are among them."""
+    name, unit = _scale(trace)
+    highest = 0.0
     for pulse in trace.pulses:
         first, last = pulse.window_ps
-        if isinstance(pulse, Kick):
-            axes.plot([first, first], [0, 1], color="#555555", linewidth=1.2)
-            continue
         times = np.linspace(first, last, 301)
-        strength = pulse.strength(times)
-        axes.fill_between(times, strength / np.abs(strength).max(), color="#999999", linewidth=0)
-    axes.set_yticks([])
-    axes.set_ylabel("field")
-    axes.spines["left"].set_visible(False)
+        strength = np.ones(301) if isinstance(pulse, Kick) else pulse.strength(times)
+        height = strength / (np.abs(strength).max() if unit is None else unit)
+        peak = int(np.abs(height).argmax())
+        highest = max(highest, float(np.abs(height[peak])))
+        if last - first < NARROW * (trace.t_ps[-1] - trace.t_ps[0]):
+            axes.plot([times[peak]] * 2, [0, height[peak]], color=GREY, linewidth=1.2)
+        else:
+            axes.fill_between(times, height, color=GREY, alpha=0.6, linewidth=0)
+    axes.set_yticks([0, highest] if highest else [], ["0", f"{highest:.3g}"] if highest else [])
+    axes.set_ylabel(name)
+
+
+def _scale(trace: AlignmentTrace) -> tuple[str, float | None]:
+    """The title of the axis of the pulses, and its unit in that of `pulse.strength`; none for relative heights."""
+    pulses = trace.pulses
+    if any(isinstance(pulse, Kick) for pulse in pulses) or len({pulse.acts_on for pulse in pulses}) != 1:
+        return "Pulses\n(relative)", None
+    if isinstance(pulses[0], DipolePulse):
+        return "Field\n(kV/cm)", RAD_PER_PS_MHZ * units.MHZ_PER_DEBYE_KV_PER_CM
+    return "Intensity\n(TW/cm²)", PER_TW * RAD_PER_PS_ANGSTROM3_W_PER_CM2
 
 
 def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) -> None:
@@ -97,9 +115,11 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
                 trace.t_ps, classical[name], color=colour, linewidth=1.0, linestyle=(0, (4, 2)), alpha=0.8, label=label
             )
     if len(trace.cosines) == 1 and "cos2theta" in trace.cosines:
-        axes.axhline(1 / 3, color="#555555", linewidth=0.6, linestyle=":")
-        axes.set_ylabel(NAMES["cos2theta"])
-    axes.set_xlabel("time (ps)")
-    axes.set_xlim(trace.t_ps[0], trace.t_ps[-1])
+        axes.axhline(1 / 3, color=GREY, linewidth=0.6, linestyle=":")
+    axes.set_ylabel(", ".join(NAMES.get(name, name) for name in trace.cosines))
+    axes.set_xlabel("Time (ps)")
+    axes.set_xlim(
+        trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1]
+    )  # a pulse at the first time is seen
     if len(trace.cosines) > 1 or classical:
         axes.legend(frameon=False, fontsize=8)

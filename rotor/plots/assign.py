@@ -60,11 +60,11 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         left = answer.unexplained
         lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
         upper.axhline(0, color="black", lw=0.5)
-        upper.set_ylabel("intensity")
-        lower.set_ylabel("left")
-        lower.set_xlabel("frequency (MHz)")
-        upper.set_title(title)
-        upper.legend(fontsize=7, loc="upper left")
+        upper.set_ylabel("Intensity")
+        lower.set_ylabel("Unexplained")
+        lower.set_xlabel("Frequency (MHz)")
+        upper.set_title(title, loc="left")
+        upper.legend(frameon=False, fontsize=7, loc="upper left")
         show_part(upper, view)
         if view.horizontal is not None:
             lower.set_xlim(*view.horizontal)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, checked_suffix, legend_below, panel, save, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 MEASURED = ORANGE
@@ -46,16 +46,15 @@ def plot_catalogue(
     save(figure, path, title, {"command": command})
 
 
-def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.inf) -> Any:
+def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.inf, axes: Any = None) -> Any:
     """A matplotlib figure of log10 of the intensity against frequency, measured lines in a colour of their own.
 
-    Sticks begin below the weakest line, or at `least` where that is lower.
+    Sticks begin below the weakest line, or at `least` where that is lower. axes : drawn on instead of a new figure.
     """
     frequency, _ = in_mhz(lines)
     bottom = min(float(lines.lgint.min()) - 0.3, least)
     with styled():
-        figure = new_figure()
-        axes = figure.add_subplot()
+        figure, axes = panel(axes)
         for seen, colour, name in ((False, BLUE, "predicted"), (True, MEASURED, "measured")):
             chosen = (lines.tag < 0) == seen
             if chosen.any():
@@ -65,5 +64,5 @@ def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.i
                 )  # fmt: skip
         axes.set(xlabel="Frequency (GHz)", ylabel="log₁₀ intensity (nm² MHz)", title=title)
         axes.set_ylim(bottom=bottom)
-        figure.legend(loc="outside lower right", ncols=2, frameon=False)
+        legend_below(figure, axes, ncols=2)
     return figure

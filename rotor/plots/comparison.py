@@ -144,6 +144,6 @@ def _draw_differences(axes: Any, comparison: Comparison) -> None:
             label=f"measured ({np.count_nonzero(seen)})",
         )  # fmt: skip
         axes.legend(frameon=False, fontsize=7)
-    axes.set_ylabel(f"difference ({unit})")
+    axes.set_ylabel(f"Difference ({unit})")
     if not len(off):
         axes.text(0.5, 0.5, "no line is in both", transform=axes.transAxes, ha="center", va="center", color=GREY)

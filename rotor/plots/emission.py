@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import GREY, PALETTE, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import GREY, PALETTE, checked_suffix, legend_below, name_of_top, panel, save, styled
 from rotor.plots.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.emission_request import EmissionAnswer
 from rotor.tops.top import Top
 
+LEAST_NAMED = 0.01  # of the brightest line; on a linear axis weaker lines are not seen
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
 
 
@@ -50,6 +51,7 @@ def emission_figure(
     range_mhz: tuple[float, float] | None = None,
     log: bool | None = None,
     vertical: Limits | None = None,
+    axes: Any = None,
 ) -> Any:
     """A matplotlib figure of T_B against the observed frequency.
 
@@ -67,6 +69,8 @@ def emission_figure(
         Whether T_B is on a logarithmic axis.
     vertical : (2,), optional
         Lowest and highest T_B shown, in K.
+    axes : matplotlib.axes.Axes, optional
+        Drawn on instead of a new figure.
 
     Returns
     -------
@@ -85,8 +89,7 @@ def emission_figure(
         for molecule, name in zip(answer.request.molecules, answer.request.names, strict=True)
     ]
     with styled():
-        figure = new_figure()
-        axes = figure.add_subplot()
+        figure, axes = panel(axes)
         if len(names) > 1:
             x, y = thinned(answer.spectrum.frequency_mhz / mhz, answer.spectrum.brightness_k)
             axes.plot(x, y, color=GREY, linewidth=2.0, alpha=0.4, label="together")
@@ -104,7 +107,7 @@ def emission_figure(
         axes.set_xlabel("Wavenumber (cm⁻¹)" if unit == "cm-1" else f"Frequency ({unit or 'GHz'})")
         axes.set_ylabel("Brightness temperature (K)")
         axes.set_title(_title(answer) if title is None else title, loc="left")
-        figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=7)
+        legend_below(figure, axes, ncols=4, fontsize=7)
         _name(axes, answer, mhz)
     return figure
 
@@ -114,6 +117,7 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
     lines, spectrum = answer.lines, answer.spectrum
     heights = np.interp(lines.observed_mhz, spectrum.frequency_mhz, spectrum.brightness_k)
     several = len(answer.request.molecules) > 1
+    seen = 0.0 if axes.get_yscale() == "log" else LEAST_NAMED * float(spectrum.brightness_k.max(initial=0.0))
     peaks = [
         Peak(
             float(lines.observed_mhz[row]) / mhz,
@@ -122,6 +126,7 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
             PALETTE[int(lines.molecule[row]) % len(PALETTE)] if several else GREY,
         )
         for row in np.argsort(-lines.brightness_k, kind="stable")[:MOST_TRIED].tolist()
+        if heights[row] > seen
     ]
     x, y = thinned(spectrum.frequency_mhz / mhz, spectrum.brightness_k)
     name_peaks(axes, peaks, np.stack([x, y], axis=1)[y > 0])

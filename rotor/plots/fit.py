@@ -24,7 +24,7 @@ _HEADINGS = {
 def fit_figure(fit: Fit, title: str = "") -> Any:
     """A matplotlib figure of (obs - calc)/error of every line; lines that do not count are crosses."""
     halves = fit.lines.halves
-    panels = [("frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
+    panels = [("Frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
     panels += [
         (_heading(name, halves), fit.lines.upper[:, i] / (2.0 if name in halves else 1.0))
         for i, name in enumerate(fit.lines.names)
@@ -91,4 +91,4 @@ def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
     seen = np.abs(y[used][np.isfinite(y[used])])
     limit = max(3.5, 1.1 * float(seen.max(initial=0.0)))
     axes.set_ylim(-limit, limit)
-    axes.set_ylabel("(obs - calc)/error")
+    axes.set_ylabel("(Obs. − calc.) / error")

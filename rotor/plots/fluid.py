@@ -14,7 +14,7 @@ from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, checked_suffix, new_f
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV
 
-TIME = "$t$ (ps)"
+TIME = "Time (ps)"
 
 
 def plot_fluid(
@@ -80,7 +80,7 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
             _draw_shells(panels["g"], shells)
         _draw_temperatures(warm, record)
         deep.plot(record.time_ps, record.potential_ev * KJ_PER_MOL_EV / molecules, color=BLUE, linewidth=0.8)
-        deep.set(xlabel=TIME, ylabel="potential (kJ/mol)")
+        deep.set(xlabel=TIME, ylabel="Potential energy (kJ/mol)")
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     return figure
 
@@ -95,13 +95,13 @@ def _draw_temperatures(axes: Any, record: FluidRecord) -> None:
     for name, kelvin, colour in curves:
         if np.isfinite(kelvin).all():
             axes.plot(record.time_ps, kelvin, color=colour, linewidth=0.8, label=name)
-    axes.set(xlabel=TIME, ylabel="temperature (K)")
+    axes.set(xlabel=TIME, ylabel="Temperature (K)")
     axes.legend(frameon=False, ncols=3, fontsize=7, loc="best")
 
 
 def _draw_shells(axes: Any, shells: PairDistribution) -> None:
     axes.axhline(1.0, color=GREY, linewidth=0.7)
     axes.plot(shells.r_angstrom, shells.g, color=GREEN, linewidth=1.2)
-    axes.set(xlabel="$r$ (Å)", ylabel="$g(r)$ of centres of mass")
+    axes.set(xlabel="Distance $r$ of centres of mass (Å)", ylabel="Pair distribution $g(r)$")
     axes.set_xlim(0.0, float(shells.r_angstrom[-1]))
     axes.set_ylim(bottom=0.0)

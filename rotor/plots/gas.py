@@ -41,7 +41,7 @@ def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], c
         panel.plot(cm, quantum.intensity, color=BLUE, linewidth=1.2, label="quantum lines")
         for (name, spectrum), colour in zip(classical.items(), (ORANGE, GREEN, "black", GREY), strict=False):
             panel.plot(cm, spectrum.intensity, color=colour, linewidth=1.2, label=f"classical, {name}")
-        panel.set(xlabel="wavenumber (cm⁻¹)", ylabel="cross section (nm²)", xlim=(0, cm[-1]))
+        panel.set(xlabel="Wavenumber (cm⁻¹)", ylabel="Cross section (nm²)", xlim=(0, cm[-1]))
         panel.set_ylim(bottom=0.0)
         panel.ticklabel_format(axis="y", style="sci", scilimits=(0, 0))
         panel.set_title(title, loc="left")
@@ -87,9 +87,9 @@ def plot_gas(
     figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])
     with styled():
         verdict = "accepted" if test.accepted else "rejected"
-        _draw_test(axes[0], test, f"equipartition {verdict}, p = {test.p_value:.2g}")
+        _draw_test(axes[0], test, f"Equipartition {verdict}, p = {test.p_value:.2g}")
         if curves is not None:
-            _draw_curves(axes[1], curves, "correlation functions", plateau)
+            _draw_curves(axes[1], curves, "Correlation of orientation", plateau)
             show_part(axes[1], view)
         title = title if view.title is None else view.title
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
@@ -122,7 +122,7 @@ def _draw_test(axes: Any, test: Equipartition, title: str) -> None:
     colours = [ORANGE if degree.name in test.failing else BLUE for degree in test.degrees]
     axes.scatter(places, [degree.mean for degree in test.degrees], c=colours, s=18, zorder=3)
     axes.set_xticks(places, names, rotation=40, ha="right")
-    axes.set_ylabel("mean of 2E/kT (grey: 1, 3 σ)")
+    axes.set_ylabel("Mean of 2E/kT")
     axes.set_title(title, loc="left")
 
 
@@ -139,6 +139,7 @@ def _draw_curves(axes: Any, curves: Correlations, title: str, plateau: float | N
     if plateau is not None:
         axes.axhline(plateau, color=BLUE, linewidth=0.7, linestyle=":", label="$C_1$ at $t → ∞$")
     axes.axhline(0.0, color=GREY, linewidth=0.7)
-    axes.set_xlabel("$t$ (ps)")
+    axes.set_xlabel("Time (ps)")
+    axes.set_ylabel("Correlation function")
     axes.set_title(title, loc="left")
     axes.legend(frameon=False)

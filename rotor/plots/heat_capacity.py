@@ -124,8 +124,8 @@ def _draw(axes: Any, panel: Panel) -> None:
     if t[-1] > LOG_FROM * t[0]:
         _make_logarithmic(axes)
     axes.set_ylim(bottom=0.0, top=_highest(panel, classical))
-    axes.set_xlabel("$T$ (K)")
-    axes.set_ylabel("$C_v/R$ without translation")
+    axes.set_xlabel("Temperature (K)")
+    axes.set_ylabel("Heat capacity $C_v/R$, no translation")
     axes.set_title(panel.title, loc="left")
     axes.legend(frameon=False, fontsize=7.5, loc="best")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,24 +14,40 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
 from rotor.plots.picture import (
     BLUE,
+    GREEN,
     GREY,
     MOST_VECTOR_STICKS,
     ORANGE,
+    PALETTE,
     checked_suffix,
+    legend_below,
     name_of_top,
-    new_figure,
+    panel,
     save,
     styled,
 )
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import heading, merged_text, of_rotation
 from rotor.quantum.request import SelectedLevels
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
 SIZE_INCHES = (7.2, 5.4)
 HALF_WIDTH = 0.36  # of a step, in columns
+NARROW = 0.25  # where names have the number of the state too
 MOST_LABELS = 160
+MOST_WEIGHTS = 4
+
+
+@dataclass(frozen=True)
+class _Species:
+    """Levels of one nuclear-spin weight: rows, colour and style of their steps, name in the legend."""
+
+    rows: NDArray[np.bool_]
+    colour: str
+    style: str
+    name: str
 
 
 def plot_levels(
@@ -82,6 +98,7 @@ def levels_figure(
     unit: str = "cm-1",
     title: str | None = None,
     view: View = WHOLE,
+    axes: Any = None,
 ) -> Any:
     """A matplotlib figure of a term diagram; see `plot_levels`.
 
@@ -97,6 +114,8 @@ def levels_figure(
         Instead of the name of the top.
     view : View
         Which columns and energies are shown, where they are given.
+    axes : matplotlib.axes.Axes, optional
+        Drawn on instead of a new figure.
 
     Returns
     -------
@@ -115,15 +134,17 @@ def levels_figure(
     table, column = _in_view(table, column, np.asarray(getattr(table, UNITS[unit])), view)
     energy = np.asarray(getattr(table, UNITS[unit]))
     with styled():
-        figure = new_figure(SIZE_INCHES)
-        axes = figure.add_subplot()
-        _draw(axes, column, energy, table.levels.weight[table.rows] > 0)
+        figure, axes = panel(axes, SIZE_INCHES)
+        half_width = NARROW if "v" in table.levels.quanta else HALF_WIDTH
+        _draw(axes, column, energy, _species(table, top), half_width)
         show_part(axes, View(vertical=view.vertical))
         axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
         axes.set_ylabel(f"Energy ({unit.replace('cm-1', 'cm⁻¹')})")
         heading_text = f"{table.levels.kind} top" if top is None else name_of_top(top)
         axes.set_title(title if title is not None else heading_text, loc="left")
-        _label(figure, axes, table, column, energy)
+        if axes.get_legend_handles_labels()[0]:
+            legend_below(figure, axes, ncols=4, fontsize=7)
+        _label(figure, axes, table, column, energy, half_width)
     return figure
 
 
@@ -152,13 +173,57 @@ def ladders(table: SelectedLevels, top: Top | None) -> tuple[str, Ints]:
     return heading(name), np.asarray(quanta[name][rows])
 
 
-def _draw(axes: Any, column: Ints, energy: Floats, exists: NDArray[np.bool_]) -> None:
-    """Steps; those of levels without a state of the nuclear spins dashed."""
+def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
+    """Levels by the species of the nuclear spins, and those without a state of the spins."""
+    weight = table.levels.weight_per_component[table.rows]
+    missing = _Species(weight == 0, GREY, ":", "missing (spin weight 0)")
+    rule = "" if top is None else top.spin_weights.rule
+    if top is not None and rule == "K" and "k" in table.levels.quanta:
+        return [*_by_k(np.abs(table.levels.quanta["k"][table.rows]), weight > 0, top.spin_weights), missing]
+    weights = np.unique(weight[weight > 0])
+    if not 2 <= len(weights) <= MOST_WEIGHTS:
+        return [_Species(weight > 0, BLUE, "-", "existing" if missing.rows.any() else ""), missing]
+    words = ("para, ", "ortho, ") if top is not None and _is_ortho_and_para(top.spin_weights) else ("",) * len(weights)
+    kinds = zip(weights.tolist(), (BLUE, ORANGE, GREEN, PALETTE[3]), words, strict=False)
+    return [
+        *(_Species(weight == value, colour, "-", f"{word}spin weight {value:g}") for value, colour, word in kinds),
+        missing,
+    ]
+
+
+def _by_k(k: Ints, exists: NDArray[np.bool_], weights: SpinWeights) -> list[_Species]:
+    """Levels of a symmetric top by K; ortho and para where three nuclei of spin 1/2 are equivalent, with weights 2 : 1."""
+    value = dict(zip(weights.classes, weights.values, strict=True))
+    period = max(int(name) for name in value if name.isdecimal()) + 1
+    zero = value.get("0", (value.get("0even", 0) + value.get("0odd", 0)) / 2)
+    if period == 3:
+        names = ("ortho, ", "para, ") if zero == 2 * value["1"] else ("A, ", "E, ")
+    else:
+        names = ("", "")
+    whole = k % period == 0
+    return [
+        _Species(exists & whole, ORANGE, "-", f"{names[0]}K = {period}n"),
+        _Species(exists & ~whole, BLUE, "-", f"{names[1]}other K"),
+    ]
+
+
+def _is_ortho_and_para(weights: SpinWeights) -> bool:
+    """Whether half the classes of levels have one weight and half another: ortho has the larger, para the smaller one."""
+    values = [value for value in weights.values if value]
+    shares = [values.count(value) for value in sorted(set(values))]
+    return len(shares) == 2 and shares[0] == shares[1]
+
+
+def _draw(axes: Any, column: Ints, energy: Floats, species: list[_Species], half_width: float) -> None:
+    """Steps in the colour of their spin species; those of levels without a state of the nuclear spins dotted."""
     many = len(energy) > MOST_VECTOR_STICKS
-    for chosen, style, colour in ((exists, "-", BLUE), (~exists, ":", ORANGE)):
-        if chosen.any():
-            left, right = column[chosen] - HALF_WIDTH, column[chosen] + HALF_WIDTH
-            axes.hlines(energy[chosen], left, right, colors=colour, linestyles=style, linewidth=1.1, rasterized=many)
+    for kind in species:
+        if kind.rows.any():
+            left, right = column[kind.rows] - half_width, column[kind.rows] + half_width
+            axes.hlines(
+                energy[kind.rows], left, right, colors=kind.colour, linestyles=kind.style, linewidth=1.1, rasterized=many,
+                label=kind.name or None,
+            )  # fmt: skip
     first, last = int(column.min()), int(column.max())
     axes.set_xlim(first - 0.6, last + 0.8)
     axes.set_xticks(range(first, last + 1, max(1, (last - first) // 12)))
@@ -166,10 +231,10 @@ def _draw(axes: Any, column: Ints, energy: Floats, exists: NDArray[np.bool_]) ->
     axes.set_ylim(float(energy.min()) - margin, float(energy.max()) + margin)
 
 
-def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats) -> None:
+def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats, half_width: float) -> None:
     """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands.
 
-    What spins make of one rotational level has one label where the steps overlap, with all values of F.
+    States and spin components of one rotational level share a label where their steps overlap, with all values of v or F.
     """
     if len(table) > 20 * MOST_LABELS:
         return
@@ -188,10 +253,11 @@ def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: 
         merged = np.flatnonzero(unnamed & (alike == alike[row]) & (np.abs(pixels - pixels[row]) < height))
         unnamed[merged] = False
         text = merged_text(table.levels.quanta, table.rows[merged], table.levels.halves)
-        axes.text(ladder + HALF_WIDTH + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
+        axes.text(ladder + half_width + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
 
 
 def _rotational_levels(table: SelectedLevels) -> Ints:
-    """A number for each level, the same for what spins make of one rotational level."""
-    numbers = np.stack([column[table.rows] for column in of_rotation(table.levels.quanta).values()], axis=1)
+    """A number for each level, shared by all states and spin components of one rotational level."""
+    quanta = of_rotation(table.levels.quanta)
+    numbers = np.stack([column[table.rows] for name, column in quanta.items() if name != "v"], axis=1)
     return np.asarray(np.unique(numbers, axis=0, return_inverse=True)[1]).ravel()

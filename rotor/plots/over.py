@@ -51,10 +51,10 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
             label="lines",
         )
         axes.axhline(0, color="black", lw=0.5)
-        axes.set_xlabel("frequency (MHz)")
-        axes.set_ylabel("intensity")
-        axes.set_title(title)
-        axes.legend(fontsize=7, loc="upper left")
+        axes.set_xlabel("Frequency (MHz)")
+        axes.set_ylabel("Intensity")
+        axes.set_title(title, loc="left")
+        axes.legend(frameon=False, fontsize=7, loc="upper left")
         axes.set_xlim(*peaks.band_mhz)
         show_part(axes, view)
         return figure
@@ -113,7 +113,7 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
         )
         axes.set_ylim(len(rows) - 0.3, -0.7)
         axes.set_xlim(-WINDOW_MHZ, WINDOW_MHZ)
-        axes.set_xlabel("peak - line (MHz)")
-        axes.set_title(title)
+        axes.set_xlabel("Peak − line (MHz)")
+        axes.set_title(title, loc="left")
         show_part(axes, view)
         return figure

@@ -19,6 +19,8 @@ STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.labelsize": 9.0,
     "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "axes.prop_cycle": f"cycler('color', {list(PALETTE)})",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.7,
@@ -27,6 +29,8 @@ STYLE: dict[Any, Any] = {
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
     "axes.formatter.use_mathtext": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
     "svg.fonttype": "none",
     "svg.hashsalt": "rotor",  # the same picture is the same file
     "pdf.fonttype": 42,
@@ -60,6 +64,37 @@ def styled() -> Any:
     import matplotlib as mpl
 
     return mpl.rc_context(STYLE)
+
+
+def use_style() -> None:
+    """Give all further pictures of matplotlib the style of the package: colours, sizes of letters, axes without a frame.
+
+    >>> import matplotlib
+    >>> with matplotlib.rc_context():
+    ...     use_style()
+    ...     matplotlib.rcParams["axes.titlelocation"]
+    'left'
+    """
+    import matplotlib as mpl
+
+    mpl.rcParams.update(STYLE)
+
+
+def panel(axes: Any = None, size: tuple[float, float] = SIZE_INCHES) -> tuple[Any, Any]:
+    """A figure and the one panel that is drawn on: the axes of a user, or those of a new figure."""
+    if axes is not None:
+        return axes.figure, axes
+    figure = new_figure(size)
+    return figure, figure.add_subplot()
+
+
+def legend_below(figure: Any, axes: Any, **options: Any) -> None:
+    """A legend below the only panel of a figure; inside the axes of a user, whose figure may have others."""
+    layout = figure.get_layout_engine() if hasattr(figure, "get_layout_engine") else None
+    if len(figure.axes) == 1 and layout is not None:
+        figure.legend(loc="outside lower right", **options)
+    else:
+        axes.legend(**options)
 
 
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:

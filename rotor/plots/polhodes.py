@@ -26,7 +26,7 @@ def polhode_figure(
     times: ArrayLike,
     *,
     axis_names: tuple[str, str, str] = ("1", "2", "3"),
-    time_label: str = "$t$",
+    time_label: str = "Time",
     time_factor: float = 1.0,
     title: str = "",
 ) -> Any:
@@ -74,7 +74,10 @@ def polhode_figure(
         _draw_left(left, motion, path, axis_names)
         _draw_right(right, motion.moments, drawn * time_factor, path, axis_names)
         _mark_period(right, drawn[0] * time_factor, drawn[-1] * time_factor, float(motion.period) * time_factor)
-        right.set(xlabel=time_label + (f" (the first {MOST_PERIODS} periods)" if cut else ""), ylabel="$L_i/|L|$")
+        right.set(
+            xlabel=time_label + (f" (the first {MOST_PERIODS} periods)" if cut else ""),
+            ylabel="Angular momentum $L_i/|L|$",
+        )
         if title:
             figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     return figure
@@ -86,7 +89,7 @@ def plot_polhodes(
     path: str | os.PathLike[str],
     *,
     axis_names: tuple[str, str, str] = ("1", "2", "3"),
-    time_label: str = "$t$",
+    time_label: str = "Time",
     time_factor: float = 1.0,
     title: str = "",
     provenance: Mapping[str, Any] | None = None,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, panel, save, styled
 from rotor.plots.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import state_text, without_nuclei
@@ -53,13 +53,12 @@ def plot_raman(
     save(raman_figure(lines, title, view), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
 
 
-def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE) -> Any:
-    """A matplotlib figure of Raman lines as sticks at their shifts; ValueError for no lines."""
+def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE, axes: Any = None) -> Any:
+    """A matplotlib figure of Raman lines as sticks at their shifts, on the axes of a user if given; ValueError for no lines."""
     if not len(lines):
         raise ValueError(f"there is no Raman line to draw for {lines.top.name or 'this top'}")
     with styled():
-        figure = new_figure()
-        axes = figure.add_subplot()
+        figure, axes = panel(axes)
         _draw(axes, lines)
         _frame(axes, lines, view)
         _name(axes, lines)
@@ -75,7 +74,7 @@ def _draw(axes: Any, lines: RamanLines) -> None:
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
     axes.set_xlim(-1.05 * seen, 1.05 * seen)
     axes.set_xlabel("Raman shift (cm⁻¹): anti-Stokes below, Stokes above 0")
-    axes.set_ylabel("dσ/dΩ (cm² sr⁻¹)")
+    axes.set_ylabel("Cross section dσ/dΩ (cm² sr⁻¹)")
 
 
 def _frame(axes: Any, lines: RamanLines, view: View) -> None:

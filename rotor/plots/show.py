@@ -34,8 +34,21 @@ from rotor.thermodynamics.classical_gas import GasAnswer
 from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer
 
+ONE_PANEL = (
+    Lines,
+    Spectrum,
+    SpectrumAnswer,
+    RamanLines,
+    RamanAnswer,
+    SelectedLevels,
+    Levels,
+    LevelsAnswer,
+    EmissionAnswer,
+    Catalogue,
+)
 
-def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+
+def plot(thing: Any, path: str | os.PathLike[str] | None = None, *, ax: Any = None, **options: Any) -> Any:
     """A matplotlib figure of lines, spectra, levels, motions, thermodynamic functions and gases, or of an answer with them.
 
     Parameters
@@ -44,6 +57,8 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any)
         Or the answer to a request for one of them.
     path : path, optional
         A .png, .pdf or .svg file to write.
+    ax : matplotlib.axes.Axes, optional
+        Axes of yours to draw on, for lines, spectra, Raman lines, levels, emission and catalogues; other pictures have several panels.
     options :
         Of the picture: those of `spectrum_figure`, `raman_figure`, `levels_figure`, `polhode_figure`, ...
 
@@ -55,7 +70,7 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any)
     Raises
     ------
     ValueError
-        A thing that there is no picture of; a suffix that is no picture.
+        A thing that there is no picture of; a suffix that is no picture; `ax` for a picture of several panels.
 
     Examples
     --------
@@ -65,6 +80,13 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any)
     >>> figure.axes[0].get_xlabel()
     'Frequency (GHz)'
     """
+    if ax is not None:
+        if not isinstance(thing, ONE_PANEL):
+            known = ", ".join(sorted(kind.__name__ for kind in ONE_PANEL))
+            raise ValueError(
+                f"ax: the picture of a {type(thing).__name__} is a figure of its own; axes are taken for {known}"
+            )
+        options["axes"] = ax
     figure = _figure(thing, **options)
     if path is not None:
         save(figure, path, type(thing).__name__, {})
@@ -128,7 +150,7 @@ def _(thing: TumbleAnswer, **options: Any) -> Any:
     shown = {
         "times": thing.table.times / units.time_factor,
         "axis_names": thing.request.axes,
-        "time_label": f"$t$ ({units.time})" if units.time else "$t$",
+        "time_label": f"Time ({units.time})" if units.time else "Time",
         "time_factor": units.time_factor,
     }
     return _figure(thing.motion, **(shown | options))

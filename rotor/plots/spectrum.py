@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
 from rotor.plots.names import leave_or_remove
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, panel, save, styled
 from rotor.plots.view import Limits, View, show_part
-from rotor.quantum.quanta import line_text
+from rotor.quantum.quanta import line_text, of_rotation
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
 from rotor.units import MHZ_PER_CM
 
 UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # of the frequency axis
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
+LEAST_HEIGHT = 0.55  # of a linear axis for the strongest line; long names have the rest
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
 NARROW = 1e-3  # of the frequency: a range that is narrower is shown in MHz, with all digits
 MOST_DECADES = 8
@@ -87,6 +88,7 @@ def spectrum_figure(
     unit: str | None = None,
     log: bool | None = None,
     vertical: Limits | None = None,
+    axes: Any = None,
 ) -> Any:
     """A matplotlib figure of lines as sticks, or of a spectrum as a curve.
 
@@ -106,11 +108,14 @@ def spectrum_figure(
         Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
     vertical : (2,), optional
         Lowest and highest intensity shown, in the unit of the axis.
+    axes : matplotlib.axes.Axes, optional
+        Drawn on instead of a new figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        One panel.
+        One panel. Lines of one rotational transition are named by the quantum numbers of their spins alone; the transition
+        stands above the picture.
 
     Raises
     ------
@@ -122,17 +127,17 @@ def spectrum_figure(
     lines = thing if isinstance(thing, Lines) else thing.lines
     heights = _heights(thing, lines)
     with styled():
-        figure = new_figure()
-        axes = figure.add_subplot()
+        figure, axes = panel(axes)
         x = _frequency_axis(thing, lines, heights, range_mhz, unit)
         _draw(axes, thing, x)
         _scale(axes, thing, lines, heights, x, log)
         show_part(axes, View(vertical=vertical))
-        _inscribe(axes, thing, lines, x, title)
+        transition = "" if lines is None else _only_transition(lines, _strongest_first(thing, lines, heights, x))
+        _inscribe(axes, thing, lines, x, title, transition)
         if lines is not None and labels:
             if vertical is None:
-                _leave_space(figure, axes, thing, lines, heights, x)
-            _name_lines(figure, axes, thing, lines, heights, x, labels)
+                _leave_space(figure, axes, thing, lines, heights, x, transition)
+            _name_lines(figure, axes, thing, lines, heights, x, labels, transition)
     return figure
 
 
@@ -232,12 +237,27 @@ def _is_logarithmic(heights: Floats) -> bool:
     return int((heights >= TALL * heights.max()).sum()) < min(10, len(heights) / 2)
 
 
-def _inscribe(axes: Any, thing: Lines | Spectrum, lines: Lines | None, x: _Axis, title: str | None) -> None:
+def _only_transition(lines: Lines, rows: Ints) -> str:
+    """The rotational transition of lines that spins split, where all of them have the same; else an empty text."""
+    quanta = lines.levels.quanta
+    rotation = of_rotation(quanta)
+    if len(rows) < 2 or len(rotation) == len(quanta):
+        return ""
+    both = np.stack([column[side[rows]] for column in rotation.values() for side in (lines.upper, lines.lower)])
+    alike = bool((both == both[:, :1]).all())
+    return (
+        line_text(rotation, int(lines.upper[rows[0]]), int(lines.lower[rows[0]]), lines.levels.halves) if alike else ""
+    )
+
+
+def _inscribe(
+    axes: Any, thing: Lines | Spectrum, lines: Lines | None, x: _Axis, title: str | None, transition: str
+) -> None:
     axes.set_xlabel("Wavenumber (cm⁻¹)" if x.unit == "cm-1" else f"Frequency ({x.unit})")
     axes.set_ylabel("Integrated absorption (nm² MHz)" if isinstance(thing, Lines) else _ordinate(thing))
     axes.set_title(title if title is not None else _title(thing, lines), loc="left")
-    if isinstance(thing, Spectrum) and thing.profile:
-        axes.set_title(_shape_text(thing), loc="right", fontsize=8, color=GREY)
+    shape = _shape_text(thing) if isinstance(thing, Spectrum) and thing.profile else ""
+    axes.set_title("; ".join(filter(None, (transition, shape))), loc="right", fontsize=8, color=GREY)
 
 
 def _shape_text(spectrum: Spectrum) -> str:
@@ -258,7 +278,7 @@ def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:
 
 
 def _name_lines(
-    figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, most: int
+    figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, most: int, transition: str
 ) -> None:
     """Name the strongest lines from the strongest down, upright above them, wherever there is space."""
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
@@ -273,7 +293,7 @@ def _name_lines(
             break
         if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
             continue  # no need to measure a name that cannot fit
-        leave_or_remove(_label(axes, lines, row, heights[row], x), axes, taken, drawn)
+        leave_or_remove(_label(axes, lines, row, heights[row], x, transition), axes, taken, drawn)
 
 
 def _strongest_first(thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis) -> Ints:
@@ -282,19 +302,21 @@ def _strongest_first(thing: Lines | Spectrum, lines: Lines, heights: Floats, x: 
     return rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")]
 
 
-def _leave_space(figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis) -> None:
+def _leave_space(
+    figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, transition: str
+) -> None:
     """Raise the upper limit of a linear axis until the name of the strongest line stands inside."""
     rows = _strongest_first(thing, lines, heights, x)
     if not len(rows) or axes.get_yscale() == "log":
         return
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
-    name = _label(axes, lines, int(rows[0]), heights[rows[0]], x)
+    name = _label(axes, lines, int(rows[0]), heights[rows[0]], x, transition)
     box, top = name.get_window_extent(), axes.get_ylim()[1]
     name.remove()
     beyond = box.y1 + 4 - axes.bbox.y1
     if beyond > 0:  # the part above the line keeps its height in pixels
         above = (axes.bbox.height - (heights[rows[0]] / top) * axes.bbox.height + beyond) / axes.bbox.height
-        axes.set_ylim(0.0, heights[rows[0]] / max(1 - above, 0.3))
+        axes.set_ylim(0.0, heights[rows[0]] / max(1 - above, LEAST_HEIGHT))
 
 
 def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArray[np.bool_]:
@@ -316,10 +338,11 @@ def _drawn_points(axes: Any, thing: Lines | Spectrum, x: _Axis) -> Floats:
     return np.asarray(axes.transData.transform(points[points[:, 1] > 0]))
 
 
-def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
+def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis, transition: str) -> Any:
     levels = lines.levels
+    text = line_text(levels.quanta, int(lines.upper[row]), int(lines.lower[row]), levels.halves)
     name = axes.annotate(
-        line_text(levels.quanta, int(lines.upper[row]), int(lines.lower[row]), levels.halves),
+        text.removeprefix(f"{transition}, ") if transition else text,
         (lines.frequency_mhz[row] / x.mhz, height),
         xytext=(0, 3),
         textcoords="offset points",

@@ -9,16 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from rotor.arrays import Ints
-from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.arrays import Floats, Ints
+from rotor.plots.picture import GREY, checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.fields.lines import FieldLines
-from rotor.units import MHZ_PER_CM
+from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 SIZE_INCHES = (7.2, 6.4)
 LEAST_DRAWN = 1e-4  # of the strongest line
+MOST_LABELS = 40  # on an axis of energies: the height of a name is a fortieth of it
+LETTER = 0.0105  # width of a letter of a name, in the width of the fields
+SAME_HEIGHT = 0.1  # of a name: nearer levels share a name
 
 
 def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view: View = WHOLE) -> Any:
@@ -106,7 +109,7 @@ def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     show_part(axes, replace(view, horizontal=None))
     fields = field_map.field[_curves(field_map, view)[0]]
     _labels(axes, (float(fields[0]), float(fields[-1])), ends)
-    axes.set_ylabel("E/hc (cm⁻¹)")
+    axes.set_ylabel("Energy (cm⁻¹)")
     if seen != {-1}:
         axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
 
@@ -127,34 +130,70 @@ def _colour(m: float) -> str:
 
 
 def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]]) -> None:
-    """Names of the free levels at the left, those that would stand on each other left out."""
+    """Names of all free levels at the left, moved apart where they would stand on each other; thin lines lead to the levels."""
     low, high = axes.get_ylim()
     first, end = fields
-    axes.set_xlim(first - 0.09 * (end - first), end + 0.02 * (end - first))
-    last = -np.inf
-    for energy, label in sorted(set(ends)):
-        if energy - last > (high - low) / 40:
-            axes.annotate(
-                label,
-                (first, energy),
-                (-4, 0),
-                textcoords="offset points",
-                ha="right",
-                va="center",
-                fontsize=7,
-            )
-            last = energy
+    height = (high - low) / MOST_LABELS
+    named = _grouped(sorted({(energy, label) for energy, label in ends if low <= energy <= high}), height)
+    places = _apart(np.array([energy for energy, _ in named]), height, low, high)
+    longest = max((len(label) for _, label in named), default=0)
+    axes.set_xlim(first - (0.045 + LETTER * longest) * (end - first), end + 0.02 * (end - first))
+    for (energy, label), place in zip(named, places.tolist(), strict=True):
+        axes.annotate(
+            label, (first, energy), (first - 0.035 * (end - first), place), ha="right", va="center", fontsize=7,
+            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0},
+        )  # fmt: skip
+
+
+def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float, str]]:
+    """Energies with their names; the nearest share a name as long as there are more of them than have space."""
+    groups = [([energy], [label]) for energy, label in levels]
+    while len(groups) > MOST_LABELS or (len(groups) > 1 and min(_gaps(groups)) < SAME_HEIGHT * height):
+        near = int(np.argmin(_gaps(groups)))
+        energies, labels = groups.pop(near + 1)
+        groups[near] = (groups[near][0] + energies, groups[near][1] + labels)
+    return [(float(np.mean(energies)), ", ".join(dict.fromkeys(labels))) for energies, labels in groups]
+
+
+def _gaps(groups: list[tuple[list[float], list[str]]]) -> Floats:
+    return np.diff([float(np.mean(energies)) for energies, _ in groups])
+
+
+def _apart(energies: Floats, height: float, low: float, high: float) -> Floats:
+    """Places at least `height` apart and inside the axis, near to rising energies: moved up, then down from the top."""
+    places = energies.copy()
+    for n in range(len(places)):
+        places[n] = max(places[n], (places[n - 1] + height) if n else low)
+    for n in range(len(places) - 1, -1, -1):
+        places[n] = min(places[n], (places[n + 1] - height) if n + 1 < len(places) else high)
+    return places
 
 
 def _slopes(axes: Any, field_map: FieldMap, unit: str, view: View) -> None:
     for rows in _curves(field_map, view):
-        axes.plot(
-            field_map.field[rows], field_map.slope[rows], color=_colour(float(field_map.m[rows[0]])), linewidth=0.8
-        )
-    axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
-    axes.set_xlabel(f"field ({unit})")
-    name = r"$\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
+        x, y = _bent(field_map, rows)
+        axes.plot(x, y, color=_colour(float(field_map.m[rows[0]])), linewidth=0.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.6, linestyle=":")
+    axes.set_xlabel(f"Field ({unit})")
+    name = r"Dipole $\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
     axes.set_ylabel(name)
+
+
+def _bent(field_map: FieldMap, rows: Ints) -> tuple[Floats, Floats]:
+    """Fields and effective dipoles, from zero field to the first one as the energies bend there.
+
+    Between the two fields the energy is the cubic that has the energies and slopes of both; its slope is drawn, not a straight line.
+    """
+    x, y = field_map.field[rows], field_map.slope[rows]
+    if field_map.slope_name != "mu_eff_debye" or x[0] != 0:
+        return x, y
+    mean = -(field_map.energy_mhz[rows[1]] - field_map.energy_mhz[rows[0]]) / (MHZ_PER_DEBYE_KV_PER_CM * x[1])
+    s = np.linspace(0.0, 1.0, 31)[:-1]
+    bent = y[0] * (1 - s) * (1 - 3 * s) + y[1] * s * (3 * s - 2) + 6 * mean * s * (1 - s)
+    inside = np.clip(
+        bent, min(y[0], y[1]), max(y[0], y[1])
+    )  # no curve beyond both ends where the field mixes close pairs
+    return np.concatenate([s * x[1], x[1:]]), np.concatenate([inside, y[1:]])
 
 
 def lobes_figure(lines: FieldLines, title: str = "") -> Any:
@@ -183,8 +222,8 @@ def lobes_figure(lines: FieldLines, title: str = "") -> Any:
                 label=label,
             )
             seen.add(m)
-        axes.set_xlabel("field (kV/cm)")
-        axes.set_ylabel("frequency (MHz)")
+        axes.set_xlabel("Field (kV/cm)")
+        axes.set_ylabel("Frequency (MHz)")
         axes.set_title(f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", "), loc="left", fontsize=9)
         axes.legend(frameon=False, fontsize=8)
     return figure

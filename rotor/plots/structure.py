@@ -40,8 +40,8 @@ def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title:
         axes.set_xlim(middle[across] - width / 2, middle[across] + width / 2)
         axes.set_ylim(middle[up] - height / 2, middle[up] + height / 2)
         axes.set_aspect("equal")
-        axes.set_xlabel(f"{'abc'[across]} (Å)")
-        axes.set_ylabel(f"{'abc'[up]} (Å)")
+        axes.set_xlabel(f"Axis ${'abc'[across]}$ (Å)")
+        axes.set_ylabel(f"Axis ${'abc'[up]}$ (Å)")
         axes.set_title(title or formula_text(molecule.formula), loc="left")
     return figure
 

@@ -53,8 +53,8 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
             show_part(axes, view)
         for axes in panels.ravel()[len(levels) :]:
             axes.set_visible(False)
-        figure.supxlabel("magnetic field (T); blue: M < 0, red: M > 0", fontsize=10)
-        figure.supylabel("shift from the level (MHz)", fontsize=10)
+        figure.supxlabel("Magnetic field (T); blue: M < 0, red: M > 0", fontsize=10)
+        figure.supylabel("Shift from the level (MHz)", fontsize=10)
         figure.suptitle(title, x=0.02, ha="left", fontsize=11)
     return figure
 

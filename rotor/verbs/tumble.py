@@ -86,7 +86,7 @@ def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
     if not isinstance(answer, TumbleAnswer):
         raise ValueError("outputs.plot: there is a picture of a free motion alone; leave it out")
     request, units = answer.request, answer.request.units
-    label = f"$t$ ({units.time})" if units.time else "$t$"
+    label = f"Time ({units.time})" if units.time else "Time"
     plot_polhodes(
         answer.motion, answer.table.times / units.time_factor, path, axis_names=request.axes, time_label=label,
         time_factor=units.time_factor, title=_picture_title(request), provenance=_provenance(report),

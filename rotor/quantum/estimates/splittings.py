@@ -118,11 +118,11 @@ def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | N
     left = 1.0
     every = range(min(numbers) + 1) if k is None else (k,)
     for one in nuclei:
-        kept = []
+        shares = []
         for number in every:
             shifts, parts = line_components(round(2 * one.spin), *numbers, number)
-            kept.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
-        left *= sum(kept) / len(kept)
+            shares.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
+        left *= sum(shares) / len(shares)
     return 1.0 - left
 
 
