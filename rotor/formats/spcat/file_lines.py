@@ -161,10 +161,14 @@ _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 
 def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArray[np.bool_]:
-    """Which lines are below FQLIM and stronger than 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz."""
-    least = 10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2
+    """Which lines are below FQLIM and strong enough."""
     limits = (frequency_mhz > LEAST_MHZ) & (frequency_mhz < request.fqlim_ghz * 1e3)
-    return np.asarray(limits & (intensity > least))
+    return np.asarray(limits & (intensity > least_intensity(request, frequency_mhz)))
+
+
+def least_intensity(request: Request, frequency_mhz: Floats) -> Floats:
+    """The intensity in nm² MHz below which a line is left out, (n,): 10^STR0 + 10^STR1 (ν/300 GHz)²."""
+    return np.asarray(10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2)
 
 
 def lines_of(

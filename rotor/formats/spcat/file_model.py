@@ -41,6 +41,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
+from rotor.quantum.connected import connected_parts
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
@@ -184,7 +185,7 @@ def groups_of(
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
-        for numbers in _connected(len(states), [*pairs, *doubled])
+        for numbers in connected_parts(len(states), [*pairs, *doubled])
     ]
 
 
@@ -307,14 +308,6 @@ def _at_components(states: tuple[int, int], pairs: list[Pair]) -> list[tuple[int
     if low in seconds:
         return []
     return [states, (firsts[low], firsts[low])] if low in firsts else [states]
-
-
-def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
-    group = list(range(count))
-    for i, k in pairs:
-        low, high = sorted((group[i], group[k]))
-        group = [low if g == high else g for g in group]
-    return [[i for i in range(count) if group[i] == g] for g in sorted(set(group))]
 
 
 def _group(

@@ -13,12 +13,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor import units
 from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat import wavenumbers
-from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
+from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted, least_intensity
 from rotor.formats.spcat.hamiltonian.codes import is_linear
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import is_plain, states_of
@@ -29,7 +28,7 @@ from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
-from rotor.formats.spcat.text.par import Options, ParameterFile, read_par
+from rotor.formats.spcat.text.par import Options, ParameterFile, note_of_npar, read_par
 from rotor.formats.spcat.variances import constants_covariance
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
@@ -37,11 +36,8 @@ from rotor.quantum.wang.basis import wang_blocks
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
-from rotor.table import counted
 from rotor.thermodynamics import PartitionFunction, partition_function
 from rotor.tops.top import Top
-
-_STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 
 @dataclass(frozen=True)
@@ -238,11 +234,6 @@ def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
     return lines.where(in_range & (10.0**lines.lgint / components > least_intensity(request, lines.frequency_mhz)))
 
 
-def least_intensity(request: Request, frequency_mhz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The intensity in nm² MHz below which a line is left out, (n,): 10^STR0 + 10^STR1 (ν/300 GHz)²."""
-    return np.asarray(10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2)
-
-
 def _as_the_program_lists(lines: Lines, options: Options, common: int, tag: int) -> Catalogue:
     made = catalogue(lines, tag)
     from_zero = (lines.levels.energy_mhz / units.MHZ_PER_CM)[lines.lower]
@@ -282,10 +273,7 @@ def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
 
 def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
     """What SPCAT does in silence with these files, and what is done here."""
-    options, found = parameters.options[0], len(parameters.parameters)
-    notes = []
-    if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
+    options, notes = parameters.options[0], note_of_npar(parameters)
     if not is_linear(options):  # a KNMAX below FEND is here only where it is lifted
         notes += notes_of_full_basis(states_of(parameters), request.fend)
     if top.kind == "asymmetric" and options.diag < 0:

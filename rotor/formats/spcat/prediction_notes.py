@@ -21,8 +21,7 @@ from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
 from rotor.formats.spcat.hamiltonian.phases import phases_of, with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
-from rotor.formats.spcat.text.par import ParameterFile
-from rotor.table import counted
+from rotor.formats.spcat.text.par import ParameterFile, note_of_npar
 
 UNDIAGONALIZED_NOTE = (
     "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
@@ -31,10 +30,7 @@ UNDIAGONALIZED_NOTE = (
 
 def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files alone, without their levels."""
-    present, notes = len(parameters.parameters), []
-    if parameters.header.npar > present:
-        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(present, 'parameter')}: all count")
-    notes += left_out(parameters)
+    notes = [*note_of_npar(parameters), *left_out(parameters)]
     if parameters.options[0].diag < 0 and not as_spcat:
         notes.append(UNDIAGONALIZED_NOTE)
     return notes + _notes_of_moments(parameters, intensities, as_spcat)

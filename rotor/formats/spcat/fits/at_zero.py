@@ -14,6 +14,7 @@ from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.connected import connected_parts
 
 _SYMMETRIES = range(4)  # of the group of twofold rotations; an operator of symmetry s leads from t to s ^ t
 _OF_TYP = 20  # TYP 20, 40 and 60 begin the operators of the symmetry of N_a, N_b and N_c
@@ -25,8 +26,9 @@ Place = tuple[int, int, int]  # of the two states and the symmetry of an operato
 def left_at_zero(file: ParameterFile) -> frozenset[int]:
     """The places of parameters of value 0 that are held, or connect what nothing else connects and so stay at 0."""
     places = _places(file)
-    known = _sets(place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
-    apart = [place is not None and _joins_sets(place, known) for place in places]
+    acting = (place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
+    known = _sets(acting, len(states_of(file)))
+    apart = [place is not None and all(known[a] != known[b] for a, b in _edges(place)) for place in places]
     return frozenset(
         i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or is_held(p) or apart[i])
     )
@@ -53,24 +55,13 @@ def _place(digits: Digits, states: int) -> Place | None:
     return None if high >= states else (low, high, digits.typ // _OF_TYP)
 
 
-def _sets(places: Iterable[Place]) -> dict[tuple[int, int], tuple[int, int]]:
-    """Of (state, symmetry) the one that stands for all that are connected with it; those that nothing connects are missing."""
-    above: dict[tuple[int, int], tuple[int, int]] = {}
-    for low, high, symmetry in places:
-        for one in _SYMMETRIES:
-            first, second = _top(above, (low, one)), _top(above, (high, one ^ symmetry))
-            if first != second:
-                above[first] = second
-    return above
+def _sets(places: Iterable[Place], states: int) -> dict[int, int]:
+    """The number of the set of each node, 4 v + symmetry."""
+    edges = (edge for place in places for edge in _edges(place))
+    return {node: i for i, part in enumerate(connected_parts(len(_SYMMETRIES) * states, edges)) for node in part}
 
 
-def _top(above: dict[tuple[int, int], tuple[int, int]], one: tuple[int, int]) -> tuple[int, int]:
-    while one in above:
-        one = above[one]
-    return one
-
-
-def _joins_sets(place: Place, above: dict[tuple[int, int], tuple[int, int]]) -> bool:
-    """Whether an operator has elements between different sets alone."""
+def _edges(place: Place) -> list[tuple[int, int]]:
+    """The pairs of nodes that an operator connects."""
     low, high, symmetry = place
-    return all(_top(above, (low, one)) != _top(above, (high, one ^ symmetry)) for one in _SYMMETRIES)
+    return [(len(_SYMMETRIES) * low + one, len(_SYMMETRIES) * high + (one ^ symmetry)) for one in _SYMMETRIES]

@@ -25,7 +25,7 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, i
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
-from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
+from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, note_of_npar, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
@@ -306,11 +306,7 @@ def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> No
 
 
 def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:
-    notes = []
-    if file.header.npar > len(file.parameters):
-        notes.append(
-            f"NPAR = {file.header.npar}, but the file has {counted(len(file.parameters), 'parameter')}: all count"
-        )
+    notes = note_of_npar(file)
     below = [p.label or str(p.code) for p in file.parameters if not p.constrained and (p.error or 0.0) < 0]
     if below:
         notes.append(f"a-priori errors below 0: {', '.join(below)} are held, as SPFIT does")

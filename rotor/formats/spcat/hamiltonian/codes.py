@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
+from rotor.tops import operators as published
 from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import RIGID
-from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
+from rotor.tops.operators import Operators, axes_of, powers_of_spelled, spelled_term
 
 NOT_YET = "is read but not computed yet"
 PLURAL_NOT_YET = "are read but not computed yet"
@@ -57,41 +58,6 @@ class Named(NamedTuple):
     name: str
     code: int
     sign: int
-
-
-def _named(codes: Mapping[str, int], minus: Iterable[str]) -> tuple[Named, ...]:
-    negative = set(minus)
-    return tuple(Named(name, code, -1 if name in negative else 1) for name, code in codes.items())
-
-
-_OCTIC = {"LJ": 400, "LJJK": 1300, "LJK": 2200, "LKKJ": 3100, "LK": 4000}
-_DECIC = {"PJ": 500, "PJJK": 1400, "PJK": 2300, "PKJ": 3200, "PKKJ": 4100, "PK": 5000}
-_SYMMETRIC_CODES = {
-    "DJ": 200, "DJK": 1100, "DK": 2000,
-    "HJ": 300, "HJK": 1200, "HKJ": 2100, "HK": 3000,
-    **_OCTIC,
-    **_DECIC,
-}  # fmt: skip
-LINEAR = _named({"D": 200, "H": 300, "L": 400}, ["D"])
-SYMMETRIC = _named(_SYMMETRIC_CODES, ["DJ", "DJK", "DK"])
-S_REDUCTION = _named(
-    {
-        **_SYMMETRIC_CODES,
-        "d1": 40100, "d2": 50000,
-        "h1": 40200, "h2": 50100, "h3": 60000,
-        "l1": 40300, "l2": 50200, "l3": 60100, "l4": 70000,
-    },
-    ["DJ", "DJK", "DK"],
-)  # fmt: skip
-A_REDUCTION = _named(
-    {
-        "DeltaJ": 200, "DeltaJK": 1100, "DeltaK": 2000, "deltaJ": 40100, "deltaK": 41000,
-        "PhiJ": 300, "PhiJK": 1200, "PhiKJ": 2100, "PhiK": 3000, "phiJ": 40200, "phiJK": 41100, "phiK": 42000,
-        **_OCTIC, "lJ": 40300, "lJK": 41200, "lKJ": 42100, "lK": 43000,
-        **_DECIC,
-    },
-    ["DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"],
-)  # fmt: skip
 
 
 def state_digits(states: int) -> int:
@@ -134,6 +100,24 @@ def code_of_term(p: int, q: int, n: int) -> int:
     [100, 1000, 40100, 70000]
     """
     return join_code(Digits(0, 0, 0, 0, 0, typ=3 + n if n else 0, ksq=q, nsq=p, v2=0, v1=0))
+
+
+def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
+    """Names, codes and signs of constants that multiply one term each."""
+    found = ((name, *next(iter(operators.items()))) for name, operators in terms)
+    return tuple(Named(name, code_of_term(*powers), int(sign)) for name, powers, sign in found)
+
+
+def _by_order(term: tuple[str, Operators]) -> tuple[int, int]:
+    """Quartic, sextic, ... terms one after another, those diagonal in K first."""
+    powers = next(iter(term[1]))
+    return sum(powers), powers[2]
+
+
+LINEAR, SYMMETRIC, S_REDUCTION = (
+    _named(t.items()) for t in (published.LINEAR, published.SYMMETRIC, published.S_REDUCTION)
+)
+A_REDUCTION = _named(sorted(published.A_REDUCTION.items(), key=_by_order))
 
 
 def _whole_code(parameter: Parameter) -> int:

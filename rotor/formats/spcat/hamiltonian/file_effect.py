@@ -15,7 +15,7 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of
 from rotor.formats.spcat.hamiltonian.phases import axis_of, half_turned
 from rotor.formats.spcat.hamiltonian.series import (
     Series,
@@ -26,6 +26,7 @@ from rotor.formats.spcat.hamiltonian.series import (
     symmetry_type,
     term_of,
 )
+from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.coupled import NOTHING

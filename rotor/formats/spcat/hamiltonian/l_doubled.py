@@ -20,13 +20,13 @@ on the phase between x and y, the parity of a split pair, is not verified agains
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.coupled import CoupledBlock, Part
 from rotor.quantum.levels import Levels
@@ -69,53 +69,36 @@ def pairs_of(states: Sequence[StateOptions]) -> list[Pair]:
     return found
 
 
-def up(operator: JOperator) -> JOperator:
-    """The part that raises k."""
-    return JOperator(operator.j, {q: band for q, band in operator.bands.items() if q > 0})
+class RealPart(NamedTuple):
+    """What a parameter stands for between two real states: the factor of O, or of i(O↑ - O↓) where `turned`."""
+
+    bra: int
+    ket: int
+    factor: float
+    turned: bool = False
 
 
-def down(operator: JOperator) -> JOperator:
-    """The part that lowers k."""
-    return JOperator(operator.j, {q: band for q, band in operator.bands.items() if q < 0})
-
-
-def _scaled(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
-    return lambda j, representation: factor * of(j, representation)
-
-
-def _turned(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
-    """factor (O↑ - O↓)."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        whole = of(j, representation)
-        return factor * (up(whole) - down(whole))
-
-    return operator
-
-
-def couplings_with_pairs(
-    name: str, of: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
-) -> list[Coupling]:
+def over_real_states(
+    states: tuple[int, int], odd: bool, reversed_: bool, pairs: Sequence[Pair], what: str = "operator"
+) -> list[RealPart]:
     """What a parameter stands for over real states, where one of its states at least is l-doubled.
 
     Parameters
     ----------
-    name : str
-        Of the parameter.
-    of : callable
-        (J, representation) to the operator in |J k⟩, with the factor i where it is odd.
-    odd : bool
-        Whether the operator changes sign under time reversal.
     states : (int, int)
         Lower number first.
+    odd : bool
+        Whether the operator changes sign under time reversal.
     reversed_ : bool
         V2 > V1 in the code, Δk Δl < 0.
     pairs : sequence of Pair
         The l-doubled states of the file.
+    what : str, optional
+        What the operator is called in errors; a "spin operator" that is odd is not computed between different states.
 
     Returns
     -------
-    list of Coupling
+    list of RealPart
         As the table at the head of the module.
 
     Raises
@@ -127,48 +110,63 @@ def couplings_with_pairs(
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
     sign = -1.0 if reversed_ else 1.0
     if low == high:
-        return _within(name, of, odd, firsts.get(low))
+        return _within(odd, firsts.get(low))
+    if odd and what != "operator":
+        raise ValueError(f"an odd {what} between l-doubled states is read but not computed yet")
     if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
         if odd:
             raise ValueError("an odd operator between l and -l is not invariant under time reversal")
-        x, y = sorted(states)
-        turned = _turned(of, 0.5j * sign * (1.0 if x in firsts else -1.0))
-        return [
-            Coupling(name, x, x, _scaled(of, 0.5)),
-            Coupling(name, y, y, _scaled(of, -0.5)),
-            Coupling(name, x, y, turned),
-        ]
+        turned = 0.5 * sign * (1.0 if low in firsts else -1.0)
+        return [RealPart(low, low, 0.5), RealPart(high, high, -0.5), RealPart(low, high, turned, True)]
     if low in firsts and high in firsts:
         if odd:
             raise ValueError("an odd operator between two l-doubled states is read but not computed yet")
-        return [
-            _between(name, firsts[low].first, firsts[high].first, of),
-            _between(name, firsts[low].second, firsts[high].second, of),
-        ]
+        return [_ordered(one, other, 1.0) for one, other in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
+        article = "an" if what == "operator" else "a"
         raise ValueError(
-            "an operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
+            f"{article} {what} of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
         )
-    pair = firsts[low] if low in firsts else firsts[high]
-    other = high if low in firsts else low
-    across = _turned(of, 1j * sign / sqrt(2.0))
-    return [
-        _between(name, other, pair.first, _scaled(of, 1 / sqrt(2.0))),
-        _between(name, other, pair.second, across),
-    ]
+    pair, other = (firsts[low], high) if low in firsts else (firsts[high], low)
+    share = 1 / sqrt(2.0)
+    return [_ordered(other, pair.first, share), _ordered(other, pair.second, sign * share, True)]
 
 
-def _between(name: str, one: int, other: int, of: OperatorOfJ) -> Coupling:
-    return Coupling(name, min(one, other), max(one, other), of)
+def _ordered(one: int, other: int, factor: float, turned: bool = False) -> RealPart:
+    return RealPart(min(one, other), max(one, other), factor, turned)
 
 
-def _within(name: str, of: OperatorOfJ, odd: bool, pair: Pair | None) -> list[Coupling]:
+def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
     if pair is None:  # of the second state: passed over
         return []
     x, y = sorted(pair)
     if odd:
-        return [Coupling(name, x, y, _scaled(of, -1.0 if x == pair.first else 1.0))]
-    return [Coupling(name, x, x, of), Coupling(name, y, y, of)]
+        return [RealPart(x, y, -1.0 if x == pair.first else 1.0)]
+    return [RealPart(x, x, 1.0), RealPart(y, y, 1.0)]
+
+
+def _scaled(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
+    return lambda j, representation: factor * of(j, representation)
+
+
+def _turned(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
+    """factor (O↑ - O↓)."""
+
+    def operator(j: int, representation: str) -> JOperator:
+        bands = of(j, representation).bands
+        return JOperator(j, {q: factor * np.sign(q) * band for q, band in bands.items() if q})
+
+    return operator
+
+
+def couplings_with_pairs(
+    name: str, of: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
+) -> list[Coupling]:
+    """The couplings of `over_real_states` for an operator in |J k⟩, which has the factor i where it is odd."""
+    return [
+        Coupling(name, bra, ket, _turned(of, 1j * factor) if turned else _scaled(of, factor))
+        for bra, ket, factor, turned in over_real_states(states, odd, reversed_, pairs)
+    ]
 
 
 # Names of levels
@@ -176,12 +174,8 @@ def _within(name: str, of: OperatorOfJ, odd: bool, pair: Pair | None) -> list[Co
 
 def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
     """The same levels with v of a pair by the sign of K l, and Ka, Kc of the function |K, l⟩ ± |-K, -l⟩ with the largest share."""
-    labels, mixing = np.empty((len(levels), 3), dtype=np.int64), np.empty(len(levels))
-    for block in levels.blocks:
-        rows = slice(block.start, block.start + len(block.energies_mhz))
-        labels[rows], mixing[rows] = _names_of_block(block, pairs, representation)
-    quanta = {**levels.quanta, "v": labels[:, 0], "ka": labels[:, 1], "kc": labels[:, 2]}
-    return replace(levels, quanta=quanta, mixing=mixing)
+    found = [_names_of_block(block, pairs, representation) for block in levels.blocks]
+    return renamed(levels, *zip(*found, strict=True))
 
 
 def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:

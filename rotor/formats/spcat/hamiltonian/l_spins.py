@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import sqrt
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_parts
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_parts, over_real_states
+from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
@@ -50,50 +50,17 @@ def spin_terms_with_pairs(
     ValueError
         For what this package does not compute between such states.
     """
-    low, high = states
-    firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
-    sign = -1.0 if reversed_ else 1.0
     odd = term.rotor.odd
-    if low == high:  # in an oblate basis the sign of what is odd is another between states than within a pair
-        return _within(_at(term, term.bra, term.ket, -1.0) if odd and axes[2] == "c" else term, odd, firsts.get(low))
-    if odd:
-        raise ValueError("an odd spin operator between l-doubled states is read but not computed yet")
-    if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
-        x, y = sorted(states)
-        turned = 0.5 * sign * (1.0 if x in firsts else -1.0)
-        return [_at(term, x, x, 0.5), _at(term, y, y, -0.5), *_at_turned(term, x, y, turned, axes)]
-    if low in firsts and high in firsts:
-        return [_at(term, *_in_order(a, b)) for a, b in zip(firsts[low], firsts[high], strict=True)]
-    if low in seconds or high in seconds:
-        raise ValueError(
-            "a spin operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
-        )
-    pair = firsts[low] if low in firsts else firsts[high]
-    other = high if low in firsts else low
-    with_x, with_y = _in_order(other, pair.first), _in_order(other, pair.second)
-    return [_at(term, *with_x, 1 / sqrt(2.0)), *_at_turned(term, *with_y, sign / sqrt(2.0), axes)]
-
-
-def _in_order(one: int, other: int) -> tuple[int, int]:
-    return min(one, other), max(one, other)
-
-
-def _at(term: SpinTerm, bra: int, ket: int, factor: float = 1.0) -> SpinTerm:
-    return replace(term, bra=bra, ket=ket, factor=term.factor * factor)
-
-
-def _within(term: SpinTerm, odd: bool, pair: Pair | None) -> list[SpinTerm]:
-    if pair is None:  # of the second state: passed over
-        return []
-    x, y = sorted(pair)
-    if odd:
-        return [_at(term, x, y, -1.0 if x == pair.first else 1.0)]
-    return [_at(term, x, x), _at(term, y, y)]
-
-
-def _at_turned(term: SpinTerm, bra: int, ket: int, factor: float, axes: str) -> list[SpinTerm]:
+    if odd and states[0] == states[1] and axes[2] == "c":
+        term = replace(
+            term, factor=-term.factor
+        )  # the sign of what is odd is another between states than within a pair there
     turned = turned_rotor(term.rotor, axes)
-    return [] if turned is None else [replace(_at(term, bra, ket, factor), rotor=turned)]
+    return [
+        replace(term, bra=part.bra, ket=part.ket, factor=term.factor * part.factor, rotor=rotor)
+        for part in over_real_states(states, odd, reversed_, pairs, "spin operator")
+        if (rotor := turned if part.turned else term.rotor) is not None
+    ]
 
 
 def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
@@ -119,21 +86,14 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
 
 def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
     """The same levels with v of a pair by the sign of K l, and names by the function |K, l⟩ ± |-K, -l⟩ with the largest share."""
-    labels, mixing = [], []
+    found = []
     known: dict[int, tuple[Floats, Ints]] = {}
     for block in levels.blocks:
         for part in block.parts:
             if part.number not in known:
                 known[part.number] = _functions(part.rotor, pairs, representation)
-        own, shares = _names_of_block(block, known)
-        labels.append(own)
-        mixing.append(shares)
-    table = np.concatenate(labels)
-    quanta = {**levels.quanta, "v": table[:, 0], "n": table[:, 3] // 2, "ka": table[:, 1], "kc": table[:, 2]}
-    sums = [name for name in levels.quanta if name not in ("v", "n", "ka", "kc")]
-    for column, name in enumerate(sums, 4):
-        quanta[name] = table[:, column] if name in levels.halves else table[:, column] // 2
-    return replace(levels, quanta=quanta, mixing=np.concatenate(mixing))
+        found.append(_names_of_block(block, known))
+    return renamed(levels, *zip(*found, strict=True))
 
 
 def functions_with_spins(block: SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:

@@ -82,6 +82,11 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
         at = places(functions, energies, diag, diagonal)
         tables.append(functions.names[at])
         shares.append(_shares_of_groups(functions, at, diag))
+    return renamed(levels, tables, shares)
+
+
+def renamed(levels: Levels, tables: Sequence[Ints], shares: Sequence[Floats]) -> Levels:
+    """The same levels with names v, Ka, Kc and, with spins, the doubled pattern N, ..., F, and shares of what names them, by block."""
     table = np.concatenate(tables)
     quanta = {**levels.quanta, "ka": table[:, 1], "kc": table[:, 2]}
     if "v" in quanta:

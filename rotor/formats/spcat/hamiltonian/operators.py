@@ -38,7 +38,7 @@ from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
 from rotor.quantum.states import OperatorOfJ
-from rotor.quantum.wang.j_operators import JOperator, anticommutator, components, identity, lowering, raising
+from rotor.quantum.wang.j_operators import JOperator, anticommutator, components
 from rotor.tops.operators import Operators
 
 ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
@@ -180,19 +180,6 @@ def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
     raised, lowered = (of[x] + 1j * of[y]) ** k, (of[x] - 1j * of[y]) ** k
     pair = raised + lowered if cosine else -1j * (raised - lowered)
     return 0.5 * pair if k == order else factor_below(typ) * anticommutator(of[z], pair)
-
-
-def plain_of_j(operators: Operators) -> OperatorOfJ:
-    """Powers (p, q, n) as an operator of one J, for what connects two states."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        total = 0.0 * identity(j)
-        for (p, q, n), factor in operators.items():
-            ladder = raising(j) ** (2 * n) + lowering(j) ** (2 * n) if n else identity(j)
-            total = total + factor * with_powers(ladder, ParameterName("", p, q))
-        return total
-
-    return operator
 
 
 def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:

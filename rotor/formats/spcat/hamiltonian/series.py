@@ -29,8 +29,8 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, plain_of_j
-from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, order_of
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of
+from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, order_of, plain_of_j
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator

@@ -18,10 +18,14 @@ from math import sqrt
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.quantum.effects.interactions import with_powers
+from rotor.quantum.effects.spin_effect import ParameterName
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
+from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.symmetric_top_elements import symmetric_top_elements
 from rotor.quantum.tensors import Complexes, spherical_components
-from rotor.quantum.wang.j_operators import components, identity, lowering, raising
+from rotor.quantum.wang.j_operators import JOperator, components, identity, lowering, raising
+from rotor.tops.operators import Operators
 
 FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # of N', N, K', K
 OverK = Callable[[int, int, str], Complexes]  # of N', N and the representation
@@ -183,16 +187,23 @@ def over_k(rotor: Rotor) -> OverK:
     return lambda m, n, rep: factor * symmetric_top_elements(m, n, spherical_components(c, rotor.rank, rep))
 
 
-def _of_powers(rotor: Scalar, m: int, n: int) -> Complexes:
-    total = np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
-    if m != n:
+def plain_of_j(operators: Operators) -> OperatorOfJ:
+    """Powers (p, q, n) as an operator of one J, for what connects two states."""
+
+    def operator(j: int, representation: str) -> JOperator:
+        total = 0.0 * identity(j)
+        for (p, q, n), factor in operators.items():
+            ladder = raising(j) ** (2 * n) + lowering(j) ** (2 * n) if n else identity(j)
+            total = total + factor * with_powers(ladder, ParameterName("", p, q))
         return total
-    square = np.diag(np.arange(-n, n + 1.0) ** 2)
-    for (p, q, power), value in rotor.operators:
-        ladder = (raising(n) ** (2 * power) + lowering(n) ** (2 * power) if power else identity(n)).matrix
-        k = np.linalg.matrix_power(square, q)
-        total += value * (n * (n + 1.0)) ** p * (k @ ladder + ladder @ k) / 2
-    return total
+
+    return operator
+
+
+def _of_powers(rotor: Scalar, m: int, n: int) -> Complexes:
+    if m != n:
+        return np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+    return plain_of_j(dict(rotor.operators))(n, "").matrix
 
 
 def _with_n(c: Floats, where: Where) -> Complexes:

@@ -151,36 +151,13 @@ def _ends(text: str, at: int) -> bool:
 
 
 def number(line: Line, words: Sequence[Word], index: int, name: str, default: float | None = None) -> float:
-    """The number that is called `name`; its default where it is left out, an error where it has none.
+    """The number `index` of a line, called `name` in errors, with an exponent E or D; its default where it is left out.
 
-    Parameters
-    ----------
-    line : Line
-        Named in errors.
-    words : sequence of Word
-        The numbers of the line.
-    index : int
-        Which of them, from 0.
-    name : str
-        What it is called in errors.
-    default : float, optional
-        Its value where it is left out.
-
-    Returns
-    -------
-    float
-        A finite number; exponents may be written with D.
-
-    Raises
-    ------
-    ValueError
-        With file, line and column, where it is missing or too large.
+    Raises ValueError, with file, line and column, where it is missing and has no default, and where it is too large.
     """
-    word = words[index] if index < len(words) else Word(None, len(line.body))
+    word = _present(line, words, index, name, default is not None)
     if word.text is None:
-        if default is None:
-            raise line.error(word.column, f"{name} is missing")
-        return default
+        return default or 0.0
     value = float(word.text.replace("D", "E").replace("d", "e"))
     if not math.isfinite(value):
         raise line.error(word.column, f"{name} = {word.text} is too large for a number")
@@ -188,39 +165,21 @@ def number(line: Line, words: Sequence[Word], index: int, name: str, default: fl
 
 
 def whole(line: Line, words: Sequence[Word], index: int, name: str, default: int | None = None) -> int:
-    """The whole number that is called `name`, of at most 30 digits.
-
-    Parameters
-    ----------
-    line : Line
-        Named in errors.
-    words : sequence of Word
-        The numbers of the line.
-    index : int
-        Which of them, from 0.
-    name : str
-        What it is called in errors.
-    default : int, optional
-        Its value where it is left out.
-
-    Returns
-    -------
-    int
-        A decimal point and what follows it are passed over.
-
-    Raises
-    ------
-    ValueError
-        With file, line and column, where it is missing or not a whole number.
-    """
-    word = words[index] if index < len(words) else Word(None, len(line.body))
+    """The same of a whole number with at most 30 digits; a decimal point and what follows it are passed over."""
+    word = _present(line, words, index, name, default is not None)
     if word.text is None:
-        if default is None:
-            raise line.error(word.column, f"{name} is missing")
-        return default
+        return default or 0
     if not _WHOLE.match(word.text) or len(word.text) > 30:
         raise line.error(word.column, f"{name} = {word.text}: expected a whole number")
     return int(word.text.split(".")[0])
+
+
+def _present(line: Line, words: Sequence[Word], index: int, name: str, optional: bool) -> Word:
+    """A word of the line; its error where it is missing and not optional."""
+    word = words[index] if index < len(words) else Word(None, len(line.body))
+    if word.text is None and not optional:
+        raise line.error(word.column, f"{name} is missing")
+    return word
 
 
 def spell(value: float) -> str:

@@ -183,6 +183,14 @@ def _parameter(line: Line) -> Parameter:
     return Parameter(abs(code), value, error, label, negative, line.text)
 
 
+def note_of_npar(file: ParameterFile) -> list[str]:
+    """A note for a file with fewer parameters than NPAR says."""
+    found = len(file.parameters)
+    if file.header.npar <= found:
+        return []
+    return [f"NPAR = {file.header.npar}, but the file has {counted(found, 'parameter')}: all count"]
+
+
 def format_par(file: ParameterFile) -> bytes:
     """The text of a parameter file; each line as it was read, as long as it says the same."""
     title = file.title_text if _title(Line(file.title_text, 1, "")) == file.title else ""
