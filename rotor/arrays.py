@@ -73,6 +73,15 @@ def rising_order(values: Floats) -> Ints:
     return np.asarray(order)
 
 
+def whole_of_lower(lower: Floats) -> Floats:
+    """Symmetric matrices (..., n, n) of their lower triangles, which have zeros above the diagonal.
+
+    >>> whole_of_lower(np.array([[1.0, 0.0], [2.0, 3.0]])).tolist()
+    [[1.0, 2.0], [2.0, 3.0]]
+    """
+    return np.asarray(lower + np.tril(lower, -1).swapaxes(-1, -2))
+
+
 def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Columns of several tables as one; that of a single table as it is."""
     return np.concatenate(columns) if len(columns) > 1 else columns[0]

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, Workspace
+from rotor.arrays import Floats, Ints, Workspace, whole_of_lower
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LIKE = 1.5  # sizes of blocks that stand side by side
@@ -36,12 +36,17 @@ class LinearBlock(NamedTuple):
     mix: Floats
     parameters: Ints
 
+    def matrices(self) -> Floats:
+        """The O_i of its parameters, whole: (parameters, size, size)."""
+        lower = np.zeros((len(self.parameters), self.size, self.size))
+        lower[:, self.rows, self.columns] = (self.factors @ self.mix).T
+        return whole_of_lower(lower)
+
     def turned(self, functions: Floats) -> LinearBlock:
         """The block over other functions, given in rows over those of this one."""
-        lower, found = np.zeros((self.size, self.size)), list[WeightedElements]()
-        for parameter, values in zip(self.parameters.tolist(), (self.factors @ self.mix).T, strict=True):
-            lower[self.rows, self.columns] = values
-            matrix = np.tril(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
+        found = list[WeightedElements]()
+        for parameter, whole in zip(self.parameters.tolist(), self.matrices(), strict=True):
+            matrix = np.tril(functions @ whole @ functions.T)
             places = np.flatnonzero(matrix)
             found.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
         return linear_block(len(functions), found)

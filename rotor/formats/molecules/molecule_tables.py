@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import whole_of_lower
 from rotor.formats.molecules.level_table import read_level_table
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
@@ -285,9 +286,8 @@ def covariance_of(
     matrix = np.zeros((len(names), len(names)))
     for i, row in enumerate(rows):
         matrix[i, : i + 1] = row
-    matrix += np.tril(matrix, -1).T
     try:
-        return Covariance.of_correlations(names, [known[name] for name in names], matrix)
+        return Covariance.of_correlations(names, [known[name] for name in names], whole_of_lower(matrix))
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 

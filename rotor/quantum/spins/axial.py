@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateTerms
-from rotor.quantum.spins.contraction import Contracted, Stack
+from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, tensors_of_stacks
 from rotor.quantum.spins.operators import AxialState, Cosines, CosinesWithN, Rotor, Scalar, factors_with_n, tensor_of
 from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
-from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs, Section
+from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 
@@ -40,23 +40,17 @@ def existing_functions(blocks: Sequence[RotorBlock], exist: Exist, spins: int) -
     return [block for block, exists in zip(blocks, there, strict=True) if exists] or list(blocks)
 
 
-def axial_stacks(blocks: Sequence[RotorBlock]) -> list[Stack]:
-    """All blocks of one state v as a stack."""
-    by_v: dict[int, list[int]] = {}
-    for number, block in enumerate(blocks):
-        by_v.setdefault(block.parts[0].v, []).append(number)
-    return [_stack(blocks, kind, numbers) for kind, numbers in enumerate(by_v.values())]
+def contracted_operators(
+    stacks: Sequence[Stack], reach: int, operators: Sequence[Sequence[Piece]], representation: str
+) -> list[list[Contracted]]:
+    """`contraction.operators_of_stacks`, by closed forms where the functions are |N K⟩."""
+    contract = operators_of_axial_stacks if are_axial(stacks[0].blocks) else operators_of_stacks
+    return contract(stacks, reach, operators, representation)
 
 
-def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack:
-    own = [blocks[number] for number in numbers]
-    count = len(own)
-    first = own[0].parts[0]
-    section = Section(first.v, first.basis, slice(0, 1), tuple(block.parts[0] for block in own))  # type: ignore[arg-type]
-    return Stack(
-        kind, np.array(numbers), np.array([block.n for block in own]), (section,), np.ones((count, 1, 1)), [1] * count, own,
-        [True] * count,
-    )  # fmt: skip
+def contracted_tensors(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
+    """`contraction.tensors_of_stacks`, by closed forms where the functions are |N K⟩."""
+    return (tensors_of_axial_stacks if are_axial(stacks[0].blocks) else tensors_of_stacks)(stacks, tensors)
 
 
 def operators_of_axial_stacks(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, whole_of_lower
 from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.spins.axial import Exist, operators_of_axial_stacks, powers_of_axial
 from rotor.quantum.spins.blocks import Plan, SpinBlock, parts_of_f
@@ -79,8 +79,6 @@ def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) 
     every_f: doubled, rising by 2. exist: see `levels.levels_of_f`.
     """
     shared = plan.shared
-    if shared.axial is None or plan.contracted is None:
-        return None
     table = pattern_table(shared.scheme, every_f[0], every_f[-1])
     members: list[Member] = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
     if not members or len(table.every) > _MOST:
@@ -115,7 +113,7 @@ def axial_derivatives(
     shared, out = blocks[0].shared, np.zeros((count, len(names)))
     twice_f = [block.twice_f for block in blocks]
     places = pattern_table(shared.scheme, min(twice_f), max(twice_f)).places
-    stacks = shared.axial or []
+    stacks = shared.stacks
     by_number = {
         number: block for stack in stacks for number, block in zip(stack.numbers.tolist(), stack.blocks, strict=True)
     }
@@ -130,8 +128,7 @@ def axial_derivatives(
         vectors = np.stack([blocks[i].vectors for i in which])
         slopes = np.matmul((vectors**2).transpose(0, 2, 1), along[functions.numbers])
         for (column, channel), found in zip(acting, spins, strict=True):
-            lower = tables.matrices(found, [channel], functions)
-            whole = lower + np.tril(lower, -1).transpose(0, 2, 1)
+            whole = whole_of_lower(tables.matrices(found, [channel], functions))
             slopes[:, :, column] += (np.matmul(whole, vectors) * vectors).sum(axis=1)
         rows = np.array([blocks[i].start for i in which])[:, None] + np.arange(vectors.shape[2])
         out[rows] = slopes

@@ -21,8 +21,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER, BlockWithSpins, Used
-from rotor.quantum.spins.axial import Exist, are_axial, axial_stacks, existing_functions, operators_of_axial_stacks
-from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
+from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
+from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
@@ -52,15 +52,19 @@ InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 @dataclass(frozen=True)
 class Shared:
-    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks, as their functions
-    are those of Wang blocks or |N K⟩, and elements that were computed once."""
+    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks, and elements that
+    were computed once."""
 
     scheme: Scheme
     representation: str
-    stacks: list[Stack] | None = field(default=None, repr=False, compare=False)
-    axial: list[Stack] | None = field(default=None, repr=False, compare=False)
+    stacks: list[Stack] = field(repr=False, compare=False)
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     used: Used | None = None
+
+    @property
+    def axial(self) -> bool:
+        """Whether the functions are |N K⟩, not those of Wang blocks."""
+        return are_axial(self.stacks[0].blocks)
 
 
 @dataclass(frozen=True)
@@ -107,14 +111,14 @@ class SpinBlock(BlockWithSpins):
 class Plan:
     """Solved rotation, operators of every channel, and which blocks they connect.
 
-    families: members (block, class), see `families`. contracted: the operators in stacks, each with the channels that share it, where
-    they were made so. given: the operators by pairs of blocks (i ≥ k), where they are others.
+    families: members (block, class), see `families`. contracted: the operators in stacks, each with the channels that share it.
+    given: the operators by pairs of blocks (i ≥ k), where they are others.
     """
 
     shared: Shared
     blocks: list[RotorBlock]
     families: list[list[tuple[int, int]]]
-    contracted: InStacks | None = field(default=None, repr=False)
+    contracted: InStacks = field(repr=False)
     given: Operators | None = field(default=None, repr=False)
 
     @cached_property
@@ -123,7 +127,7 @@ class Plan:
         if self.given is not None:
             return self.given
         out: Operators = {}
-        for found, channels in self.contracted or ():
+        for found, channels in self.contracted:
             for pair, operator in by_numbers(found).items():
                 out.setdefault(pair, []).append((operator, channels))
         return out
@@ -181,17 +185,15 @@ def plan_of(
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
-    axial = axial_stacks(blocks) if are_axial(blocks) else None
-    stacks = None if axial else stacks_of(blocks)
-    contract = operators_of_axial_stacks if axial else operators_of_stacks
+    stacks = stacks_of(blocks)
     found: dict[Channel, list[Contracted]] = {}
     for rank in {channel.rank for channel in distinct}:
         own = [channel for channel in distinct if channel.rank == rank]
         pieces = [distinct[channel] for channel in own]
-        found |= zip(own, contract(axial or stacks or [], min(reach, rank), pieces, representation), strict=True)
+        found |= zip(own, contracted_operators(stacks, min(reach, rank), pieces, representation), strict=True)
     contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
-    return Plan(Shared(scheme, representation, stacks, axial), blocks, families, contracted)
+    return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:

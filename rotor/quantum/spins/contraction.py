@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.operators import Rotor
+from rotor.quantum.spins.operators import Basis, Rotor
 from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, power_matrices, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
@@ -54,13 +54,16 @@ class Contracted(NamedTuple):
 
 
 def stacks_of(blocks: Sequence[RotorBlock]) -> list[Stack]:
-    """All blocks, whose functions are those of Wang blocks, in stacks of like shapes."""
-    alike: dict[tuple[tuple[int, int, int], ...], list[int]] = {}
+    """All blocks in stacks of like shapes: by their states and kinds of Wang blocks, of |N K⟩ by their states."""
+    alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
     for number, block in enumerate(blocks):
-        key = tuple((part.v, part.basis.first_k, part.basis.sign) for part in block.parts)  # type: ignore[union-attr]
-        alike.setdefault(key, []).append(number)
+        alike.setdefault(tuple((part.v, *_kind(part.basis)) for part in block.parts), []).append(number)
     of_kinds = enumerate(alike.values())
     return [_stack(blocks, kind, some) for kind, members in of_kinds for some in _of_like_size(blocks, members)]
+
+
+def _kind(basis: Basis) -> tuple[int, ...]:
+    return (basis.first_k, basis.sign) if isinstance(basis, WangBlock) else ()
 
 
 def _of_like_size(blocks: Sequence[RotorBlock], members: list[int]) -> Iterator[list[int]]:
@@ -78,8 +81,7 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
     sections, start = [], 0
     for parts in zip(*(block.parts for block in own), strict=True):
         largest = max((part.basis for part in parts), key=lambda basis: basis.size)
-        assert isinstance(largest, WangBlock)
-        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
+        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))  # type: ignore[arg-type]
         start += largest.size
     sizes = [len(block.energies_mhz) for block in own]
     vectors = np.zeros((len(own), start, max(sizes)))

@@ -54,7 +54,7 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared: Shared = levels.blocks[0].shared
-    if shared.axial is not None:
+    if shared.axial:
         return np.asarray(axial_derivatives(top, levels.effects, names, levels.blocks, len(levels))[rows])
     frame, groups = _frame_and_groups(levels.blocks, shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row is that of padding
@@ -79,7 +79,7 @@ def _frame_and_groups(blocks: Sequence[SpinBlock], shared: Shared) -> tuple[Fram
         return frame, groups_of_blocks(blocks)
     twice_f = [block.twice_f for block in blocks]
     table = pattern_table(shared.scheme, min(twice_f), max(twice_f))
-    frame = frame_of(shared.stacks or [], table.places, table.every)
+    frame = frame_of(shared.stacks, table.places, table.every)
     made = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
     return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in made]
 
@@ -119,7 +119,7 @@ def _of_spins(
     """Operators of spins in some channels of one rank: a unit for each operator of N, which a parameter has ½(N'^2p + N^2p) times."""
     units = [_units([by_channel.get(channel, []) for by_channel in every]) for channel in channels]
     reach, alone = min(_REACH, channels[0].rank), [[unit] for own in units for unit in own]
-    contracted = iter(operators_of_stacks(shared.stacks or [], reach, alone, shared.representation))
+    contracted = iter(operators_of_stacks(shared.stacks, reach, alone, shared.representation))
     for channel, own in zip(channels, units, strict=True):
         terms = [
             (own.index(_unit(piece)), piece, column)
@@ -169,11 +169,8 @@ def _of_links(
         kind, size = frame.kinds[number], block.size
         states = frame.energies_mhz[kind].shape[1]
         table = found.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
-        lower = np.zeros((len(block.parameters), size, size))
-        lower[:, block.rows, block.columns] = (block.factors @ block.mix).T
-        whole = lower + np.tril(lower, -1).transpose(0, 2, 1)
         units = [linked.index(parameter) for parameter in block.parameters.tolist()]
-        table[rotor.n - frame.lowest, units, :size, :size] = rotor.vectors.T @ whole @ rotor.vectors
+        table[rotor.n - frame.lowest, units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
     mix = np.tile(np.eye(len(linked)), (frame.count_of_n, 1, 1))
     return {key: UnitTables(table, np.array(linked), mix) for key, table in found.items()}
 
@@ -191,7 +188,7 @@ def _of_powers(every: StateTerms, shared: Shared, frame: Frame) -> dict[Kinds, U
     for unit, p, column, factor in terms:
         mix[:, columns.index(column), units.index(unit)] += factor * (n * (n + 1.0)) ** p
     found: dict[Kinds, Floats] = {}
-    for stack, matrices in powers_of_stacks(shared.stacks or [], units) if units else ():
+    for stack, matrices in powers_of_stacks(shared.stacks, units) if units else ():
         count, states = frame.energies_mhz[stack.kind].shape
         table = found.setdefault((stack.kind, stack.kind, 0), np.zeros((count, len(units), states, states)))
         table[stack.n - frame.lowest, :, : matrices.shape[2], : matrices.shape[3]] = matrices

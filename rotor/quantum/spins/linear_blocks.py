@@ -18,9 +18,9 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
-from rotor.quantum.spins.axial import are_axial, axial_stacks, operators_of_axial_stacks, powers_of_axial
+from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
 from rotor.quantum.spins.blocks import Shared, SpinBlock, couplings_of
-from rotor.quantum.spins.contraction import Contracted, operators_of_stacks, stacks_of
+from rotor.quantum.spins.contraction import Contracted, stacks_of
 from rotor.quantum.spins.rotor import Channel, Channels, RotorBlock, parameter_channels
 
 if TYPE_CHECKING:
@@ -108,12 +108,11 @@ def _by_channel(
     channels: Sequence[Channels], blocks: Sequence[RotorBlock], shared: Shared
 ) -> Iterator[tuple[Channel, list[int], list[list[Contracted]]]]:
     """Each channel with the parameters that act in it and what they have there between the functions of all blocks."""
-    stacks = axial_stacks(blocks) if are_axial(blocks) else stacks_of(blocks)
-    contract = operators_of_axial_stacks if are_axial(blocks) else operators_of_stacks
+    stacks = stacks_of(blocks)
     for channel in dict.fromkeys(channel for own in channels for channel in own):
         columns = [column for column, own in enumerate(channels) if channel in own]
         pieces = [channels[column][channel] for column in columns]
-        yield channel, columns, contract(stacks, min(_REACH, channel.rank), pieces, shared.representation)
+        yield channel, columns, contracted_operators(stacks, min(_REACH, channel.rank), pieces, shared.representation)
 
 
 def _by_pairs(columns: Sequence[int], every: Sequence[Sequence[Contracted]]) -> Iterator[tuple[tuple[int, int], Unit]]:

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.axial import tensors_of_axial_stacks
+from rotor.quantum.spins.axial import contracted_tensors
 from rotor.quantum.spins.blocks import Shared, SpinBlock, product
-from rotor.quantum.spins.contraction import by_numbers, tensors_of_stacks
+from rotor.quantum.spins.contraction import by_numbers
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.scheme import Scheme
@@ -97,13 +97,8 @@ def _elements(shared: Shared, tensors: Tensors) -> Elements:
     """All of them at once."""
     key = ("elements", *sorted(tensors.items(), key=lambda one: one[0]))
     if key not in shared.cache:
-        found = (
-            tensors_of_axial_stacks(shared.axial, tensors)
-            if shared.axial
-            else tensors_of_stacks(shared.stacks or [], tensors)
-        )
         partners: dict[int, list[tuple[int, Floats]]] = {}
-        for (i, k), element in by_numbers(found).items():
+        for (i, k), element in by_numbers(contracted_tensors(shared.stacks, tensors)).items():
             partners.setdefault(i, []).append((k, element))
         shared.cache[key] = Elements(partners)
     elements: Elements = shared.cache[key]

@@ -50,7 +50,7 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     list of SpinBlock or None
     """
     shared = plan.shared
-    if shared.stacks is None or plan.contracted is None or shared.scheme.equivalent == 3:
+    if shared.scheme.equivalent == 3:
         return None
     table = pattern_table(shared.scheme, every_f[0], every_f[-1])
     if not 0 < len(table.every) <= _FEW:

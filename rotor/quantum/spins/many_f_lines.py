@@ -66,7 +66,7 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     """
     shared, rank = blocks[0].shared, rank_of(tensors)
     frame: Frame = shared.cache["frame"]
-    tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
+    tables = tables_of(tensors_of_stacks(shared.stacks, tensors), frame)
     every = [states_of_group(group, own, levels) for group, own in groups_of_blocks(blocks)]
     space = Workspace()
     for step in range(0, 2 * rank + 1, 2):

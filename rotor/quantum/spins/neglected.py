@@ -74,7 +74,7 @@ def largest_shifts(plan: Plan) -> tuple[float, float]:
 def _matrices(plan: Plan) -> Iterator[_Matrices]:
     """Every pair of blocks once, those of two stacks together."""
     of_stacks: dict[tuple[int, int, int], _Matrices] = {}
-    for every, channels in plan.contracted or ():
+    for every, channels in plan.contracted:
         for up, low, pairs, matrices in every:
             numbers = up.numbers[pairs.up], low.numbers[pairs.low]
             key = (int(up.numbers[0]), int(low.numbers[0]), pairs.rise)

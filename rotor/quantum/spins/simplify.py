@@ -39,7 +39,7 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
     if chosen == EXACT:
         return plan.with_method(used)
-    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted or ()])
+    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted])
 
 
 def _of_one_n(every: Sequence[Contracted], method: str) -> list[Contracted]:
