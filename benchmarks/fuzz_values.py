@@ -94,9 +94,9 @@ def all_seeds() -> list[Seed]:
 
 def _examples() -> list[str]:
     """The command lines in the help of every verb, with bars for quotes."""
-    from rotor.cli import VERBS, _command
+    from rotor.cli import VERBS, declaration
 
-    texts = "\n".join(_command(verb)[2] for verb in VERBS).replace('"', "|")
+    texts = "\n".join(declaration(verb)[0].examples for verb in VERBS).replace('"', "|")
     return [line.strip()[6:] for line in texts.splitlines() if line.strip().startswith("rotor ") and ">" not in line]
 
 

@@ -111,7 +111,10 @@ def _kind_of(unit: str) -> str:
     return next(kind for kind, table in _KINDS.items() if unit in table)
 
 
-def _factor(unit: str, expected: str, text: str) -> float:
+def _factor(unit: str | None, expected: str, text: str) -> float:
+    """The factor of a unit, 1 of none."""
+    if not unit:
+        return 1.0
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_kind_of(expected)]
     if expected in ("", "fraction") and unit not in table:
@@ -121,10 +124,6 @@ def _factor(unit: str, expected: str, text: str) -> float:
         what = "does not measure the same thing as" if known else "is not a known unit; the default is"
         raise ValueError(f"{text!r}: unit {unit!r} {what} {expected!r}; use one of {', '.join(table)}")
     return table[unit] / table[expected]
-
-
-def _factor_or_one(unit: str | None, expected: str, text: str) -> float:
-    return _factor(unit, expected, text) if unit else 1.0
 
 
 def _number(text: str) -> tuple[float, str | None]:
@@ -147,7 +146,7 @@ def parse_quantity(value: float | str, unit: str) -> float:
     """
     if isinstance(value, str):
         number, given = _number(value)
-        value = number * _factor_or_one(given, unit, value)
+        value = number * _factor(given, unit, value)
     if not math.isfinite(value):
         raise ValueError(f"{value!r} is not a finite number of {unit}")
     return float(value)
@@ -161,9 +160,7 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
 
     (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
     shared = unit_2 or unit_1
-    first, last = (
-        number * _factor_or_one(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2))
-    )
+    first, last = (number * _factor(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2)))
     if not first < last:
         numbers = f"{first:g} is not below {last:g} {unit}".rstrip()
         raise ValueError(f"{text!r}: the range must rise, but {numbers}")
@@ -195,7 +192,7 @@ def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.fl
     if ":" not in text:
         numbers = [_number(item) for item in text.split(",")]
         shared = numbers[-1][1]
-        return np.array([n * _factor_or_one(u or shared, unit, text) for n, u in numbers])
+        return np.array([n * _factor(u or shared, unit, text) for n, u in numbers])
 
     first, last, count = _bounds(text, unit)
     count = str(points) if count is None and points is not None else count

@@ -9,7 +9,8 @@ from typing import Any
 from rotor.reports.screen import show_facts
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
-from rotor.verbs.verb import NoAnswerError, Output, Tool
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import NoAnswerError, Output
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ before a verb has looked at what it was given.
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import signal
 import sys
@@ -15,7 +16,6 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast
 
 import typer
@@ -188,9 +188,11 @@ def _run(arguments: list[str]) -> int:
     known = bool(words) and words[0] in VERBS
     verbs = words[:1] if known else VERBS  # what is not asked for is not loaded
     if words[:1] and words[0] in ONE_THREAD:
-        process.one_thread_of_blas(_jmax(arguments))
+        jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
+        process.one_thread_of_blas(int(jmax[1]) if jmax else None)
     command = typer.main.get_command(_application(verbs, listed=not known))
-    provenance = _printable(shlex.join(["rotor", *arguments]))
+    # bytes of a file's name that the locale could not read are read as UTF-8, or shown as �
+    provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     try:
         with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
             command.invoke(context)
@@ -198,18 +200,6 @@ def _run(arguments: list[str]) -> int:
         return 0
     except typer.Exit as end:
         return end.exit_code
-
-
-def _jmax(arguments: Sequence[str]) -> int | None:
-    """The highest J that was typed, before anything is read."""
-    texts = [after for word, after in pairwise(arguments) if word == "--jmax"]
-    texts += [word.partition("=")[2] for word in arguments if word.startswith("--jmax=")]
-    return int(texts[0]) if texts and texts[0].isdecimal() else None
-
-
-def _printable(text: str) -> str:
-    """Text that UTF-8 can write: bytes of a file's name that the locale could not read are read as UTF-8, or shown as �."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def _text_of_use(error: Exception) -> str:

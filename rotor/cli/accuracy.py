@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Quantity, Text
-from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import PICTURES, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import Row, WorkPrecision

@@ -10,7 +10,8 @@ from rotor.cli.shared.output import write_text
 from rotor.requests.field import declared
 from rotor.requests.readers import Flag, Text
 from rotor.verbs.names import SCENE_VERBS
-from rotor.verbs.verb import Output, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Output, Work
 
 EXAMPLES = """\b
 Examples:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.screen import show_facts
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Text
-from rotor.verbs.verb import Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.requests.plan import LeftOut, Plan

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.cli.shared import process
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.reports.screen import Table, json_with_rows, show_facts, show_table
@@ -18,7 +19,8 @@ from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
 from rotor.requests.fill import Given
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
-from rotor.verbs.verb import Place, Tool, report_of
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Place, report_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -93,6 +95,7 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
     files = Files()
     files.ask_json(typed.get("json"))
     refuse_overwriting(files.paths, {"scene": options.scene})
+    process.begin_work()
     with _workers(options, scene) as pool:
         if swept:
             _sweep(scene, options, files, pool, context.obj)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
 from rotor.verbs.observed_file import PANEL
-from rotor.verbs.verb import Output, Report, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service

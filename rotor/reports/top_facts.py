@@ -26,22 +26,18 @@ NOTHING_SEEN = "nothing that the molecule shows signs of; further states of vibr
 NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitude are not known; a geometry shows them"
 
 
-def error_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The line of the error budget, where the content has one."""
-    if "errors" not in content:
+def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """The line of an error budget, from its JSON; nothing for none."""
+    if errors is None:
         return []
     from rotor.requests.budget import ErrorBudget
 
-    name, _, text = ErrorBudget.from_json(content["errors"]).line().partition(": ")
+    name, _, text = ErrorBudget.from_json(errors).line().partition(": ")
     return [("errors", f"{name.removeprefix('errors ')}: {text}")]
 
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Errors, effects of the model and what it leaves out, largest first, from `rotor.quantum.estimates.limits.limit_facts`."""
-    return [*error_facts(content), *_effects_and_limits(content)]
-
-
-def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     from rotor.quantum.estimates.beyond import Limit
     from rotor.requests.plan import larger_ones
 
@@ -49,11 +45,12 @@ def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     sizes = (
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
-    facts = [("effects", sizes)]
+    facts = [*error_facts(content.get("errors")), ("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     larger, others = larger_ones(content["limits"], lambda one: one["size_mhz"], lambda one: str(one["name"]))
-    limits = [with_option(Limit(**limit).sentence, content["command"]) for limit in larger]
+    verb = content["command"].split()[1:2]
+    limits = [with_option(Limit(**limit).sentence, *verb) for limit in larger]
     limits += [others] if others else []
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
@@ -61,12 +58,11 @@ def _effects_and_limits(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
 
 
-def with_option(sentence: str, command: str) -> str:
+def with_option(sentence: str, verb: str = "spectrum") -> str:
     """A sentence about spins that are left out, with the option that adds them: of this verb if it has one, else of rotor spectrum."""
     from rotor.quantum.estimates.beyond import COMPUTE
 
-    verb = next((word for word in command.split()[1:2] if word in WITH_HYPERFINE), "spectrum")
-    return sentence.replace(COMPUTE, f"rotor {verb} --hyperfine")
+    return sentence.replace(COMPUTE, f"rotor {verb if verb in WITH_HYPERFINE else 'spectrum'} --hyperfine")
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:

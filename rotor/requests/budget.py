@@ -125,12 +125,8 @@ class ErrorBudget:
             texts.append(f"{name} {about}{replace(term, source=source or 'x').text(self.unit)}".removesuffix(" (x)"))
         return f"errors of {self.of}: " + (", ".join(texts) or "none beyond the last digit")
 
-    def above(self, accuracy: float) -> dict[str, ErrorTerm]:
-        """The terms that exceed an accuracy (in the unit of the budget), largest first."""
-        return {name: term for name, term in self.shown() if term.value is not None and term.value > accuracy}
-
     def shortfall(self, accuracy: float) -> str:
-        """What exceeds an accuracy, largest first, and what would lower it; empty where nothing does.
+        """What exceeds an accuracy (in the unit of the budget), largest first, and what would lower it; empty where nothing does.
 
         >>> exact = ErrorTerm(0.0, "exact")
         >>> geometry = ErrorTerm(300.0, "error of the geometry", "measured constants")
@@ -138,7 +134,9 @@ class ErrorBudget:
         'left out about 3e+02 MHz is larger (error of the geometry); measured constants would lower it'
         """
         parts = []
-        for name, term in self.above(accuracy).items():
+        for name, term in self.shown():
+            if term.value is None or term.value <= accuracy:
+                continue
             size = f"{'about ' if name == 'left out' else ''}{term.value:.2g} {self.unit}".rstrip()
             remedy = f"; {term.remedy} would lower it" if term.remedy else ""
             parts.append(f"{name} {size} is larger ({term.source}){remedy}")

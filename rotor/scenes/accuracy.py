@@ -19,16 +19,20 @@ beside it in a plan. What double precision cannot give is refused.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
 from rotor.requests.budget import ErrorBudget, ErrorTerm
-from rotor.requests.knob import Choice
-from rotor.scenes.choice import Accuracy, Reached, TotalAccuracy, quantity
-from rotor.scenes.numerics import choose, numerics_of
+from rotor.requests.field import Field
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, knobs_of_fields
+from rotor.requests.readers import Quantity
+from rotor.scenes.choice import Accuracy, Reached, TotalAccuracy
+from rotor.scenes.numerics import answering, numerics_of
 from rotor.scenes.scene import Scene
 
 CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 def asked_of(scene: Scene) -> float | None:
@@ -48,7 +52,8 @@ def asked_of(scene: Scene) -> float | None:
     percent = text.endswith("%")
     if percent and unit not in ("", "%"):
         raise ValueError(f"accuracy: {given!r}: expected {unit}, not a percentage")
-    number = quantity("accuracy", text.removesuffix("%").removesuffix("rad").strip(), unit if unit in CONVERTED else "")
+    reader = Quantity(unit if unit in CONVERTED else "")
+    number: float = Field(reader, "", "accuracy").read(text.removesuffix("%").removesuffix("rad").strip(), "key")
     if not number > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
     return 0.01 * number if percent and not unit else number
@@ -72,25 +77,22 @@ def unit_of(scene: Scene) -> str:
     if text.endswith("%"):
         unit = numerics.percent(scene)
         return unit if unit in numerics.goals else first
-    return "" if _is_number(text) and ("" in numerics.goals or not numerics.bare) else first
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return "" if _NUMBER.fullmatch(text) and ("" in numerics.goals or not numerics.bare) else first
 
 
 def chosen(scene: Scene, request: Any) -> Choice:
-    """The request with the cheapest settings that reach the accuracy of its scene.
+    """The request with the cheapest settings that reach the accuracy of its scene; without a field that decides on it, nothing is cheaper.
 
     Raises ValueError for what double precision cannot give, and where a knob is given by hand as well.
     """
-    asked = asked_of(scene)
+    asked, unit = asked_of(scene), unit_of(scene)
     assert asked is not None
-    return choose(scene, request, asked, unit_of(scene))
+    if by_kind := numerics_of(scene.kind).goals[unit].choose:
+        return by_kind(scene, request, asked)
+    for field, knob in knobs_of_fields(request) if unit != "%" else ():
+        if knob.least is not None or knob.tried:
+            return knob.choose(field, request, asked, answering(scene.kind))
+    return Choice(request, NOTHING_CHEAPER)
 
 
 def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:

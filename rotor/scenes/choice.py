@@ -7,9 +7,6 @@ from typing import Annotated
 
 import msgspec
 
-from rotor.requests.field import Field
-from rotor.requests.readers import Quantity as Number
-
 
 class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """An accuracy of the whole error budget, not of its numerical part alone."""
@@ -28,9 +25,3 @@ class Reached:
     error: float
     unit: str
     how: str
-
-
-def quantity(name: str, value: float | str, unit: str) -> float:
-    """A number in `unit`; a ValueError names the key."""
-    found: float = Field(Number(unit), "", name).read(value, "key")
-    return found

@@ -59,7 +59,8 @@ class Kind:
         outputs = outputs_of(scene, self.verb, out)
         shown = self.verb.read_shown(given_of(scene, self.verb))
         with self.naming():
-            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance={"scene": scene_text(scene)}))
+            provenance = {"scene": scene_text(scene)} if self.grows & outputs.keys() else {}  # of files that grow
+            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance=provenance))
         if reason := self.verb.failure(answer):
             raise NoResultError(f"{reason}; 'rotor {self.verb.name}' shows it nevertheless")
         for name, reason in self.verb.withheld(answer, list(outputs)).items():

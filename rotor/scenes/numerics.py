@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rotor.requests.fill import Given
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Sweeps, knobs_of_fields
+from rotor.requests.knob import Sweeps, knobs_of_fields
 from rotor.requests.numerics import Numerics
 from rotor.verbs.verb import Work, verb_of
 
@@ -22,16 +22,6 @@ def answering(kind: str) -> Callable[[Any], Any]:
     verb = verb_of(kind)
     work = Work(shown=verb.read_shown(Given()))
     return lambda request: verb.answer(request, work)
-
-
-def choose(scene: Any, request: Any, accuracy: float, unit: str) -> Choice:
-    """The request with the cheapest settings that reach an accuracy; without a field that decides on it, nothing is cheaper."""
-    if by_kind := numerics_of(scene.kind).goals[unit].choose:
-        return by_kind(scene, request, accuracy)
-    for field, knob in knobs_of_fields(request) if unit != "%" else ():
-        if knob.least is not None or knob.tried:
-            return knob.choose(field, request, accuracy, answering(scene.kind))
-    return Choice(request, NOTHING_CHEAPER)
 
 
 def sweeps_of(kind: str, request: Any) -> Sweeps:

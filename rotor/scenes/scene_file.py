@@ -60,7 +60,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
 
     Raises ValueError for a version or a kind that there is not, unknown keys, and values of another type.
     """
-    kind = _kind_of(content, where)
+    kind = _kind_of(content.get("schema"), content.get("kind"), where)
     rest = {key: value for key, value in content.items() if key != "kind"}
     _refuse_unknown_keys(rest, kind, where, "", kind)
     try:
@@ -70,8 +70,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     return found
 
 
-def _kind_of(content: Mapping[str, Any], where: str) -> type[Scene]:
-    schema, kind = content.get("schema"), content.get("kind")
+def _kind_of(schema: Any, kind: Any, where: str) -> type[Scene]:
     if schema != SCHEMA:
         found = "it has none" if schema is None else f"this one has {schema!r}"
         raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {found}")
@@ -91,6 +90,8 @@ def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, plac
             of = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
             elsewhere = "" if isinstance(value, Mapping) else _other_place(key, scene)
             raise ValueError(f"{where}: {of} has no key {key!r}{elsewhere or _nearest(key, kind.__struct_fields__)}")
+        if not isinstance(value, Mapping | list):
+            continue
         inside = f"{place}.{key}" if place else key
         _refuse_unknown_tags(hints[key], value, where, inside)
         for one, item, number in _tables_in(hints[key], value):

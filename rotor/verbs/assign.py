@@ -126,7 +126,7 @@ def show(answer: AssignAnswer, report: Report) -> None:
         show_table(_table(number, one))
         show_facts(_facts(one))
     print()
-    show_facts(error_facts(record))
+    show_facts(error_facts(record.get("errors")))
 
 
 def _verdict(answer: AssignAnswer) -> str:

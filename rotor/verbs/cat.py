@@ -19,7 +19,8 @@ from rotor.verbs.comparing import (
     read_catalogue,
     temperature_note,
 )
-from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import PICTURES, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue

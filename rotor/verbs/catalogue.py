@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
-from rotor.verbs.verb import Output, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Output, Work
 
 if TYPE_CHECKING:
     from rotor.table import Table as Columns

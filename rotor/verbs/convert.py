@@ -12,7 +12,8 @@ from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
 from rotor.verbs.subjects import top_of_word
-from rotor.verbs.verb import Note, Output, Tool, Work, silent
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Note, Output, Work, silent
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

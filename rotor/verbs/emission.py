@@ -269,7 +269,7 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         + ("" if lines.quanta else f", Q {lines.q_source}")
         for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
     )
-    show_facts([("sources", cited), *error_facts(report.content), *_limits(answer)])
+    show_facts([("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer)])
 
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
@@ -282,7 +282,7 @@ def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
         if not isinstance(top, Top):
             continue
         limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects)
-        facts += [("", f"{name}: {with_option(limit.sentence, 'rotor emission')}") for limit in limits[:1]]
+        facts += [("", f"{name}: {with_option(limit.sentence, 'emission')}") for limit in limits[:1]]
     return facts
 
 

@@ -20,7 +20,8 @@ from rotor.verbs.observed_file import (
     species_of,
     spectrum_facts,
 )
-from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import PICTURES, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.observed.fit import Contribution, SourceFit

@@ -261,7 +261,7 @@ def show(answer: FitAnswer, report: Report) -> None:
     if answer.suggestions:
         show_table(_suggestion_table(fit, answer.suggestions))
     close = [] if far_off(fit) else [("lines", "none is more than 3 errors off")]
-    show_facts([*close, *error_facts(report.content)])
+    show_facts([*close, *error_facts(report.content.get("errors"))])
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:

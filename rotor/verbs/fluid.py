@@ -328,7 +328,7 @@ def show(answer: FluidAnswer, report: Report) -> None:
         facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
     if content["motion_reason"]:
         facts.append(("no motion", content["motion_reason"]))
-    facts += error_facts(content)
+    facts += error_facts(content.get("errors"))
     show_facts(facts)
     rows = [
         [

@@ -82,7 +82,9 @@ def show(answer: GasAnswer, report: Report) -> None:
         print()
         show_table(_curves_table(curves))
     sources = source_facts(top, ("constants",), report.sources)
-    show_facts([*sources, *top_facts.error_facts(content), *top_facts.left_out_facts(content["left_out"])])
+    show_facts(
+        [*sources, *top_facts.error_facts(content.get("errors")), *top_facts.left_out_facts(content["left_out"])]
+    )
 
 
 def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:

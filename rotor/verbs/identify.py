@@ -12,7 +12,8 @@ from rotor.reports.screen import Table, show_facts, show_table
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
-from rotor.verbs.verb import PICTURES, Output, Report, Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import PICTURES, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.observed.identify import Identification

@@ -29,7 +29,7 @@ def show(answer: IsotopologuesAnswer, report: Report) -> None:
         print()
         show_table(Table("", columns, rows, frozenset(columns)))
     print()
-    show_facts(error_facts(report.content))
+    show_facts(error_facts(report.content.get("errors")))
 
 
 def _constants_text(top: Top) -> str:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.screen import Table, plain, show_facts, show_table
 from rotor.requests.field import declared
 from rotor.requests.readers import Text
-from rotor.verbs.verb import Tool, Work
+from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

@@ -134,7 +134,7 @@ def show(answer: StructureAnswer, report: Report) -> None:
         if answer.without.get(one.method):
             show_table(_without_table(one.method, answer.without[one.method]))
     print()
-    show_facts(error_facts(report.content))
+    show_facts(error_facts(report.content.get("errors")))
 
 
 def _planar_table(found: Sequence[PlanarMoment]) -> Table:

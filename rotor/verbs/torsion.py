@@ -62,7 +62,10 @@ def show(answer: TorsionAnswer, report: Report) -> None:
     show_table(_thermo_table(answer))
     print()
     show_facts(
-        [*source_facts(answer.request.top, ("constants",), report.sources), *top_facts.error_facts(report.content)]
+        [
+            *source_facts(answer.request.top, ("constants",), report.sources),
+            *top_facts.error_facts(report.content.get("errors")),
+        ]
     )
 
 

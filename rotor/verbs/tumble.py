@@ -146,7 +146,7 @@ def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> None:
     show_table(_motion_table(answer))
     top = getattr(answer.request, "top", None)
     sources = [] if top is None else source_facts(top, ("constants",), report.sources)
-    show_facts([*top_facts.error_facts(content), *sources])
+    show_facts([*top_facts.error_facts(content.get("errors")), *sources])
 
 
 def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
@@ -161,7 +161,7 @@ def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
         ("method", f"{content['method']}, {content['steps']} steps"),
         ("energy", f"{content['energy_first']:.10g} to {content['energy_last']:.10g}{energy}: {last}"),
     ]
-    show_facts([*facts, *top_facts.error_facts(content)])
+    show_facts([*facts, *top_facts.error_facts(content.get("errors"))])
     print()
     show_table(_driven_table(answer))
 

@@ -23,6 +23,8 @@ from rotor.version import version
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from rotor.verbs.tool import Tool
+
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
 
@@ -260,6 +262,11 @@ class Verb:
         module, _, name = self.numerics.partition(":")
         return getattr(import_module(module), name) if module else Numerics()
 
+    @property
+    def has_json(self) -> bool:
+        """Whether there is a JSON of it."""
+        return True
+
     @cached_property
     def fields(self) -> dict[str, Field]:
         """Every declared input by its identity: of the subject, the request and of what is shown."""
@@ -328,43 +335,6 @@ class Verb:
     def output(self, name: str) -> Output:
         """A file by its name."""
         return next(one for one in self.outputs if one.name == name)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Unshown:
-    """No options of printing."""
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Tool(Verb):
-    """A verb that works on files, lists or a browser: no scene says it, and what its report shows is a part of its request.
-
-    of: the field that is the input of the JSON and of files. text: the JSON, where it is not the facts; None: there is none. instead:
-    the options by which it takes the place of another verb, in words.
-    """
-
-    table: Callable[[Any], Any] = lambda answer: None
-    rows: str = ""
-    outputs: tuple[Output, ...] = ()
-    subject: SubjectKind = NOTHING
-    shown: type = Unshown
-    drawn: str | None = None
-    scaled: bool = False
-    sound: bool = False
-    of: str = ""
-    text: Callable[[Any, Mapping[str, Any]], str] | None = lambda answer, content: json_text(content)
-    instead: str = ""
-    has_scenes: ClassVar[bool] = False
-
-    def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
-        """The request; its own field is the subject."""
-        request = read_instance(self.request, given)
-        source = getattr(request, self.of, "")
-        return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
-
-    def json(self, answer: Any, content: Mapping[str, Any]) -> str:
-        """The facts, or what stands for them."""
-        return "" if self.text is None else self.text(answer, content)
 
 
 def report_of(

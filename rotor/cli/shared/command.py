@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ import typer
 from rotor.cli.shared.options import PlainCommand
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, REQUIRED, Field
 from rotor.requests.readers import Flag
-from rotor.verbs.verb import Extra, Output, Tool, Verb
+from rotor.verbs.verb import Extra, Output, Verb
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
@@ -46,7 +46,7 @@ def parameters_of(verb: Verb) -> list[Parameter]:
     found = [_input(one) for one in verb.parameters.values()]
     found += [_extra(one) for one in verb.extras]
     found += [_file(one) for one in verb.outputs]
-    if not isinstance(verb, Tool) or verb.text is not None:
+    if verb.has_json:
         found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     if verb.has_scenes:
         found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
@@ -109,8 +109,14 @@ def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]
     by_name = {one.name: one for one in every}
 
     def call(context: typer.Context, **typed: Any) -> None:
-        typed.pop("help_all", None)
-        run(verb, context, dict(_texts(by_name, typed)))
+        texts = {}
+        for name, value in typed.items():
+            if name != "help_all" and value is not None and value != [] and value != ():
+                one = by_name[name]
+                if any(isinstance(text, str) and not text.strip() for text in (value if one.many else [value])):
+                    raise ValueError(f"{one.flag}: the text given is empty; expected one that is not, or leave it out")
+                texts[one.identity] = tuple(value) if one.many else value
+        run(verb, context, texts)
 
     parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
     parameters += [_signature_of(one) for one in every]
@@ -149,18 +155,6 @@ def molecules_and_files(incomplete: str) -> list[str]:
     stems = {path.stem.casefold(): path.stem for path in names().values()}
     known = {**{name: name for name in names() if " " not in name}, **stems}
     return sorted(text for name, text in known.items() if name.startswith(incomplete.casefold())) + sorted(files)
-
-
-def _texts(by_name: Mapping[str, Parameter], typed: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """What was typed, by identity; ValueError for an empty text."""
-    for name, value in typed.items():
-        one = by_name[name]
-        if value is None or value == [] or value == ():
-            continue
-        texts = value if isinstance(value, list | tuple) else [value]
-        if any(isinstance(text, str) and not text.strip() for text in texts):
-            raise ValueError(f"{one.flag}: the text given is empty; expected one that is not, or leave it out")
-        yield one.identity, tuple(value) if one.many else value
 
 
 class PanelCommand(PlainCommand):

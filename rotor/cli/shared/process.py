@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import os
 import sys
 import threading
@@ -13,9 +14,10 @@ _OWN = False  # set by the console script
 
 
 def begin() -> None:
-    """The process is that of the command."""
+    """The process is that of the command. Until the work begins nothing is looked for that is no longer used: modules stay."""
     global _OWN
     _OWN = True
+    gc.disable()
     _open_missing_streams()
 
 
@@ -27,6 +29,13 @@ def _open_missing_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):  # in the order of their numbers
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  # for as long as the process lives
+
+
+def begin_work() -> None:
+    """What is loaded stays; from here on memory that is no longer used is found again."""
+    if _OWN:
+        gc.freeze()
+        gc.enable()
 
 
 def end(code: int) -> NoReturn:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb with the texts that were typed, by identity."""
-    verb = verb.by_what(typed)
+    verb = verb.by_what(typed.keys())
     there = {name: typed[name] for name in typed.keys() & places_of(verb)}
     inputs = {name: value for name, value in typed.items() if name not in there}
     given, there = Given(with_extras(verb, inputs), "option"), with_files(verb, there)
@@ -44,6 +44,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         verb.check(request, outputs, shown)
     if verb.short(request):
         process.leave_compiler_out()
+    process.begin_work()
     head = {"command": str(context.obj), "input": subject.text}
     with working(verb, there.get("workers", 1)) as executor:
         with answering() if verb.sound else naming(verb), reaching():

@@ -76,7 +76,7 @@ def solve_block(
     """`block_states` with the matrices of the block at hand."""
     order = basis_order(block, jmax)
     count = count_of(request, block, order)
-    places, states = _enough(problem, order, count, fields, request.tolerance_mhz)
+    places, states = enough_states(problem, order, count, fields, request.tolerance_mhz)
     if states is None or len(fields) > 1:
         states = solve_fields(problem.terms(places), fields, count, request.tolerance_mhz)
     energies, vectors, error = states
@@ -92,7 +92,9 @@ def bounded_states(
     return BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, error)
 
 
-def enough_states(problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float) -> Ints:
+def enough_states(
+    problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float
+) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
     """The lowest free states that suffice at the strongest field.
 
     Parameters
@@ -110,16 +112,11 @@ def enough_states(problem: BlockProblem, order: Ints, count: int, fields: Floats
 
     Returns
     -------
-    (m,) array
+    places : (m,) array
         Places in the block, rising.
+    states : tuple or None
+        The lowest states in them at the strongest field, as of `solve_fields`, where they were solved.
     """
-    return _enough(problem, order, count, fields, tolerance_mhz)[0]
-
-
-def _enough(
-    problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float
-) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
-    """Places of the states that suffice, and the lowest states in them at the strongest field where they were solved."""
     size = max(FIRST_BASIS, 2 * count)
     every = np.sort(order)
     if len(order) <= max(size, 2 * DENSE):

@@ -316,7 +316,7 @@ def _solve_blocks(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) 
     for block in blocks:
         problem, order = request.problem(block), basis_order(block, jmax)
         count = count_of(request, block, order)
-        places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)
+        places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)[0]
         parts.append((block, problem, order, places, (problem.terms(places), count)))
     solved = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
     return [
@@ -431,7 +431,7 @@ def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Ter
     """The Hamiltonian of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
     terms = problem.terms(
-        enough_states(problem, basis_order(block, jmax), count, request.fields, request.tolerance_mhz)
+        enough_states(problem, basis_order(block, jmax), count, request.fields, request.tolerance_mhz)[0]
     )
     if len(terms[0]) <= DENSE:
         return terms

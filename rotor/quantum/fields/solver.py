@@ -81,7 +81,13 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
         states = chain_states([(terms, count)], fields)
         if states is not None:
             return _exact(*states[0])
-    return _solve_matrices(terms, fields, count, tolerance_mhz)
+    size = len(terms[0])
+    if size <= DENSE:
+        solved = np.linalg.eigh(at_fields(terms, fields))
+        return _exact(np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count])
+    if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < size // 4:
+        return reduced_basis(terms, fields, count, tolerance_mhz)
+    return _each(terms, fields, count)
 
 
 def solve_together(
@@ -98,16 +104,6 @@ def solve_together(
 def _exact(energies: Floats, vectors: Matrix) -> tuple[Floats, Matrix, Floats]:
     """A full solution with its error of 0."""
     return energies, vectors, np.zeros(energies.shape)
-
-
-def _solve_matrices(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix, Floats]:
-    size = len(terms[0])
-    if size <= DENSE:
-        solved = np.linalg.eigh(at_fields(terms, fields))
-        return _exact(np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count])
-    if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < size // 4:
-        return reduced_basis(terms, fields, count, tolerance_mhz)
-    return _each(terms, fields, count)
 
 
 def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
