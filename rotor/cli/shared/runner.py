@@ -61,8 +61,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         writers = {verb.output(name).flag: write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
             named = by_name(verb, files, growing)
-            kept = {name: value for name, value in there.items() if name not in outputs or name in named}
-            writers["--save-scene"] = scene_writer(verb, request, subject, given, kept)
+            named_files = {name: value for name, value in there.items() if name not in outputs or name in named}
+            writers["--save-scene"] = scene_writer(verb, request, subject, given, named_files)
         with naming(verb), reaching():
             deliver(
                 files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
