@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from rotor.cli.shared.output import write_text
@@ -50,7 +50,7 @@ def answer(request: NewRequest, work: Work) -> New:
     return New(_schema() if request.kind is None else template(request.kind), "out" in work.files)
 
 
-def check(_: NewRequest, outputs: dict[str, tuple[Path, ...]], __: Any) -> None:
+def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
     """ValueError for a file that is there: a scene that was edited is not lost."""
     for path in outputs.get("out", ()):
         if path.exists():

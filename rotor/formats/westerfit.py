@@ -134,7 +134,7 @@ def _top(name: str, sections: Mapping[str, Sequence[tuple[int, str]]]) -> Top:
         raise ValueError(f"{', '.join(spins)} beside S = 0: expected the spin S of the nucleus")
     named = {f"{key}({SPIN})": value for key, value in spins.items()}
     return Top.from_constants(
-        Constants(**rotation, reduction="A", representation="Ir"),
+        Constants(reduction="A", representation="Ir", **rotation),  # type: ignore[arg-type]  # names are those of constants
         dipole_abc_debye=dipole if any(dipole) else None,
         spin_constants=SpinConstants(named, {SPIN: twice}, "file of westerfit") if twice and named else None,
         internal_rotation=internal,
@@ -151,7 +151,8 @@ def _number(line: int, text: str) -> float:
 
 def _second_order(lines: Sequence[tuple[int, str]]) -> tuple[dict[str, float], dict[str, float]]:
     """Constants of the rotation and the rotor, and of the spin, MHz."""
-    values, spins = {}, {}
+    values: dict[str, float] = {}
+    spins: dict[str, float] = {}
     for number, line in lines:
         parts = [part.strip() for part in line.split(";")]
         if len(parts) < 2:

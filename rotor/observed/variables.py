@@ -68,9 +68,9 @@ class Variables:
             for k in variable.components:
                 changes[k][variable.name] = variable.back(value)
         return [
-            replace(component, **change) if change else component
+            replace(component, **change) if change else component  # type: ignore[arg-type]
             for component, change in zip(components, changes, strict=True)
-        ]  # type: ignore[arg-type]
+        ]
 
     def jacobian(self, components: Sequence[Component], slopes: Floats) -> Floats:
         """Derivatives (n, m) of the brightness by what the search moves, from the slopes (k, 5, n) of `model`."""

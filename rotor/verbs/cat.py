@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,7 +168,7 @@ def draw(answer: CatAnswer, path: Path, report: Report) -> None:
     plot_catalogue(answer.lines, path, title=name, view=report.view, command=command)
 
 
-def json_of(answer: CatAnswer, content: dict[str, Any]) -> str:
+def json_of(answer: CatAnswer, content: Mapping[str, Any]) -> str:
     """The facts with every line."""
     return json_text({**content, "lines": [line_record(answer.lines, row) for row in range(len(answer.lines))]})
 

@@ -188,7 +188,7 @@ def _components(
     if request.fit is None:
         defaults = {name: own_fields(LayerInput)[name].default * count for name in typed}
         values = {name: each or defaults[name] for name, each in typed.items()}
-        rows = [{name: each[k] for name, each in values.items()} for k in range(count)]
+        rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
         return [Component(one, **row, size_arcsec=size) for one, row in zip(species, rows, strict=True)]
     first = {name: (values[0] if values else None) for name, values in typed.items()}
     del first["column_per_cm2"]
@@ -209,7 +209,8 @@ def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] 
 def _fitted(
     spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight, request: ObservedRequest
 ) -> SourceFit:
-    from rotor.observed.fit import DEFAULT_FREE, FitChoices, fit_source
+    from rotor.observed.fit import FitChoices, fit_source
+    from rotor.observed.variables import DEFAULT_FREE
 
     free, shared = (tuple(FREE[word] for word in words) for words in (request.free, request.shared))
     choices = FitChoices(free=free or DEFAULT_FREE, shared=shared, calibration=request.calibration)

@@ -87,7 +87,7 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
         apart = _rolled_over(groups, k, hamiltonian.diagonal())
         linked[apart, :] = linked[:, apart] = False
     parts = np.empty(len(k), dtype=np.int64)
-    for number, members in enumerate(connected_parts(len(k), np.argwhere(linked).tolist())):
+    for number, members in enumerate(connected_parts(len(k), zip(*np.nonzero(linked), strict=True))):
         parts[members] = number
     return np.asarray(np.unique(np.column_stack([groups, parts]), axis=0, return_inverse=True)[1].reshape(-1))
 
