@@ -223,4 +223,4 @@ def test_a_comparison_is_drawn_as_a_mirror_with_differences():
 
 def test_the_plot_of_a_comparison_is_written(call, tmp_path):
     assert call("cat", OCS, "--compare", "OCS", "--plot", "both.svg")[0] == 0
-    assert "difference" in (tmp_path / "both.svg").read_text(encoding="utf-8")
+    assert "Difference" in (tmp_path / "both.svg").read_text(encoding="utf-8")
