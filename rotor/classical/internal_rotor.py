@@ -44,8 +44,8 @@ class TurningTop:
         λ along the principal axes, of any length.
     own : float
         I_t.
-    barriers : mapping of int to float
-        V_n of V = Σ ½ V_n (1 - cos nα), energies.
+    barriers, sines : mapping of int to float
+        V_n and W_n of V = Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα, energies.
 
     Examples
     --------
@@ -58,17 +58,20 @@ class TurningTop:
     axis: ArrayLike
     own: float
     barriers: Mapping[int, float] = field(default_factory=dict)
+    sines: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         moments, axis = checked_moments(self.moments), np.asarray(self.axis, dtype=float)
         length = float(np.linalg.norm(axis))
         if axis.shape != (3,) or not length > 0:
             raise ValueError(f"axis of a top {axis}: expected three numbers along the principal axes, not all 0")
-        if any(n < 1 for n in self.barriers):
-            raise ValueError(f"barriers {dict(self.barriers)}: terms V_n are counted from n = 1")
+        for name in ("barriers", "sines"):
+            terms = dict(getattr(self, name))
+            if any(n < 1 for n in terms):
+                raise ValueError(f"{name} {terms}: terms of the potential are counted from n = 1")
+            object.__setattr__(self, name, MappingProxyType(terms))
         object.__setattr__(self, "moments", moments)
         object.__setattr__(self, "axis", axis / length)
-        object.__setattr__(self, "barriers", MappingProxyType(dict(self.barriers)))
         if not self.own > 0 or not self.rest_moments[0] > 0:
             raise ValueError(
                 f"moment of a top {self.own:g}: expected a number above 0 that leaves the rest of the body moments above 0"
@@ -105,17 +108,21 @@ class TurningTop:
 
     def potential(self, angle: ArrayLike) -> Floats:
         """V at angles."""
-        alpha = np.asarray(angle, dtype=float)
-        return np.asarray(
-            sum((0.5 * v * (1 - np.cos(n * alpha)) for n, v in self.barriers.items()), np.zeros(alpha.shape))
-        )
+        alpha, total = np.asarray(angle, dtype=float), np.zeros(np.shape(angle))
+        for n, v in self.barriers.items():
+            total = total + 0.5 * v * (1 - np.cos(n * alpha))
+        for n, w in self.sines.items():
+            total = total + 0.5 * w * np.sin(n * alpha)
+        return total
 
     def torque(self, angle: ArrayLike) -> Floats:
         """-V'(α)."""
-        alpha = np.asarray(angle, dtype=float)
-        return np.asarray(
-            sum((-0.5 * n * v * np.sin(n * alpha) for n, v in self.barriers.items()), np.zeros(alpha.shape))
-        )
+        alpha, total = np.asarray(angle, dtype=float), np.zeros(np.shape(angle))
+        for n, v in self.barriers.items():
+            total = total - 0.5 * n * v * np.sin(n * alpha)
+        for n, w in self.sines.items():
+            total = total - 0.5 * n * w * np.cos(n * alpha)
+        return total
 
     def energy(self, momentum: ArrayLike, p: ArrayLike, angle: ArrayLike) -> Floats:
         """H (n,) of momenta (n, 3) along the principal axes of the whole, p (n,) and angles (n,)."""
@@ -126,6 +133,10 @@ class TurningTop:
         """α' (n,) of momenta (n, 3) along the principal axes of the whole."""
         torsion, _, velocity = self._relative(momentum, p)
         return np.asarray(torsion / self.own - velocity @ self._axis)
+
+    def angular_velocity(self, momentum: ArrayLike, p: ArrayLike) -> Floats:
+        """ω (n, 3) of the body, along the principal axes of the whole, of momenta along these."""
+        return np.asarray(self._relative(momentum, p)[2] @ self.rest_axes.T)
 
     def _relative(self, momentum: ArrayLike, p: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """p (n,), and L - pλ and ω = J⁻¹(L - pλ) (n, 3) along the axes of J."""

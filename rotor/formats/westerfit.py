@@ -20,6 +20,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -125,7 +126,7 @@ def _top(name: str, sections: Mapping[str, Sequence[tuple[int, str]]]) -> Top:
     dipole = [0.0, 0.0, 0.0]
     for key, value in _further(_terms(sections.get("PARAMS", ())), dipole).items():
         values[key] = values.get(key, 0.0) + value
-    rotation = {key: values.pop(key) for key in list(values) if not is_torsional(key)}
+    rotation: dict[str, Any] = {key: values.pop(key) for key in list(values) if not is_torsional(key)}
     internal = InternalRotationConstants(
         values, "RAM", vt_max=int(settings.get("vtmax", "0")), names="energy", source="file of westerfit"
     )

@@ -29,6 +29,7 @@ from rotor.thermodynamics.hindered_rotor import HinderedRotorFunctions, hindered
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from rotor.thermodynamics.classical_torsion import ClassicalTorsion
     from rotor.tops.top import Top
 
 TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
@@ -58,7 +59,8 @@ class TorsionRequest:
 
     top: with a geometry. bond: atoms i-j as counted from 1; those behind j turn. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
     of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: of a scan, in a whole turn. vmax: highest
-    torsional level. temperatures_k: of the thermodynamic functions.
+    torsional level. temperatures_k: of the thermodynamic functions. classical_k: temperature of a classical gas, of `molecules`
+    followed for `duration_ps`; None: none is made.
     """
 
     top: Top
@@ -78,6 +80,16 @@ class TorsionRequest:
         common=True, example="10:1000K:100",
     )  # fmt: skip
 
+    classical_k: float | None = declared(
+        None, Quantity("K", above=0, metavar="T"), "Move a classical gas over the barrier at this temperature (K)", "observables.classical",
+        example="300 K",
+    )  # fmt: skip
+    duration_ps: float = declared(
+        10.0, Quantity("ps", above=0), "How long the classical gas is followed (ps)", "numerics.duration"
+    )
+    molecules: int = declared(300, Whole(2, 100_000), "Molecules of the classical gas", "numerics.molecules")
+    seed: int = declared(1, Whole(0), "Seed of the classical gas", "numerics.seed")
+
     def __post_init__(self) -> None:
         require_top(self.top)
         check_fields(self)
@@ -94,6 +106,10 @@ class TorsionRequest:
             given_terms(self.potential, rotation)
         elif self.potential == TABLE:
             table_barrier(rotation)
+        if self.classical_k is not None:
+            from rotor.thermodynamics.classical_torsion import refuse_changing_moments
+
+            refuse_changing_moments(rotation)
 
     @property
     def rotation(self) -> BondRotation:
@@ -199,6 +215,16 @@ class TorsionAnswer(TextOf):
         return functions
 
     @cached_property
+    def classical(self) -> ClassicalTorsion | None:
+        """The classical gas; None without its temperature."""
+        if self.request.classical_k is None:
+            return None
+        from rotor.thermodynamics.classical_torsion import classical_torsion, turning_top
+
+        request, body = self.request, turning_top(self.rotation, self.torsion.potential)
+        return classical_torsion(body, self.request.classical_k, request.duration_ps, request.molecules, request.seed)
+
+    @cached_property
     def functions(self) -> HinderedRotorFunctions:
         """Thermodynamic functions at the temperatures of the request."""
         return hindered_rotor_functions(self.torsion, self.request.temperatures_k, self.symmetry_number)
@@ -258,6 +284,7 @@ class TorsionAnswer(TextOf):
             "scan_closure_cm": self.scan.closure_cm if self.scan is not None else None,
             "waves": self.waves,
             "errors": self.errors.as_json(),
+            "classical": self.classical.facts() if self.classical else None,
         }  # fmt: skip
 
     @property

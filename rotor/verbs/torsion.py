@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotor import units
 from rotor.formats import write
@@ -17,11 +17,15 @@ from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, 
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Work
 
+if TYPE_CHECKING:
+    from rotor.thermodynamics.classical_torsion import ClassicalTorsion
+
 EXAMPLES = """\b
 Examples:
   rotor torsion C2H6 --bond 1-2
   rotor torsion "SMILES:CC=O" --bond 1-2 --potential table --plot acetaldehyde.png
   rotor torsion C2H6 --bond 1-2 --potential "V3=1013 cm-1" --temperature 100:1000K:10
+  rotor torsion C2H6 --bond 1-2 --potential "V3=1013 cm-1" --classical 300K
   rotor torsion butane.xyz --bond 2-3 --potential xtb --csv levels.csv --thermo-csv heat.csv"""
 
 SHOWN = 30  # levels of the report
@@ -61,6 +65,9 @@ def show(answer: TorsionAnswer, report: Report) -> None:
     print()
     show_table(_thermo_table(answer))
     print()
+    if answer.classical is not None:
+        show_facts(_classical_facts(answer.classical))
+        print()
     show_facts(
         [
             *source_facts(answer.request.top, ("constants",), report.sources),
@@ -87,6 +94,25 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
     if record["scan_misfit_cm"] is not None:
         facts.append(("scan", f"Fourier series within {record['scan_misfit_cm']:.2g} cm⁻¹ (root mean square)"))
     return facts
+
+
+def _classical_facts(gas: ClassicalTorsion) -> list[tuple[str, str]]:
+    torsion, rotation, potential = (gas.equipartition[name] for name in ("torsion", "rotation", "potential"))
+    conserved = f"energy within {gas.energy_error:.1g} kT, L in space within {gas.momentum_error:.1g}"
+    return [
+        ("classical gas", f"{gas.molecules} molecules at {gas.temperature_k:g} K for {gas.time_ps[-1]:g} ps"),
+        ("passages", f"{gas.rate.value:.4g} ± {gas.rate.error:.2g} a molecule and ps; {gas.expected_rate:.4g} by the equilibrium flux"),
+        ("equipartition", f"p ∂H/∂p {torsion.value:.3f} ± {torsion.error:.3f} kT; L·ω/3 {rotation.value:.3f} ± {rotation.error:.3f} kT"),
+        ("mean V", f"{potential.value:.3f} ± {potential.error:.3f} kT; {gas.expected_potential:.3f} by quadrature, 0.5 of a harmonic well"),
+        ("conserved", f"{conserved}; steps of {gas.step_ps * 1e3:.2g} fs"),
+    ]  # fmt: skip
+
+
+def write_motion(answer: TorsionAnswer, path: Path, report: Report) -> None:
+    """The classical gas at times as a file."""
+    if answer.classical is None:
+        raise ValueError("classical_csv: there is no classical gas; give its temperature, such as --classical 300K")
+    write(answer.classical, path, settings=dict(report.provenance))
 
 
 def _bond_text(answer: TorsionAnswer) -> str:
@@ -147,6 +173,7 @@ VERB = Verb(
     outputs=(
         Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
         Output("thermo_csv", (".csv",), "Write the thermodynamic functions of every method as CSV", write_functions, "thermo.csv"),
+        Output("classical_csv", (".csv",), "Write the classical gas at times as CSV", write_motion, "gas.csv"),
         Output("plot", PICTURES, "Draw potential, levels and wave functions (.png, .pdf, .svg)", draw, "torsion.png"),
     ),
     subject=OneMolecule(
