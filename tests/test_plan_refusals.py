@@ -26,12 +26,14 @@ REFUSED = {
     "align total": ("align", "accuracy = { total = 1e-3 }\n" + OCS + LIGHT),
     "driven total": ("tumble", 'accuracy = { total = "1e-6 rad" }\n' + DRIVEN),
     "free total": ("tumble", 'accuracy = { total = "1e-6 rad" }\n' + SEPARATRIX),
+    "growth rate of a driven body": ("tumble", 'accuracy = "0.1 %"\n' + DRIVEN),
     "gas total": ("gas", 'accuracy = { total = "5 K" }\n' + OCS),
     "folder of a file": ("levels", CO + '[outputs]\ncsv = "nowhere/l.csv"\n'),
     "suffix of a file": ("levels", CO + '[outputs]\ncsv = "l.txt"\n'),
 }
 ALLOWED = {
     "separatrix": ("tumble", 'accuracy = "1e-6 rad"\n' + SEPARATRIX + "[conditions]\ntimes = [0.0, 1e13]\n"),
+    "growth rate": ("tumble", 'accuracy = "1e-9 %"\n' + SEPARATRIX),
     "levels": ("levels", 'accuracy = "1 Hz"\n' + CO),
     "stark": ("stark", 'accuracy = "1 kHz"\n' + OCS + '[conditions]\nfield = "0:10:3"\n'),
     "thermo": ("thermo", 'accuracy = "0.1 %"\n' + CO),

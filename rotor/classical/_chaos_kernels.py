@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
-
-STAGES = 12
+from rotor.classical.exponents import STAGES
 
 
 @njit(cache=True)
@@ -93,10 +92,10 @@ def _orthogonal(table: Floats, grown: Floats) -> None:
 @njit(cache=True, nogil=True)
 def follow(
     form: Any, tableau: Any, table: Floats, interval: float, intervals: int, first: float, grown: Floats
-) -> float:
-    """Advance by `intervals` intervals, orthogonalising after each; the step to go on with, or 0 where none serves."""
+) -> tuple[float, int]:
+    """Advance by `intervals` intervals, orthogonalising after each; the next step, 0 where none serves, and how many were made."""
     k, work = np.zeros((STAGES, *table.shape)), np.empty_like(table)
-    step = first
+    step, steps = first, 0
     for _ in range(intervals):
         left = interval
         while left > 0.0:
@@ -104,10 +103,11 @@ def follow(
             error = _stepped(form, tableau, table, h, k, work)
             if error <= 1.0:
                 left = left - h if h < left else 0.0
+                steps += 1
             grow = 0.9 * max(error, 1e-8) ** (-0.125)
             if error > 1.0 or h == step:
                 step = h * min(5.0, max(0.2, grow)) if grow == grow else 0.2 * h
             if step < 1e-12 * interval:
-                return 0.0
+                return 0.0, steps
         _orthogonal(table, grown)
-    return step
+    return step, steps

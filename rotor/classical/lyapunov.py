@@ -22,11 +22,12 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import attitude_rate, checked_momentum
+from rotor.classical.exponents import DIFFERENCE, STAGES, Exponents, Growth, Settings, exponents_of
 from rotor.classical.system import system_of
 from rotor.geometry.rotations import IDENTITY, normalised
 
 ALIGNING = 0.2  # of a segment
-DIFFERENCE = 6e-6  # relative step of central differences: cube root of the rounding of doubles
+DOUBLINGS = 10  # of the time, for an accuracy
 
 
 @dataclass(frozen=True)
@@ -51,27 +52,6 @@ class Flow:
         opposite = y[:, None, :] - step * np.eye(d)
         both = self.rate(time, np.concatenate([shifted, opposite]).reshape(2 * k * d, d)).reshape(2, k, d, d)
         return np.swapaxes((both[0] - both[1]) / (2.0 * step), -1, -2)
-
-
-@dataclass(frozen=True)
-class Exponents:
-    """Lyapunov exponents, natural logarithm per time, largest first.
-
-    values: (m,), means over segments of orbit. errors: (m,), the standard error of the mean and `bias`, added in squares.
-    bias: what a growth in proportion to time, which is no exponent, would add to a value (see the head of this module).
-    divergence: mean trace of the Jacobian, which the sum of a full spectrum equals. time: total time averaged over.
-    """
-
-    values: Floats
-    errors: Floats
-    divergence: float
-    time: float
-    bias: float
-
-    @property
-    def kaplan_yorke(self) -> float:
-        """Kaplan-Yorke dimension of the full spectrum; exponents within three errors of zero count as zero."""
-        return kaplan_yorke(np.where(np.abs(self.values) <= 3.0 * self.errors, 0.0, self.values))
 
 
 def body_flow(
@@ -132,6 +112,7 @@ def lyapunov_exponents(
     segments: int = 32,
     interval: float = 1.0,
     tolerance: float = 1e-10,
+    accuracy: float | None = None,
 ) -> Exponents:
     """The largest Lyapunov exponents along the orbit of flow.start.
 
@@ -152,6 +133,8 @@ def lyapunov_exponents(
         Time between two orthogonalisations.
     tolerance : float
         Of the integration (DOP853), relative and absolute.
+    accuracy : float, optional
+        `time` is doubled, up to 1024 times, until the numerical error of every exponent and twice its standard error are at most this.
 
     Returns
     -------
@@ -161,7 +144,7 @@ def lyapunov_exponents(
     Raises
     ------
     ValueError
-        A count, time or number of segments that cannot be; an orbit that grows without bound.
+        A count, time or number of segments that cannot be; an orbit that grows without bound; an accuracy that is not reached.
 
     Notes
     -----
@@ -179,15 +162,17 @@ def lyapunov_exponents(
         raise ValueError(f"the flow has {d} exponents; count={count} is not among 1 to {d}")
     if segments < 2 or not time > 0.0 or not interval > 0.0:
         raise ValueError("exponents need a positive time, a positive interval and at least two segments")
-    plan = _Plan(transient, time / segments, segments, interval, tolerance)
     form = None if flow.timed else quadratic_form(flow)
-    grown, divergence = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
-    each = grown / plan.length
-    values, spread = np.mean(each, axis=0), np.std(each, axis=0, ddof=1) / np.sqrt(segments)
-    bias = plan.bias(together=form is not None)
-    order = np.argsort(-values, kind="stable")
-    errors = np.hypot(spread, bias)[order]
-    return Exponents(values[order], errors, float(np.mean(divergence) / plan.length), time, bias)
+    for doubled in range(DOUBLINGS + 1):
+        plan = _Plan(transient, 2.0**doubled * time / segments, segments, interval, tolerance)
+        grown = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
+        found = exponents_of(grown, plan.settings(together=form is not None))
+        if accuracy is None or found.reached <= accuracy:
+            return found
+    raise ValueError(
+        f"accuracy: {accuracy:g} per time cannot be given: the error after a time of {found.time:g} is {found.reached:.2g} "
+        f"({found.budget.line()}); ask for less, or give a longer time or a smaller tolerance"
+    )
 
 
 def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
@@ -214,23 +199,6 @@ def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     if np.max(np.abs(predicted - expected)) > 1e-12 * np.max(np.abs(expected)):
         return None
     return constant, np.ascontiguousarray(linear.T), np.ascontiguousarray(quadratic)
-
-
-def kaplan_yorke(exponents: ArrayLike) -> float:
-    """Dimension j + Σ_{i<=j} λ_i / |λ_{j+1}|, j the largest number of exponents whose sum is not negative.
-
-    (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730, 204 (1979).) A spectrum whose sum is not negative fills its
-    space; one whose first exponent is negative ends in a point.
-
-    >>> kaplan_yorke([0.5, 0.0, -2.0])
-    2.25
-    """
-    values = np.sort(np.asarray(exponents, dtype=np.float64))[::-1]
-    sums = np.cumsum(values)
-    if sums[-1] >= 0.0:
-        return float(values.size)
-    j = int(np.argmax(sums < 0.0))
-    return float(j + (sums[j - 1] / abs(values[j]) if j else 0.0))
 
 
 def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Floats:
@@ -322,11 +290,11 @@ class _Plan:
         """Time given to the tangent vectors before anything is measured."""
         return ALIGNING * self.length
 
-    def bias(self, together: bool) -> float:
-        """ln(t2/t1)/(t2 - t1) of vectors that have grown since before the aligning, along the whole orbit or a segment."""
+    def settings(self, together: bool) -> Settings:
+        """What the errors follow from. together: whether the segments follow one another, with tangent vectors that go on."""
         before = self.aligning + (self.transient if together else 0.0)
         measured = self.length * (self.segments if together else 1)
-        return float(np.log1p(measured / before) / measured)
+        return Settings(before, measured, self.length * self.segments, self.intervals(self.length)[1], self.tolerance)
 
     def intervals(self, part: float) -> tuple[int, float]:
         """How many intervals, of what length, make up `part`."""
@@ -334,11 +302,11 @@ class _Plan:
         return number, part / number
 
 
-def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _Plan) -> tuple[Floats, Floats]:
-    """Growth (segments, m) and integrated trace (segments,) of segments one after the other, compiled."""
+def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _Plan) -> Growth:
+    """Of segments one after the other, compiled."""
     from scipy.integrate import DOP853
 
-    from rotor.classical._chaos_kernels import STAGES, follow
+    from rotor.classical._chaos_kernels import follow
 
     d = flow.start.size
     coefficients = (DOP853.A[:STAGES, :STAGES], DOP853.B, DOP853.E3[:STAGES], DOP853.E5[:STAGES])
@@ -346,27 +314,30 @@ def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _P
     table = np.zeros((d + 1, 1 + count))
     table[:d, 0], table[:d, 1:] = flow.start, np.eye(d)[:, :count]
     grown, divergence = np.zeros((plan.segments, count)), np.zeros(plan.segments)
-    step, before = 1e-3 * plan.interval, plan.transient + plan.aligning
+    step, before, steps = 1e-3 * plan.interval, plan.transient + plan.aligning, 0
     number, length = plan.intervals(before)
-    step = _checked_step(follow(form, tableau, table, length, number, step, np.zeros(count)))
+    step = _checked_step(follow(form, tableau, table, length, number, step, np.zeros(count))[0])
     number, length = plan.intervals(plan.length)
     for segment in range(plan.segments):
         table[d, 0] = 0.0
-        step = _checked_step(follow(form, tableau, table, length, number, step, grown[segment]))
+        step, taken = follow(form, tableau, table, length, number, step, grown[segment])
+        steps += taken
+        _checked_step(step)
         divergence[segment] = table[d, 0]
-    return grown, divergence
+    return Growth(
+        grown / plan.length, divergence / plan.length, steps / (plan.segments * plan.length), True, whole=count == d
+    )
 
 
-def _side_by_side(flow: Flow, count: int, plan: _Plan) -> tuple[Floats, Floats]:
+def _side_by_side(flow: Flow, count: int, plan: _Plan) -> Growth:
     """The same of segments side by side, each from its own point of one orbit."""
     d = flow.start.size
     starts = plan.transient + plan.length * np.arange(plan.segments)
     points = orbit(flow, starts, plan.tolerance)
     tracker = _Tracker(flow, starts - starts[0], plan.tolerance)
     y = (points, np.broadcast_to(np.eye(d)[:, :count], (plan.segments, d, count)))
-    clock, y, _, _ = tracker.follow(float(starts[0]), y, *plan.intervals(plan.aligning))
-    _, _, grown, divergence = tracker.follow(clock, y, *plan.intervals(plan.length))
-    return grown, divergence
+    clock, y, _ = tracker.follow(float(starts[0]), y, *plan.intervals(plan.aligning))
+    return tracker.follow(clock, y, *plan.intervals(plan.length))[2]
 
 
 def _checked_step(step: float) -> float:
@@ -385,20 +356,24 @@ class _Tracker:
 
     def follow(
         self, clock: float, y: tuple[Floats, Floats], intervals: int, length: float
-    ) -> tuple[float, tuple[Floats, Floats], Floats, Floats]:
-        """After `intervals`: the clock, states, logarithms of growth (k, m) and integrals of the trace (k,)."""
+    ) -> tuple[float, tuple[Floats, Floats], Growth]:
+        """After `intervals`: the clock, states, and their growth."""
         states, tangent = y
-        k, _, m = tangent.shape
-        grown, divergence = np.zeros((k, m)), np.zeros(k)
+        k, d, m = tangent.shape
+        grown, divergence, steps, span = np.zeros((k, m)), np.zeros(k), 0, intervals * length
         for _ in range(intervals):
-            states, tangent, traces = self._interval(clock, states, tangent, length)
+            states, tangent, traces, taken = self._interval(clock, states, tangent, length)
             tangent, upper = np.linalg.qr(tangent)
             grown += np.log(np.abs(np.diagonal(upper, axis1=-2, axis2=-1)))
             divergence += traces
+            steps += taken
             clock += length
-        return clock, (states, tangent), grown, divergence
+        exact = self.flow.jacobian is not None
+        return clock, (states, tangent), Growth(grown / span, divergence / span, steps / span, exact, d == m)
 
-    def _interval(self, clock: float, states: Floats, tangent: Floats, length: float) -> tuple[Floats, Floats, Floats]:
+    def _interval(
+        self, clock: float, states: Floats, tangent: Floats, length: float
+    ) -> tuple[Floats, Floats, Floats, int]:
         from scipy.integrate import solve_ivp
 
         (k, d), m = states.shape, tangent.shape[2]
@@ -421,7 +396,7 @@ class _Tracker:
         )
         _check_success(solution)
         end = solution.y[:, -1]
-        return end[: k * d].reshape(k, d), end[k * d : -k].reshape(k, d, m), end[-k:]
+        return end[: k * d].reshape(k, d), end[k * d : -k].reshape(k, d, m), end[-k:], solution.nfev // STAGES
 
     def _rate_and_slopes(self, time: float, y: Floats) -> tuple[Floats, Floats]:
         """Rates and Jacobians of all states, each taken at its own time where the flow depends on time."""

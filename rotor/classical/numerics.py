@@ -10,6 +10,7 @@ from rotor.classical.motion_steps import beginning, expected_steps, first_share,
 from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
 from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
+from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import LONG_SEARCH, LeftOut, Plan, peak_mb, timed
@@ -34,6 +35,20 @@ def choose(scene: Any, request: Any, allowed: float) -> Choice:
 def error_of_motion(answer: Any) -> float:
     """Round-off of a free motion; the error of steps was found when they were chosen."""
     return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
+
+
+def choose_growth(scene: Any, request: Any, asked: float) -> Choice:
+    """Nothing: the rate at which a free body leaves its unstable axis is a closed form."""
+    if not isinstance(request, TumbleRequest):
+        raise ValueError(
+            f"accuracy: {asked:g} %: is of the growth rate of a free motion; a motion under effects has an accuracy of the attitude, in rad"
+        )
+    return Choice(request, NOTHING_CHEAPER)
+
+
+def error_of_growth(answer: Any) -> float:
+    """Rounding of the growth rate in percent: a square root of products and quotients of seven numbers."""
+    return 100 * ROUNDING
 
 
 def sweeps_of_tumble(request: Any) -> Sweeps:
@@ -162,5 +177,8 @@ def _memory_mb(request: DrivenRequest) -> float:
 
 
 TUMBLE = Numerics(
-    {"rad": Goal("attitude", choose, error_of_motion)}, sweeps=sweeps_of_tumble, plan=plan_of_motion, planned=planned
+    {"rad": Goal("attitude", choose, error_of_motion), "%": Goal("growth rate", choose_growth, error_of_growth)},
+    sweeps=sweeps_of_tumble,
+    plan=plan_of_motion,
+    planned=planned,
 )

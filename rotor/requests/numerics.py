@@ -38,7 +38,8 @@ class Numerics:
 
     goals: by the unit of an accuracy; a number is in "", else in the first one. bare: whether a number may stand without a unit.
     percent: the unit of a percentage of a scene. sweeps: of a request. plan: of a request; by default that of a run. planned: of (scene,
-    request, accuracy), the plan with its choice, where a search would take as long as a run. rounding: of the highest level in MHz.
+    request, accuracy in the first unit), the plan with its choice, where a search would take as long as a run. rounding: of the highest
+    level in MHz.
     """
 
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})

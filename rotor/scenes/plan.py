@@ -67,12 +67,12 @@ def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None)
 
 def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
     """The plan, and the settings for the accuracy of the scene; None where it asks for none, or where the run alone finds them."""
-    from rotor.scenes.accuracy import asked_of
+    from rotor.scenes.accuracy import asked_of, unit_of
 
     asked, numerics = asked_of(scene), numerics_of(scene.kind)
     if asked is None:
         return plan_of_request(scene.kind, request), None
-    if numerics.planned is not None:
+    if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
         return numerics.planned(scene, request, asked)
     choices: list[Choice | None] = []
     search = timed(lambda: choices.append(choice_of(scene, request)), LONG_SEARCH)

@@ -188,7 +188,7 @@ def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str
         low, _, high = sorted(zip(request.moments, request.axes, strict=True))
         where = f"|ω{high[1]}/ω{low[1]}| = {ratio:.8g} where L crosses the plane of these two axes"
         facts.append(("separatrix", where))
-        facts.append(("growth rate", f"{growth:.8g}{_per(units.time)} off the intermediate axis"))
+        facts.append(("growth rate", f"{growth:.8g}{_per(units.time)} off the intermediate axis, exact"))
     facts += [
         ("chaos", content["chaos"]),
         ("times", content["times_source"]),
