@@ -93,8 +93,8 @@ MUTATIONS = (
     ),
     Mutation(
         6, "rotor/tops/kind_of_constants.py",
-        '    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):\n        return "prolate"',
-        '    if given == "AB" or (given == "ABC" and abs(values["B"] / values["C"] - 1) < 1e-5):\n        return "prolate"',
+        '    if rigid == "AB" or (rigid == "ABC" and values["B"] == values["C"]):\n        return "prolate"',
+        '    if rigid == "AB" or (rigid == "ABC" and abs(values["B"] / values["C"] - 1) < 1e-5):\n        return "prolate"',
         "tests/hard/test_safeguards.py::test_the_doublet_of_a_near_symmetric_top_is_there",
     ),
     Mutation(
@@ -230,7 +230,7 @@ MUTATIONS = (
         "tests/test_rotations.py::test_log_gives_back_the_smallest_rotation_vectors_in_any_direction",
     ),
     Mutation(
-        27, "rotor/classical/lyapunov.py", "    errors = np.hypot(spread, bias)[order]", "    errors = spread[order]",
+        27, "rotor/classical/exponents.py", "        errors=np.hypot(spread, settings.bias),", "        errors=spread,",
         "tests/hard/test_safeguards.py::test_the_growth_of_a_free_body_is_within_its_error_of_zero",
     ),
     Mutation(
@@ -267,8 +267,8 @@ MUTATIONS = (
     ),
     Mutation(
         24, "rotor/alignment/align.py",
-        "        if given is not None:\n            raise BasisTooSmallError(",
-        "        if given is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
+        "        if jmax_option is not None:\n            raise BasisTooSmallError(",
+        "        if jmax_option is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
         "tests/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
     ),
     Mutation(
@@ -285,6 +285,26 @@ MUTATIONS = (
         29, "rotor/fluids/budgets.py",
         "    if settings.every > 1:\n", "    if False:\n",
         "tests/test_error_budgets.py::test_the_steps_of_a_fluid_are_counted_about_the_mean",
+    ),
+    Mutation(
+        20, "rotor/thermodynamics/level_sums.py",
+        "        raise OutOfReachError(refusal(t, error, at_worst) + others)", "        return",
+        "tests/test_thermo.py::test_levels_that_distortion_does_not_serve_are_counted_with_their_error",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/field_map.py",
+        "<= request.tolerance_mhz and leaked <= request.most_at_edge", "<= request.tolerance_mhz",
+        "tests/hard/test_safeguards.py::test_the_edge_of_a_basis_is_empty_whatever_the_tolerance",
+    ),
+    Mutation(
+        24, "rotor/alignment/align.py",
+        "    return trace.step_error * 2 + ", "    return ",
+        "tests/test_stated_bounds.py::test_stated_errors_are_bounds[aligned]",
+    ),
+    Mutation(
+        27, "rotor/classical/exponents.py",
+        "    return np.asarray(2 * np.log(", "    return np.asarray(0 * np.log(",
+        "tests/test_lyapunov.py::test_closed_forms_are_within_the_stated_errors[free_tumble]",
     ),
     Mutation(
         30, "rotor/classical/free/budget.py",

@@ -15,6 +15,7 @@ from rotor.classical.lyapunov import body_flow, lyapunov_exponents
 from rotor.fluids.motion.thermometers import Kinetic, temperatures
 from rotor.molecules.molecule import Molecule
 from rotor.quantum.effects.stark import stark_map
+from rotor.quantum.fields.map_request import MOST_AT_EDGE
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.degrees_of_freedom import Degrees
 from rotor.structures.family import family
@@ -101,3 +102,10 @@ def test_the_steps_of_a_pulse_are_halved_until_they_agree():
     trace = align(top, GaussianPulse(3e12, 0.3), np.linspace(-1, 20, 5), temperature_k=2.0, tolerance=1e-8)
     assert trace.step_error <= 1e-8
     assert max(trace.steps) > FIRST_STEPS
+
+
+def test_the_edge_of_a_basis_is_empty_whatever_the_tolerance():
+    """Case 23: cosines are off by about the population of the two highest J, which a tolerance of the energies says nothing of."""
+    top = Top.from_constants("B=1000 MHz", dipole_abc_debye=(3.0, 0.0, 0.0))
+    found = stark_map(top, [0.0, 100.0], j_highest=1, tolerance_mhz=1e7)
+    assert found.edge_population.max() <= MOST_AT_EDGE
