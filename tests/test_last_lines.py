@@ -2,12 +2,18 @@
 
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from test_assignment import spectrum
 from test_structure import OCS_SPECIES
 
+from rotor import units
+from rotor.formats.spcat.catalogue_budget import catalogue_budget
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Layout
 from rotor.reports.error_table import error_rows
 from rotor.requests.budget import ErrorBudget
 from rotor.verbs.verb import SCENE_VERBS
@@ -76,6 +82,47 @@ def test_the_same_errors_on_the_screen_in_the_json_and_in_the_provenance(verb, c
     known = [term.value for _, term in budget.shown() if term.value is not None]
     assert known == sorted(known, reverse=True)  # the largest is named first
     assert not re.search(r"accuracy reached|reached, .* asked", screen)
+
+
+CATALOGUE = Path(__file__).parent / "oracles" / "ocs" / "sample.cat"
+TOOLS = {
+    "cat": ("cat", str(CATALOGUE), "--csv", "a.csv"),
+    "catalogue": ("catalogue", "show", "--catalogue", "l.rotorcat", "--csv", "a.csv"),
+    "convert": ("convert", "water", "w.toml"),
+    "identify": ("identify", "s.csv", "--catalogue", "co", "--width", "3", "--noise", "0.01", "--csv", "a.csv"),
+}
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_commands_on_files_state_their_errors_too(tool, call, folder):
+    if tool == "catalogue":
+        assert call("catalogue", "add", str(CATALOGUE), "--catalogue", "l.rotorcat")[0] == 0
+    if tool == "identify":
+        (folder / "co").mkdir()
+        assert call("spectrum", "CO", "--cat", "co/c028001.cat")[0] == 0
+        emission = ("emission", "CO", "--range", "115.2:115.35GHz", "--width", "3", "--excitation", "20")
+        assert call(*emission, "--profile-csv", "s.csv")[0] == 0
+    code, out, err = call(*TOOLS[tool], "--errors", "--json", "a.json")
+    assert code == 0, err
+    content = json.loads((folder / "a.json").read_text())["errors"]
+    assert plain(ErrorBudget.from_json(content).line().removeprefix("errors ")) in plain(out)
+    for name, text in error_rows(content):
+        assert plain(f"{name} {text}") in plain(out)
+    if tool != "convert":
+        assert json.loads((folder / "a.csv.provenance.json").read_text())["errors"] == content
+
+
+def test_errors_of_a_catalogue_are_those_of_its_strong_lines(call, folder):
+    """Half of the last printed decimal, and the largest error of the file above a tenth of the strongest line."""
+    lines = read_cat(CATALOGUE)
+    strong = lines.lgint >= lines.lgint.max() - 1.0
+    every = replace(lines, error_mhz=np.where(strong, 0.002, 5.0), layout=Layout())
+    budget = catalogue_budget(every)
+    assert (budget.rounding.value, budget.data.value) == (5e-5, 0.002)
+    some = catalogue_budget(replace(every, error_mhz=np.where(lines.lgint == lines.lgint.max(), 0.0, 0.002)))
+    assert some.data.source == f"1 of {strong.sum()} strong lines have no error; the largest of the others is 0.002 MHz"
+    infrared = catalogue_budget(replace(every, layout=Layout(decimals=(6, 6, 4, 4))))
+    assert infrared.rounding.value == pytest.approx(5e-7 * units.MHZ_PER_CM)
 
 
 @pytest.mark.parametrize("verb", [verb for verb in COMMANDS if verb not in SLOW])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, json_text, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
 from rotor.verbs.comparing import (
@@ -20,11 +21,16 @@ from rotor.verbs.comparing import (
     read_catalogue,
     temperature_note,
 )
+<<<<<<< HEAD
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, Output, Report, Work
+=======
+from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Tool, Work
+>>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue
+    from rotor.requests.budget import ErrorBudget
 
 EXAMPLES = """\b
 Examples:
@@ -132,7 +138,14 @@ class CatAnswer:
         if self.compared is not None:
             other = ", ".join([self.request.compare or "", *self.request.isotope])
             facts["compared"] = comparison_record(self.compared, other, self.request.top_lines)
-        return facts
+        return facts | {"errors": self.errors.as_json()}
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the frequencies can be trusted, as the file prints them."""
+        from rotor.formats.spcat.catalogue_budget import catalogue_budget
+
+        return catalogue_budget(self.lines)
 
 
 def answer(request: CatRequest, work: Work) -> CatAnswer:
@@ -185,6 +198,7 @@ def show(answer: CatAnswer, report: Report) -> None:
             ("species", ", ".join(map(str, content["tags"])) or "none"),
         ]
     )
+    show_facts(error_facts(content))
     if answer.compared is None:
         _show_strongest("", lines, shown)
         return
@@ -231,6 +245,7 @@ VERB = Tool(
     answer=answer,
     table=lambda answer: answer.lines,
     text=json_of,
+    shown=ErrorsShown,
     show=show,
     outputs=(
         Output("out", (".cat", ".cat.gz"), "Write the lines that are left (.cat, .cat.gz)", write_lines),

@@ -9,13 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.formats.provenance import write_beside
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
+<<<<<<< HEAD
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Output, Work
+=======
+from rotor.verbs.verb import ErrorsShown, Output, Report, Tool, Work
+from rotor.version import version
+>>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
 
 if TYPE_CHECKING:
+    from rotor.requests.budget import ErrorBudget
     from rotor.table import Table as Columns
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
@@ -136,11 +144,22 @@ class Found:
     def facts(self) -> dict[str, Any]:
         """A record for each line."""
         lines = [dict(zip(_COLUMNS, row, strict=True)) for row in self.rows]
-        return {"catalogue": self.request.catalogue, "lines": lines}
+        return {"catalogue": self.request.catalogue, "lines": lines, "errors": self.errors.as_json()}
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the frequencies can be trusted, by the errors of their sources."""
+        import numpy as np
+
+        from rotor.formats.spcat.catalogue_budget import stored_budget
+
+        return stored_budget(*np.array([row[1:4] for row in self.rows], dtype=np.float64).reshape(-1, 3).T)
 
     def show(self) -> None:
         """Print the strongest at 300 K in order of frequency."""
-        show_facts([("catalogue", self.request.catalogue), ("lines", f"{len(self.rows)} of {self.species} species")])
+        count = f"{len(self.rows)} of {self.species} species"
+        errors = error_facts({"errors": self.errors.as_json()})
+        show_facts([("catalogue", self.request.catalogue), ("lines", count), *errors])
         if self.rows and self.request.top_lines:
             print()
             show_table(_table(self.rows, self.request.top_lines))
@@ -193,7 +212,7 @@ def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
     return Table(f"{title}, in order of frequency", heads, cells, frozenset({"species"}))
 
 
-def write_csv(answer: Listed | Found, path: Path, _: Any) -> None:
+def write_csv(answer: Listed | Found, path: Path, report: Report) -> None:
     """The species, or the lines."""
     if isinstance(answer, Listed):
         from rotor.formats import write
@@ -204,6 +223,7 @@ def write_csv(answer: Listed | Found, path: Path, _: Any) -> None:
         writer = csv.writer(handle, lineterminator="\n")
         writer.writerow(_COLUMNS)
         writer.writerows(answer.rows)
+    write_beside(path, {"program": "rotor", "version": version(), **report.provenance})
 
 
 def check(request: CatalogueRequest, outputs: Any, _: Any) -> None:
@@ -222,5 +242,6 @@ VERB = Tool(
     show=lambda answer, report: answer.show(),
     outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV", write_csv),),
     check=check,
+    shown=ErrorsShown,
     stepwise=True,
 )

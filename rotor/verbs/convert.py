@@ -7,17 +7,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.reports.screen import show_facts
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
 from rotor.verbs.subjects import top_of_word
+<<<<<<< HEAD
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Note, Output, Work, silent
+=======
+from rotor.verbs.verb import ErrorsShown, Note, Output, Report, Tool, Work, silent
+>>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile
     from rotor.formats.spcat.text.int_file import IntensityFile
+    from rotor.requests.budget import ErrorBudget
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -50,7 +57,15 @@ class Converted:
 
     def facts(self) -> dict[str, Any]:
         """The top, as `rotor info` states it."""
-        return top_facts(self.top)
+        errors = self.errors
+        return top_facts(self.top) | ({} if errors is None else {"errors": errors.as_json()})
+
+    @property
+    def errors(self) -> ErrorBudget | None:
+        """How far the constants can be trusted, of which every digit of a double is written; None of an .int, which has none of them."""
+        from rotor.tops.constants_budget import constants_budget
+
+        return None if self.target.lower().endswith(".int") else constants_budget([self.top])
 
 
 def answer(request: ConvertRequest, work: Work) -> Converted:
@@ -214,9 +229,11 @@ def _intensities(top: Top, highest: int) -> IntensityFile:
     return intensity_file(top, request)
 
 
-def show(answer: Converted, _: Any) -> None:
-    """Print what was written."""
+def show(answer: Converted, report: Report) -> None:
+    """Print what was written, and how far it can be trusted."""
     print(f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}")
+    if facts := error_facts(report.content):
+        show_facts(facts)
 
 
 VERB = Tool(
@@ -234,4 +251,5 @@ VERB = Tool(
         ),
     ),
     check=refuse_overwriting,
+    shown=ErrorsShown,
 )  # fmt: skip

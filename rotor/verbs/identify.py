@@ -9,18 +9,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
+<<<<<<< HEAD
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, Output, Report, Work
+=======
+from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Tool, Work
+>>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
 
 if TYPE_CHECKING:
     from rotor.observed.identify import Identification
     from rotor.observed.model import Sight
     from rotor.observed.species import SpeciesLines
     from rotor.observed.spectrum import ObservedSpectrum
+    from rotor.requests.budget import ErrorBudget
 
+CAT = (".cat", ".cat.gz")
 EXAMPLES = """\b
 Examples:
   rotor identify spectrum.fits --catalogue lines.rotorcat --plot pages.pdf
@@ -76,10 +83,18 @@ class Identified:
     observed: ObservedSpectrum
     sight: Sight
     found: Identification
+    model_error: float
 
     def facts(self) -> dict[str, Any]:
         """Spectrum and species, by the keys of docs/verbs."""
-        return {"spectrum": json_of(self.observed), **self.found.facts()}
+        return {"spectrum": json_of(self.observed), **self.found.facts(), "errors": self.errors.as_json()}
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the column densities can be trusted."""
+        from rotor.observed.budgets import columns_budget
+
+        return columns_budget(self.found.fit, self.model_error)
 
 
 def answer(request: IdentifyRequest, work: Work) -> Identified:
@@ -100,7 +115,7 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
     found = identify(observed, candidates, sight, choices, progress=progress)
     if progress:
         print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
-    return Identified(observed, sight, found)
+    return Identified(observed, sight, found, request.model_error)
 
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
@@ -114,8 +129,12 @@ def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[
         path = Path(source)
         if not path.exists():
             raise ValueError(f"--catalogue {source}: no such file or folder")
-        if path.is_dir() or path.name.lower().endswith((".cat", ".cat.gz")):
-            every = sorted(path.rglob("*.cat*")) if path.is_dir() else [path]
+        if path.is_dir() or path.name.lower().endswith(CAT):
+            every = (
+                [one for one in sorted(path.rglob("*.cat*")) if one.name.lower().endswith(CAT)]
+                if path.is_dir()
+                else [path]
+            )
             species = [read_cat_species(file) for file in every if not is_catdir(file)]
             out += [one.between(*range_mhz) for one in species if len(one.between(*range_mhz))]
             if path.is_dir() and not every:
@@ -137,7 +156,7 @@ def draw(answer: Identified, path: Path, report: Report) -> None:
     )
 
 
-def show(answer: Identified, _: Report) -> None:
+def show(answer: Identified, report: Report) -> None:
     """Print the spectrum, the species by evidence and the unidentified lines."""
     show_facts(spectrum_facts(answer.observed))
     found = answer.found
@@ -147,6 +166,7 @@ def show(answer: Identified, _: Report) -> None:
             ("candidates", str(found.candidates)),
             ("begun with", f"velocity {found.velocity_km_s:.2f} km/s, width {found.fwhm_km_s:.2f} km/s"),
             ("species", f"{len(found.species)}{chi}"),
+            *error_facts(report.content),
         ]
     )
     if found.species:
@@ -195,5 +215,6 @@ VERB = Tool(
         Output("csv", (".csv",), "Write the species as CSV"),
         Output("plot", PICTURES, "Draw pages of panels with the model over the spectrum", draw),
     ),
+    shown=ErrorsShown,
     stepwise=True,
 )

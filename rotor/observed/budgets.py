@@ -1,0 +1,52 @@
+"""Error budget of column densities that a fit of an observed spectrum finds (`rotor.requests.budget`), in percent, of the least certain.
+
+| term | value |
+|---|---|
+| rounding | brightness in double precision |
+| truncation | twice the step that would follow, in standard errors |
+| model | the fraction of the brightness by which one layer in equilibrium may be wrong, which its column follows |
+| data | frequencies of the catalogue are in the noise of the channels; strengths have no stated error |
+| statistics | standard error by the noise of the channels, times √(χ²/ν) where that is above 1 |
+"""
+
+from __future__ import annotations
+
+import math
+
+from rotor.observed.fit import SourceFit
+from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
+
+REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+COLUMN = "column_per_cm2"
+
+
+def columns_budget(fit: SourceFit | None, model_error: float) -> ErrorBudget:
+    """The errors of the column densities of a fit; model_error: a fraction of the brightness."""
+    statistics = _statistics(fit)
+    left = None if fit is None or statistics.value is None else REMAINING * fit.minimum.distance * statistics.value
+    return ErrorBudget(
+        of="column densities",
+        unit="%",
+        rounding=ErrorTerm(100 * ROUNDING, "brightness in double precision"),
+        truncation=ErrorTerm(left, statistics.source if left is None else "twice the next step of the search"),
+        model=ErrorTerm(100 * model_error, "one layer in equilibrium, by the error of the model that is given"),
+        data=ErrorTerm(None, "strengths of catalogues have no stated error; errors of frequencies are in the noise"),
+        statistics=statistics,
+    )
+
+
+def _statistics(fit: SourceFit | None) -> ErrorTerm:
+    """The largest relative standard error of a column density."""
+    if fit is None:
+        return ErrorTerm(None, "no species is found")
+    columns = [one for one in fit.parameters if one["parameter"] == COLUMN]
+    unknown = [one["name"] for one in columns if not one["determined"]]
+    if unknown or not columns:
+        return ErrorTerm(None, f"not determined by this spectrum: {', '.join(unknown) or COLUMN}")
+    errors = [100 * one["error"] / one["value"] for one in columns]
+    largest = max(errors)
+    if not math.isfinite(largest):
+        return ErrorTerm(None, "a column density without an error")
+    return ErrorTerm(
+        largest, f"noise of the channels, {columns[errors.index(largest)]['name']}", "a longer integration"
+    )
