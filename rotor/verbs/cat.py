@@ -21,12 +21,8 @@ from rotor.verbs.comparing import (
     read_catalogue,
     temperature_note,
 )
-<<<<<<< HEAD
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, Output, Report, Work
-=======
-from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Tool, Work
->>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
+from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue

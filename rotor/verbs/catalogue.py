@@ -14,13 +14,9 @@ from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
-<<<<<<< HEAD
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Output, Work
-=======
-from rotor.verbs.verb import ErrorsShown, Output, Report, Tool, Work
+from rotor.verbs.verb import ErrorsShown, Output, Report, Work
 from rotor.version import version
->>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
 
 if TYPE_CHECKING:
     from rotor.requests.budget import ErrorBudget

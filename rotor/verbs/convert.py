@@ -14,12 +14,8 @@ from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
 from rotor.verbs.subjects import top_of_word
-<<<<<<< HEAD
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Note, Output, Work, silent
-=======
-from rotor.verbs.verb import ErrorsShown, Note, Output, Report, Tool, Work, silent
->>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
+from rotor.verbs.verb import ErrorsShown, Note, Output, Report, Work, silent
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

@@ -13,12 +13,8 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
-<<<<<<< HEAD
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, Output, Report, Work
-=======
-from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Tool, Work
->>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
+from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work
 
 if TYPE_CHECKING:
     from rotor.observed.identify import Identification

@@ -118,19 +118,11 @@ def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | N
     left = 1.0
     every = range(min(numbers) + 1) if k is None else (k,)
     for one in nuclei:
-<<<<<<< HEAD
         shares = []
         for number in every:
             shifts, parts = line_components(round(2 * one.spin), *numbers, number)
             shares.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
         left *= sum(shares) / len(shares)
-=======
-        heights = []
-        for number in every:
-            shifts, parts = line_components(round(2 * one.spin), *numbers, number)
-            heights.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
-        left *= sum(heights) / len(heights)
->>>>>>> 74937c85 (Commands on files state their errors: cat, catalogue show, convert, identify)
     return 1.0 - left
 
 
