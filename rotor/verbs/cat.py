@@ -194,7 +194,7 @@ def show(answer: CatAnswer, report: Report) -> None:
             ("species", ", ".join(map(str, content["tags"])) or "none"),
         ]
     )
-    show_facts(error_facts(content))
+    show_facts(error_facts(content["errors"]))
     if answer.compared is None:
         _show_strongest("", lines, shown)
         return

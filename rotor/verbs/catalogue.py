@@ -154,7 +154,7 @@ class Found:
     def show(self) -> None:
         """Print the strongest at 300 K in order of frequency."""
         count = f"{len(self.rows)} of {self.species} species"
-        errors = error_facts({"errors": self.errors.as_json()})
+        errors = error_facts(self.errors.as_json())
         show_facts([("catalogue", self.request.catalogue), ("lines", count), *errors])
         if self.rows and self.request.top_lines:
             print()

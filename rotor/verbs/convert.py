@@ -228,7 +228,7 @@ def _intensities(top: Top, highest: int) -> IntensityFile:
 def show(answer: Converted, report: Report) -> None:
     """Print what was written, and how far it can be trusted."""
     print(f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}")
-    if facts := error_facts(report.content):
+    if facts := error_facts(report.content.get("errors")):
         show_facts(facts)
 
 

@@ -162,7 +162,7 @@ def show(answer: Identified, report: Report) -> None:
             ("candidates", str(found.candidates)),
             ("begun with", f"velocity {found.velocity_km_s:.2f} km/s, width {found.fwhm_km_s:.2f} km/s"),
             ("species", f"{len(found.species)}{chi}"),
-            *error_facts(report.content),
+            *error_facts(report.content.get("errors")),
         ]
     )
     if found.species:
