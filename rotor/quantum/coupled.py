@@ -11,32 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.levels import Block
 from rotor.quantum.one_to_one import one_to_one
-from rotor.quantum.wang.basis import WangBlock, names_of
+from rotor.quantum.wang.basis import Part, WangBlock, names_of
 
 NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
 
 
-class Part(NamedTuple):
-    """The functions of one state v and one Wang block, at `start` ... in a coupled block."""
-
-    v: int
-    basis: WangBlock
-    start: int
-
-    @property
-    def place(self) -> slice:
-        """Where the functions stand in the block."""
-        return slice(self.start, self.start + self.basis.size)
-
-
 @dataclass(frozen=True)
-class CoupledBlock:
+class CoupledBlock(Block):
     """Wang blocks of one J solved together: energies (n,) in MHz, rising, eigenvectors (n, n) in columns over the parts.
 
     labels: (n, 3) v, Ka, Kc of every state. mixing: (n,) its overlap, squared, with the function that names it. Functions
@@ -50,6 +37,11 @@ class CoupledBlock:
     labels: Ints
     mixing: Floats
     start: int = 0
+
+    @property
+    def twice_total(self) -> int:
+        """2J."""
+        return 2 * self.j
 
 
 def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:

@@ -16,7 +16,7 @@ from rotor.quantum.connected import connected_parts
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.levels import Levels, weights_by_state
-from rotor.quantum.states import Coupling, OperatorOfJ, State
+from rotor.quantum.states import Coupling, OperatorOfJ, State, couplings_of
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
@@ -64,12 +64,7 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
     states, couplings = {0: operators}, []
     for effect in effects:
         values = effect.parameters(top)
-        couplings += [(values[coupling.name], coupling) for coupling in effect.couplings(top)]
-        couplings += [
-            (value, _own_coupling(top, effect, name))
-            for name, value in values.items()
-            if effect.j_operator(top, name, 1, representation) is not None
-        ]
+        couplings += [(values[one.name], one) for one in couplings_of(top, [effect], representation)]
         states |= {state.v: state.operators(values) for state in effect.states(top)}
     extra_states(top, effects)
     for _, coupling in couplings:
@@ -77,15 +72,6 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
             if v not in states:
                 raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
     return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
-
-
-def _own_coupling(top: Top, effect: QuantumEffect, name: str) -> Coupling:
-    def operator(j: int, representation: str) -> JOperator:
-        found = effect.j_operator(top, name, j, representation)
-        assert found is not None
-        return found
-
-    return Coupling(name, 0, 0, operator)
 
 
 def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -28,18 +27,9 @@ class Used:
     tolerance_mhz: float
 
 
-class BlockWithSpins(ABC):
-    """A solved block of levels whose functions are those of the rotation coupled with spins."""
-
-    @property
-    @abstractmethod
-    def used(self) -> Used | None:
-        """The method, None where nothing was asked, which means exact."""
-
-
 def are_with_spins(levels: Levels) -> bool:
     """Whether levels were solved in blocks with spins, whatever their quantum numbers are."""
-    return any(isinstance(block, BlockWithSpins) for block in levels.blocks[:1])
+    return any(block.with_spins for block in levels.blocks[:1])
 
 
 @dataclass(frozen=True)
@@ -74,8 +64,7 @@ class HyperfineMethod(QuantumEffect):
 
 def used_method(levels: Levels) -> Used | None:
     """What was used for levels with spins; None without spins, and where nothing was asked, which means exact."""
-    first = levels.blocks[0] if levels.blocks else None
-    return first.used if isinstance(first, BlockWithSpins) else None
+    return levels.blocks[0].used if levels.blocks else None
 
 
 def hyperfine_facts(top: Top, levels: Levels) -> dict[str, Any] | None:

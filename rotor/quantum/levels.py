@@ -10,19 +10,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum import quanta as names_of
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.table import Table
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.hyperfine_method import Used
     from rotor.quantum.states import State
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
@@ -30,34 +31,48 @@ if TYPE_CHECKING:
 FEW_LEVELS = 64  # among which one is found by looking at all
 
 
-class Block(Protocol):
+class Block(ABC):
     """States solved together: energies (n,) in MHz, rising, at the rows `start` ... of the levels."""
 
-    @property
-    def energies_mhz(self) -> Floats:
-        """Energies (n,) in MHz, rising."""
-
-    @property
-    def start(self) -> int:
-        """Row of the first state."""
-
-
-class MomentBlock(ABC):
-    """States solved together that know the elements of molecule-fixed tensors with other blocks of their kind."""
-
+    with_spins: ClassVar[bool] = False
     energies_mhz: Floats
     start: int
+
+    @property
+    @abstractmethod
+    def twice_total(self) -> int:
+        """Twice the total angular momentum."""
+
+    @property
+    def axial_k(self) -> int | None:
+        """|K| where K is good, None where functions are those of Wang."""
+        return None
+
+    @property
+    def combined(self) -> bool:
+        """Whether functions are combined so that reduced elements of odd rank are i times real."""
+        return self.axial_k is None
+
+    @property
+    def paired(self) -> bool:
+        """Whether states stand for their mirror images too: K and -K, σ and -σ."""
+        return bool(self.axial_k)
+
+    @property
+    def used(self) -> Used | None:
+        """How spins are treated, None where nothing was asked, which means exactly."""
+        return None
+
+
+class MomentBlock(Block):
+    """States solved together that know the elements of molecule-fixed tensors with other blocks of their kind."""
+
     components: int
 
     @property
-    @abstractmethod
-    def combined(self) -> bool:
-        """Whether functions are combined so that reduced elements of odd rank are i times real."""
-
-    @property
-    @abstractmethod
-    def twice_f(self) -> int:
-        """Twice the total angular momentum."""
+    def paired(self) -> bool:
+        """σ and -σ coincide."""
+        return self.components > 1
 
     @abstractmethod
     def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
@@ -77,7 +92,7 @@ class MomentBlock(ABC):
 
 
 @dataclass(frozen=True)
-class SolvedBlock:
+class SolvedBlock(Block):
     """One Wang block solved: energies (n,) in MHz, rising, and eigenvectors (n, n) in columns over `basis.k`.
 
     `start` is the place of its first state in the arrays of `Levels`.
@@ -87,6 +102,16 @@ class SolvedBlock:
     energies_mhz: Floats
     vectors: Floats
     start: int
+
+    @property
+    def twice_total(self) -> int:
+        """2J."""
+        return 2 * self.basis.j
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The Wang block as the one part."""
+        return (Part(0, self.basis, 0),)
 
 
 @dataclass(frozen=True, eq=False)

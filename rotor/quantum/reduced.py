@@ -62,20 +62,13 @@ def pairs_where(
     """The pairs (up, low) that a test connects, of those whose total angular momenta differ by `rank` at most."""
     by_total: dict[int, list[AnyBlock]] = {}
     for block in blocks:
-        by_total.setdefault(twice_total(block), []).append(block)
+        by_total.setdefault(block.twice_total, []).append(block)
     for twice, lows in sorted(by_total.items()):
         above = [block for rise in range(1, rank + 1) for block in by_total.get(twice + 2 * rise, [])]
         for i, low in enumerate(lows):
             for up in lows[i:] + above:
                 if connects(up, low):
                     yield up, low
-
-
-def twice_total(block: AnyBlock) -> int:
-    """Twice the total angular momentum of a block."""
-    if isinstance(block, SolvedBlock):
-        return 2 * block.basis.j
-    return 2 * block.j if isinstance(block, CoupledBlock) else int(block.twice_f)
 
 
 def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
@@ -113,12 +106,4 @@ def connected_wang_blocks(
 
     A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
     """
-    by_j: dict[int, list[SolvedBlock]] = {}
-    for block in blocks:
-        by_j.setdefault(block.basis.j, []).append(block)
-    for j, lows in by_j.items():
-        above = [block for rise in range(1, tensor.rank + 1) for block in by_j.get(j + rise, [])]
-        for i, low in enumerate(lows):
-            for up in lows[i:] + above:
-                if tensor.between(up.basis, low.basis) is not None:
-                    yield up, low
+    return pairs_where(blocks, tensor.rank, lambda up, low: tensor.between(up.basis, low.basis) is not None)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rotor.quantum.wang.j_operators import JOperator
-from rotor.tops.operators import Operators
+from rotor.tops.operators import Operators, added
 from rotor.tops.spins.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
 
 OperatorOfJ = Callable[[int, str], JOperator]  # (J, representation) -> the operator in |J k⟩
 
@@ -27,11 +32,7 @@ class State:
 
     def operators(self, values: dict[str, float]) -> Operators:
         """The terms times the values of the parameters, added."""
-        total: Operators = {}
-        for name, terms in self.terms.items():
-            for powers, factor in terms.items():
-                total[powers] = total.get(powers, 0.0) + factor * values[name]
-        return total
+        return added((terms, values[name]) for name, terms in self.terms.items())
 
 
 @dataclass(frozen=True)
@@ -46,3 +47,23 @@ class Coupling:
     bra: int
     ket: int
     operator: OperatorOfJ
+
+
+def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str) -> list[Coupling]:
+    """Couplings of effects, and what acts in the top's own state by other operators of J than powers."""
+    found: list[Coupling] = []
+    for effect in effects:
+        found += effect.couplings(top)
+        for name in effect.parameters(top):
+            if effect.j_operator(top, name, 1, representation) is not None:
+                found.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
+    return found
+
+
+def _own_operator(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
+    def operator(j: int, representation: str) -> JOperator:
+        found = effect.j_operator(top, name, j, representation)
+        assert found is not None
+        return found
+
+    return operator

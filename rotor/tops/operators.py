@@ -12,6 +12,7 @@ P J^2(5-q) Jz^2q are named as CDMS names them; without them the levels of water 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 Powers = tuple[int, int, int]  # p, q, n
 Operators = dict[Powers, float]  # coefficient of every term
@@ -41,6 +42,19 @@ def axes_of(representation: str) -> str:
     if representation not in REPRESENTATIONS:
         raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
     return REPRESENTATIONS[representation]
+
+
+def added(weighted: Iterable[tuple[Operators, float]]) -> Operators:
+    """The sum of operators times numbers.
+
+    >>> added([({(1, 0, 0): 0.5, (0, 1, 0): -0.5}, 2.0), ({(1, 0, 0): 1.0}, 3.0)])
+    {(1, 0, 0): 4.0, (0, 1, 0): -1.0}
+    """
+    total: Operators = {}
+    for operators, value in weighted:
+        for powers, factor in operators.items():
+            total[powers] = total.get(powers, 0.0) + factor * value
+    return total
 
 
 _QUARTIC = {"J": (2, 0), "JK": (1, 1), "K": (0, 2)}

@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled import NOTHING, CoupledBlock, Part, parts_of
+from rotor.quantum.coupled import NOTHING, CoupledBlock, parts_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, numbered
-from rotor.quantum.states import OperatorOfJ, State
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.states import OperatorOfJ, State, couplings_of
+from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
+    from rotor.quantum.spins.rotor import RotorBlock
     from rotor.tops.top import Top
 
 _TRIED_AT = 3  # J at which a pair of kinds of Wang blocks is tried
@@ -84,11 +85,11 @@ class StateTerms(NamedTuple):
             for (p, q, n), factor in operators.items()
         ]
         links = list[_Link]()
-        for name, bra, ket, operator in _links(top, effects, representation):
-            if name not in place:
-                continue
-            links.append(_Link(len(first) * len(powers) + len(links), bra, ket, operator, [(name, operator)]))
-            terms.append((links[-1].unit, place[name], 0, 1.0))
+        for one in couplings_of(top, effects, representation):
+            if one.name in place:
+                unit = len(first) * len(powers) + len(links)
+                links.append(_Link(unit, one.bra, one.ket, one.operator, [(one.name, one.operator)]))
+                terms.append((unit, place[one.name], 0, 1.0))
         rows, columns, p = np.array([term[:3] for term in terms], dtype=np.int64).reshape(-1, 3).T
         factors = np.array([term[3] for term in terms], dtype=float)
         return cls(powers, first, rows, columns, p, factors, tuple(links))
@@ -124,26 +125,6 @@ class StateTerms(NamedTuple):
         out = np.zeros((len(self.first) * len(self.powers) + len(self.links), count))
         np.add.at(out, (self.rows, self.columns), self.factors * (j * (j + 1.0)) ** self.p)
         return out
-
-
-def _links(top: Top, effects: Sequence[QuantumEffect], representation: str) -> list[tuple[str, int, int, OperatorOfJ]]:
-    """Parameter, states and operator of couplings and of operators of the top's own state that no powers describe."""
-    found = list[tuple[str, int, int, OperatorOfJ]]()
-    for effect in effects:
-        found += [(one.name, one.bra, one.ket, one.operator) for one in effect.couplings(top)]
-        for name in effect.parameters(top):
-            if effect.j_operator(top, name, 1, representation) is not None:
-                found.append((name, 0, 0, _of_effect(effect, top, name)))
-    return found
-
-
-def _of_effect(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
-    def operator(j: int, representation: str) -> JOperator:
-        made = effect.j_operator(top, name, j, representation)
-        assert made is not None
-        return made
-
-    return operator
 
 
 def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, WangElements]:
@@ -288,26 +269,32 @@ class ElementsOfJ(NamedTuple):
         return LinearBlock(size, *np.divmod(places, size), factors, mix[:, parameters], parameters)
 
 
-def vertices_of(block: SolvedBlock | CoupledBlock) -> list[Vertex]:
+def vertices_of(block: SolvedBlock | CoupledBlock | RotorBlock) -> list[Vertex]:
     """The states and Wang blocks of a solved block."""
-    return [(0, block.basis)] if isinstance(block, SolvedBlock) else [(part.v, part.basis) for part in block.parts]
+    return [(part.v, part.basis) for part in block.parts]  # type: ignore[misc]
 
 
 def linear_blocks_of(
     top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[SolvedBlock | CoupledBlock]
 ) -> list[LinearBlock]:
     """The linear blocks of solved blocks of levels, over the functions that their vectors have."""
-    by_j: dict[int, list[int]] = {}
-    for number, block in enumerate(blocks):
-        by_j.setdefault(vertices_of(block)[0][1].j, []).append(number)
-    vertices = {j: [vertex for i in numbers for vertex in vertices_of(blocks[i])] for j, numbers in by_j.items()}
     terms = StateTerms.of(top, levels.effects, names, str(levels.representation))
-    elements = StateElements(terms, len(names), str(levels.representation), vertices)
+    return blocks_of_terms(terms, len(names), str(levels.representation), blocks)
+
+
+def blocks_of_terms(
+    terms: StateTerms, count: int, representation: str, blocks: Sequence[SolvedBlock | CoupledBlock | RotorBlock]
+) -> list[LinearBlock]:
+    """The linear blocks of so many parameters over the functions of solved blocks."""
+    every, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()
+    for number, own in enumerate(every):
+        by_j.setdefault(own[0][1].j, []).append(number)
+    vertices = {j: [vertex for i in numbers for vertex in every[i]] for j, numbers in by_j.items()}
+    elements = StateElements(terms, count, representation, vertices)
     out: dict[int, LinearBlock] = {}
     for j in sorted(by_j, reverse=True):
         here, start = elements.of_j(j), 0
         for number in by_j[j]:
-            stop = start + len(vertices_of(blocks[number]))
-            out[number] = here.block(range(start, stop))
-            start = stop
+            stop = start + len(every[number])
+            out[number], start = here.block(range(start, stop)), stop
     return [out[number] for number in range(len(blocks))]

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms, powers_of_spelled
+from rotor.tops.operators import Operators, Powers, added, axes_of, distortion_terms, powers_of_spelled
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -66,12 +66,7 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
 
 
 def _added(constants: Constants, names: Iterable[str]) -> Operators:
-    by_name = operators_by_name(constants)
-    total: Operators = {}
-    for name in names:
-        for powers, factor in by_name[name].items():
-            total[powers] = total.get(powers, 0.0) + factor * constants.values[name]
-    return total
+    return added((operators_of_name(constants, name), constants.values[name]) for name in names)
 
 
 def rigid_operators(constants: Constants) -> Operators:

@@ -34,11 +34,6 @@ class AxialBlock(FieldBlock):
     space: AxialSpace = field(repr=False)
 
     @property
-    def levels(self) -> FreeLevels:
-        """The levels of the space."""
-        return self.space.levels
-
-    @property
     def even_in_field(self) -> bool:
         """Where K M is not 0 a reversed field exchanges K and -K."""
         return not self.k * self.m

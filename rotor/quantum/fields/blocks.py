@@ -65,6 +65,7 @@ class FieldBlock(ABC):
     m: float
     copies: int
     rows: Ints
+    space: FieldSpace
 
     @property
     @abstractmethod
@@ -72,9 +73,9 @@ class FieldBlock(ABC):
         """Which block of its M it is."""
 
     @property
-    @abstractmethod
     def levels(self) -> FreeLevels:
         """The levels whose rows the states are of."""
+        return self.space.levels
 
     @property
     def j(self) -> Ints:

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.coupled import CoupledBlock, Part
+from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, twice_total, wang_amplitudes
+from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, wang_amplitudes
 from rotor.quantum.tensors import Tensors
 
 if TYPE_CHECKING:
@@ -53,14 +53,12 @@ class ReducedElements:
     @cached_property
     def combined(self) -> list[bool]:
         """Whether the functions of each block are combined to real ones."""
-        return [block.combined if isinstance(block, MomentBlock) else axial_k(block) is None for block in self.blocks]
+        return [block.combined for block in self.blocks]
 
     @cached_property
     def paired(self) -> list[bool]:
         """Whether the states of each block stand for their mirror images too: K and -K, σ and -σ."""
-        return [
-            block.components > 1 if isinstance(block, MomentBlock) else bool(axial_k(block)) for block in self.blocks
-        ]
+        return [block.paired for block in self.blocks]
 
     def connected(self, operator: FieldOperator) -> list[Pair]:
         """Pairs of blocks that an operator connects, each once."""
@@ -75,7 +73,7 @@ class ReducedElements:
             for up, low in connected_pairs(self.blocks, tensors) if tensors else ():
                 yield number[up.start], number[low.start]
             return
-        total = [twice_total(block) for block in self.blocks]
+        total = [block.twice_total for block in self.blocks]
         for low, first in enumerate(total):
             for up, second in enumerate(total):
                 near = second == first + 2 or (second == first and up >= low)
@@ -110,22 +108,14 @@ class ReducedElements:
     def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
         if isinstance(up, MomentBlock):
             raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
-        if axial_k(up) != axial_k(low) or abs(twice_total(up) - twice_total(low)) > 2:
+        if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
         if isinstance(up, SolvedBlock | CoupledBlock):
             return _of_rotation(magnet.g, up, low, self.representation)
         if magnet.key not in self._moments:
             self._moments[magnet.key] = _spin_moments(magnet, self.states, low.shared)
         moment: Floats = self._moments[magnet.key].amplitudes(up, low)
-        return moment / np.sqrt(2.0) if axial_k(up) else moment  # that of one sign of K
-
-
-def axial_k(block: AnyBlock) -> int | None:
-    """|K| of a block with spins where K is good, None where functions are those of Wang."""
-    if isinstance(block, SolvedBlock | CoupledBlock | MomentBlock):
-        return None
-    basis = block.parts[0].rotor.parts[0].basis
-    return getattr(basis, "axial_k", None)
+        return moment / np.sqrt(2.0) if up.paired else moment  # that of one sign of K
 
 
 def _matrix(g: Floats) -> Any:
@@ -149,14 +139,10 @@ def _of_rotation(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) ->
 
     rotor = CosinesWithN(_matrix(g))
     total: Floats | None = None
-    for left in _parts(up):
-        for right in _parts(low):
+    for left in up.parts:
+        for right in low.parts:
             found = rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
             if found is not None:
                 moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
                 total = moved if total is None else total + moved
     return total
-
-
-def _parts(block: AnyBlock) -> tuple[Any, ...]:
-    return (Part(0, block.basis, 0),) if isinstance(block, SolvedBlock) else block.parts

@@ -21,10 +21,9 @@ from rotor.arrays import Ints
 from rotor.quantum.connected import coloured_components, connected_parts
 from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
-from rotor.quantum.fields.reduced_elements import ReducedElements, axial_k
+from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.in_field import space_factor
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.reduced import twice_total
 from rotor.quantum.solve import solve_levels
 
 if TYPE_CHECKING:
@@ -74,13 +73,8 @@ class SolvedFieldBlock(FieldBlock):
         blocks = [self.space.elements.blocks[self.space.sectors[i].block] for i in self.members]
         if isinstance(blocks[0], SolvedBlock):
             return "+".join(sorted({block.basis.species for block in blocks}))
-        k = axial_k(blocks[0])
+        k = blocks[0].axial_k
         return f"from {self.levels.label(int(self.rows[0]))}" if k is None else f"k={k}"
-
-    @property
-    def levels(self) -> FreeLevels:
-        """The levels of the space."""
-        return self.space.levels
 
     @cached_property
     def starts(self) -> Ints:
@@ -257,11 +251,11 @@ def _sectors(levels: Levels, by_vt: bool) -> Iterator[Sector]:
     for number, block in enumerate(levels.blocks):
         rows = np.arange(block.start, block.start + len(block.energies_mhz))
         if vt is None:
-            yield Sector(number, None, rows, twice_total(block))
+            yield Sector(number, None, rows, block.twice_total)
             continue
         for value in np.unique(vt[rows]).tolist():
             places = np.flatnonzero(vt[rows] == value)
-            yield Sector(number, places, rows[places], twice_total(block))
+            yield Sector(number, places, rows[places], block.twice_total)
 
 
 def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:

@@ -26,7 +26,6 @@ from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.fields.solved_space import solved_levels
-from rotor.quantum.reduced import twice_total
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang.basis import WangBlock, wang_blocks
 
@@ -60,11 +59,6 @@ class TiltedBlock(FieldBlock):
     def label(self) -> str:
         """Which block it is."""
         return self.species
-
-    @property
-    def levels(self) -> FreeLevels:
-        """The levels of the space."""
-        return self.space.levels
 
     def matrix(self, operator: FieldOperator) -> Any:
         """The contraction over the states (n, n), real symmetric; sparse (CSR) for more than 600 of them."""
@@ -139,7 +133,7 @@ class TiltedSpace(FieldSpace):
     @cached_property
     def _j(self) -> list[int]:
         """J of each solved block."""
-        return [twice_total(block) // 2 for block in self.elements.blocks]
+        return [block.twice_total // 2 for block in self.elements.blocks]
 
     @cached_property
     def _of_m(self) -> dict[int, list[WangBlock]]:

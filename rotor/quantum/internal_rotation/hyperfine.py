@@ -43,7 +43,7 @@ class HyperfineBlock(MomentBlock):
     components: int
 
     @property
-    def twice_f(self) -> int:
+    def twice_total(self) -> int:
         """Twice the total angular momentum."""
         return self.species.space.sectors[self.sector].twice_j
 

@@ -107,7 +107,7 @@ class TorsionBlock(MomentBlock):
     rows: Ints
 
     @property
-    def twice_f(self) -> int:
+    def twice_total(self) -> int:
         """Twice the total angular momentum."""
         return 2 * self.j
 

@@ -14,13 +14,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.hyperfine_method import FIRST_ORDER, BlockWithSpins, Used
+from rotor.quantum.hyperfine_method import FIRST_ORDER, Used
+from rotor.quantum.levels import Block
 from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
@@ -68,13 +69,15 @@ class Shared:
 
 
 @dataclass(frozen=True)
-class SpinBlock(BlockWithSpins):
+class SpinBlock(Block):
     """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
     patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
     of states. mixing: (n,) shares of the sub-blocks that name them. start: row of the first state. allowed: the functions that are there.
     group: blocks of other F that it was solved with.
     """
+
+    with_spins: ClassVar[bool] = True
 
     twice_f: int
     patterns: Ints
@@ -87,6 +90,16 @@ class SpinBlock(BlockWithSpins):
     start: int = 0
     allowed: Allowed | None = None
     group: Group | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def twice_total(self) -> int:
+        """2F."""
+        return self.twice_f
+
+    @property
+    def axial_k(self) -> int | None:
+        """|K| where K is good."""
+        return getattr(self.parts[0].rotor.parts[0].basis, "axial_k", None)
 
     @property
     def used(self) -> Used | None:

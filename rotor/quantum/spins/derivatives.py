@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.state_elements import StateTerms
+from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.axial_levels import axial_derivatives
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import operators_of_stacks, powers_of_stacks
-from rotor.quantum.spins.linear_blocks import rotation_blocks
 from rotor.quantum.spins.many_f import Frame, Group, RotationColumns, Tables, frame_of, groups_of, tables_of
 from rotor.quantum.spins.many_f_lines import States, groups_of_blocks, states_of_group
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
@@ -164,7 +163,7 @@ def _of_links(
     """Parameters that multiply other operators of N than powers, each a unit."""
     rotors = {part.number: part.rotor for block in blocks for part in block.parts}
     found: dict[Kinds, Floats] = {}
-    linear = rotation_blocks(terms, count, list(rotors.values()), blocks[0].shared.representation)
+    linear = blocks_of_terms(terms, count, blocks[0].shared.representation, list(rotors.values()))
     for (number, rotor), block in zip(rotors.items(), linear, strict=True):
         kind, size = frame.kinds[number], block.size
         states = frame.energies_mhz[kind].shape[1]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.state_elements import StateElements, StateTerms
+from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
@@ -75,25 +75,7 @@ def _rotations(terms: StateTerms, count: int, blocks: Sequence[RotorBlock], repr
     if are_axial(blocks):
         one, every = np.zeros(1, dtype=np.int64), np.arange(count)
         return [Unit(one, one, row[None], every, (1, 1)) for row in powers_of_axial(terms, count, blocks)]
-    return [_mirrored(block) for block in rotation_blocks(terms, count, blocks, representation)]
-
-
-def rotation_blocks(
-    terms: StateTerms, count: int, blocks: Sequence[RotorBlock], representation: str
-) -> list[LinearBlock]:
-    """The linear blocks of the rotation over the functions of its solved blocks, those of Wang blocks, by so many parameters."""
-    by_n: dict[int, list[int]] = {}
-    for place, block in enumerate(blocks):
-        by_n.setdefault(block.n, []).append(place)
-    vertices = {n: [(part.v, part.basis) for i in places for part in blocks[i].parts] for n, places in by_n.items()}
-    elements = StateElements(terms, count, representation, vertices)  # type: ignore[arg-type]
-    out: dict[int, LinearBlock] = {}
-    for n in sorted(by_n, reverse=True):
-        here, start = elements.of_j(n), 0
-        for place in by_n[n]:
-            stop = start + len(blocks[place].parts)
-            out[place], start = here.block(range(start, stop)), stop
-    return [out[place] for place in range(len(blocks))]
+    return [_mirrored(block) for block in blocks_of_terms(terms, count, representation, blocks)]
 
 
 def _mirrored(block: LinearBlock) -> Unit:

@@ -38,6 +38,19 @@ class WangBlock(NamedTuple):
         return self.first_k + 2 * np.arange(self.size)
 
 
+class Part(NamedTuple):
+    """The functions of one state v and one Wang block, at `start` ... in a block."""
+
+    v: int
+    basis: WangBlock
+    start: int
+
+    @property
+    def place(self) -> slice:
+        """Where the functions stand in the block."""
+        return slice(self.start, self.start + self.basis.size)
+
+
 def _parity(character: int) -> str:
     return "e" if character > 0 else "o"
 

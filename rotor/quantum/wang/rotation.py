@@ -28,7 +28,7 @@ from rotor.quantum.wang.wang_matrix import (
     matrices_of,
     scalar_energy,
 )
-from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
+from rotor.tops.operators import AXIAL_REPRESENTATION, Operators, added
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ _NONE: Floats = np.zeros((0, 0))  # stands for eigenvectors that were not asked 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
     """The operators of all effects added: {(p, q, n): MHz}, zeros left out."""
-    total: Operators = {}
-    for effect in effects:
-        values = effect.parameters(top)
-        for name, operators in effect.operators(top).items():
-            for powers, factor in operators.items():
-                total[powers] = total.get(powers, 0.0) + factor * values[name]
+    total = added(
+        (operators, values[name])
+        for effect in effects
+        for values in [effect.parameters(top)]
+        for name, operators in effect.operators(top).items()
+    )
     return {powers: value for powers, value in total.items() if value}
 
 
