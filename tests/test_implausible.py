@@ -1,10 +1,15 @@
 """Input that hardly any molecule has is taken with a note."""
 
+from pathlib import Path
+
 import pytest
 
 import rotor
 from rotor.formats.molecules.library import names
+from rotor.quantum.effects.of_top import effects_of
+from rotor.spectra.request import SpectrumRequest, _expected_q, answer_spectrum
 from rotor.tops.plausible import implausible
+from rotor.tops.spins.spin_constants import SpinConstants
 
 
 def test_constants_beyond_a_rigid_body(call):
@@ -72,8 +77,6 @@ def test_the_sum_beside_a_given_q_is_made_once(call, folder, monkeypatch):
 @pytest.mark.parametrize(("name", "kelvin"), [("NH3", 300.0), ("NH3", 50.0)])
 def test_the_note_on_q_estimates_further_states(name, kelvin):
     """A sum over the coupled states of a file took 18 s for the sake of this note; a tenth is enough."""
-    from rotor.spectra.request import SpectrumRequest, _expected_q, answer_spectrum
-
     answer = answer_spectrum(SpectrumRequest(rotor.read(name), temperature_k=kelvin, jmax=3, q=1.0))
     expected, of_states = _expected_q(answer.lines)
     summed = rotor.thermodynamics.partition_function(answer.lines.top, kelvin, effects=answer.lines.levels.effects).q
@@ -84,9 +87,6 @@ def test_the_note_on_q_estimates_further_states(name, kelvin):
 
 def test_a_file_of_many_states_is_not_summed_for_a_note(monkeypatch):
     """The sum is of the levels of one state."""
-    from pathlib import Path
-
-    from rotor.spectra.request import SpectrumRequest, answer_spectrum
     from rotor.thermodynamics import partition
 
     counted, solve = [], partition.level_sums
@@ -100,3 +100,41 @@ def test_a_file_of_many_states_is_not_summed_for_a_note(monkeypatch):
     answer = answer_spectrum(SpectrumRequest(top, jmax=2, q=1000.0, min_lgint=None))
     assert answer.notes[-1].startswith("Q = 1000 is given where the sum over the levels is about 1.6e+06")
     assert counted == [None]
+
+
+KINDS = Path(__file__).parent / "oracles" / "kinds"
+
+
+@pytest.mark.parametrize("name", ["methyl_i_tot", "forbidden_three_i_tot", "three_protons_i_tot"])
+def test_the_note_on_q_estimates_three_equivalent_nuclei(name):
+    """n/3 functions of the spins; the sum over levels at 30 K, where it takes little. Six minutes and 5 GB for three deuterons before."""
+    top = rotor.read(KINDS / name / f"{name}.int")
+    answer = answer_spectrum(SpectrumRequest(top, temperature_k=30.0, jmax=1, q=1.0, effects=effects_of(top, True)))
+    expected = _expected_q(answer.lines)
+    summed = rotor.thermodynamics.partition_function(
+        top, 30.0, relative_error=1e-3, effects=answer.lines.levels.effects
+    ).q
+    assert expected == (pytest.approx(summed, rel=0.02), True)  # K and -K of few levels; a note is about a tenth
+
+
+def test_the_note_on_q_estimates_spins():
+    """Two nuclei: functions of both."""
+    top = rotor.Top.from_constants(
+        "A=30 B=9 C=7 GHz",
+        dipole_abc_debye=(1.0, 0.0, 0.0),
+        spin_constants=SpinConstants.parse("C_aa(1H)=0.01 chi_aa(14N)=-4 MHz"),
+    )
+    answer = answer_spectrum(
+        SpectrumRequest(top, temperature_k=5.0, jmax=1, q=1.0, effects=effects_of(top, True), min_lgint=None)
+    )
+    summed = rotor.thermodynamics.partition_function(top, 5.0, effects=answer.lines.levels.effects).q
+    assert _expected_q(answer.lines) == (pytest.approx(summed, rel=1e-3), True)
+
+
+def test_no_note_where_the_sum_takes_minutes(monkeypatch):
+    """Two equivalent nuclei of I = 3/2 in two states: 0.8 GB and half a minute before it was ended."""
+    monkeypatch.setattr("rotor.thermodynamics.partition_function", None)
+    top = rotor.read(KINDS / "two_quadrupoles_i_tot" / "two_quadrupoles_i_tot.int")
+    answer = answer_spectrum(SpectrumRequest(top, jmax=1, q=1.0, effects=effects_of(top, True), min_lgint=None))
+    assert _expected_q(answer.lines) is None
+    assert not [note for note in answer.notes if "Q = 1" in note]

@@ -20,6 +20,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
+from rotor.quantum.spins.scheme import scheme_of
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
 from rotor.requests.knob import Knob, Measure
@@ -198,9 +199,12 @@ class SpectrumAnswer(TextOf):
         if stated is None or not lines.levels.of_named_constants:
             return tuple(lines.warnings)
         try:
-            summed, of_states = _expected_q(lines)
-        except ValueError:  # the sum does not converge: the value that was given stands alone
+            expected = _expected_q(lines)
+        except ValueError:  # the sum does not converge
+            expected = None
+        if expected is None:  # the value that was given stands alone
             return tuple(lines.warnings)
+        summed, of_states = expected
         if Q_TOO_SMALL * summed <= stated <= Q_TOO_LARGE * summed:
             return tuple(lines.warnings)
         factor = f"intensities differ by a factor of {summed / stated:.3g}"
@@ -322,30 +326,33 @@ class SpectrumAnswer(TextOf):
         return without_constants(facts) | {"q": facts["q"] | {"classical": None}, "limits": []}
 
 
-def _expected_q(lines: Lines) -> tuple[float, bool]:
-    """Q summed over the levels, and whether that of further states is estimated: a sum over many coupled states takes minutes.
+def _expected_q(lines: Lines) -> tuple[float, bool] | None:
+    """Q summed over the levels, and whether it is estimated; None with two equivalent nuclei, where neither is a matter of seconds.
 
-    Q = Q_0 Σ_v e^(-E_v/kT) w_v/w_0 with the levels of state 0 alone, E_v the energy of a state and w_v its mean spin weight: what a
-    state's own constants and couplings change is far below the tenth that a note is about.
+    Q = Q_0 n Σ_v e^(-E_v/kT) w_v/w_0 with the levels of state 0 without spins, E_v the energy of a state, w_v its mean spin weight,
+    and n the number of functions of the spins; of three equivalent nuclei a third of it, as one in three exists with a function of the
+    rotation. What the own constants of a state, couplings and spins change is far below the tenth that a note is about.
     """
     from rotor.thermodynamics import partition_function
 
     top, effects, kelvin = lines.top, lines.levels.effects, lines.temperature_k
+    scheme = scheme_of(top, effects)
+    if scheme.equivalent == 2:  # which of their functions exist follows from the weights of the rotation
+        return None
     of_states = [effect for effect in effects if effect.states(top)]
-    if not of_states:
+    others = tuple(effect for effect in effects if effect not in of_states and not effect.spins(top))
+    if len(others) == len(effects):
         return partition_function(top, kelvin, effects=effects).q, False
-    others = tuple(effect for effect in effects if effect not in of_states)
-    first = partition_function(
-        replace(top, states=None, level_table=None, symmetry_checked=False), kelvin, effects=others
-    ).q
-    sums = 1.0
+    bare = replace(top, states=None, spin_constants=None, level_table=None, symmetry_checked=False)
+    first, sums = partition_function(bare, kelvin, effects=others).q, 1.0
     for effect in of_states:
         values = effect.parameters(top)
         for state in effect.states(top):
             energy = state.operators(values).get((0, 0, 0), 0.0)
             weight = 1.0 if state.spin_weights is None else state.spin_weights.mean / top.spin_weights.mean
             sums += weight * math.exp(-energy / (units.MHZ_PER_K * kelvin))
-    return first * sums, True
+    functions = math.prod(twice + 1 for twice in scheme.twice) / max(scheme.equivalent, 1)
+    return functions * first * sums, True
 
 
 def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) -> SpectrumAnswer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -38,16 +39,20 @@ def by_size(
     members: Sequence[tuple[int, Sequence[SpinPart]]], places: dict[int, Ints]
 ) -> Iterator[tuple[list[int], Functions]]:
     """Blocks, given by their doubled F and parts, of one number of functions: which, and their functions."""
-    first = min(places)
-    alike: dict[int, list[tuple[int, int, list[int], list[int]]]] = {}
-    for place, (f, parts) in enumerate(members):
-        own = places[f].tolist()
-        numbers = [part.number for part in parts for _ in range(part.repeats)]
-        patterns = [pattern for part in parts for pattern in own[part.patterns]]
-        alike.setdefault(len(numbers), []).append((place, (f - first) // 2, numbers, patterns))
-    for rows in alike.values():
-        of_f, of_numbers, of_patterns = (np.array([row[i] for row in rows]) for i in (1, 2, 3))
-        yield [row[0] for row in rows], Functions(of_f, of_numbers, of_patterns)
+    offsets = dict(zip(places, accumulate(map(len, places.values()), initial=0), strict=False))
+    every, first = np.concatenate(list(places.values())), min(places)
+    number, start, repeats = np.array(
+        [(part.number, offsets[f] + part.patterns.start, part.repeats) for f, parts in members for part in parts]
+    ).T
+    part = np.repeat(np.arange(len(number)), repeats)  # of every function
+    row = np.arange(len(part)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+    numbers, patterns = number[part], every[start[part] + row]
+    sizes = np.array([parts[-1].place.stop for _, parts in members])
+    begins, of_f = np.cumsum(sizes) - sizes, (np.array([f for f, _ in members]) - first) // 2
+    for size in dict.fromkeys(sizes.tolist()):
+        which = np.flatnonzero(sizes == size)
+        at = begins[which, None] + np.arange(size)
+        yield which.tolist(), Functions(of_f[which], numbers[at], patterns[at])
 
 
 class AxialTables:
@@ -88,6 +93,7 @@ def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) 
     tables = AxialTables([block.parts[0] for block in plan.blocks], shared.scheme, (every_f[0], every_f[-1]))
     rotation = np.array([block.energies_mhz[0] for block in plan.blocks])
     out: list[SpinBlock] = [None] * len(members)  # type: ignore[list-item]
+    starts = list(accumulate((parts[-1].place.stop for _, parts in members), initial=0))
     for which, functions in by_size(members, table.places):
         diagonal = rotation[functions.numbers]
         zeros = diagonal[:, :1].copy()  # taken out of the matrices for the sake of digits
@@ -102,7 +108,7 @@ def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) 
         results = zip(energies + zeros, vectors, labels, mixing, strict=True)
         for i, result in zip(which, results, strict=True):
             f, parts = members[i]
-            out[i] = SpinBlock(f, table.patterns[f], parts, *result, shared)
+            out[i] = SpinBlock(f, table.patterns[f], parts, *result, shared, starts[i])
     return out
 
 

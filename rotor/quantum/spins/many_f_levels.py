@@ -90,8 +90,12 @@ def existing_blocks(
     if exist is not None:
         there = np.logical_or.reduceat(exist(names), np.append(0, stops[:-1]))
     chosen = np.flatnonzero(there).tolist()
-    of_members, of_sizes = np.split(names, stops[:-1]), np.split(sizes, lasts[:-1])
-    return [members[i] for i in chosen], [of_members[i] for i in chosen], [of_sizes[i] for i in chosen]
+    of_names, of_sizes = ([0, *ends.tolist()] for ends in (stops, lasts))
+    return (
+        [members[i] for i in chosen],
+        [names[of_names[i] : of_names[i + 1]] for i in chosen],
+        [sizes[of_sizes[i] : of_sizes[i + 1]] for i in chosen],
+    )
 
 
 def _solved(

@@ -111,9 +111,8 @@ def solved_rotor(
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))
         v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
-        columns = (v, levels.rotational, levels.quanta["k"], levels.energy_mhz)
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        return [_axial_block(*row) for row in rows], "Ir" if top.kind == "prolate" else "IIIr"
+        blocks = _axial_blocks(v, levels.rotational, levels.quanta["k"], levels.energy_mhz)
+        return blocks, "Ir" if top.kind == "prolate" else "IIIr"
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
     if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
@@ -139,9 +138,14 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     return not coupled and all(operator is None for operator in own)
 
 
-def _axial_block(v: int, n: int, k: int, energy_mhz: float) -> RotorBlock:
-    part = RotorPart(v, AxialState(n, k), slice(0, 1), np.array([[v, k, 0]]))
-    return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
+def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[RotorBlock]:
+    """A block of one function for each level; their arrays are rows of shared ones."""
+    names, alone, vector = np.column_stack([v, k, np.zeros_like(k)]), slice(0, 1), np.ones((1, 1))
+    rows = enumerate(zip(v.tolist(), n.tolist(), k.tolist(), strict=True))
+    return [
+        RotorBlock(m, (RotorPart(state, AxialState(m, q), alone, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
+        for i, (state, m, q) in rows
+    ]
 
 
 def _of_one_state(block: SolvedBlock, names: Ints) -> RotorBlock:
