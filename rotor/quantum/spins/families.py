@@ -42,5 +42,6 @@ def families_of(count: int, links: Iterable[Link], classes: int) -> list[list[tu
     list of list of (int, int)
         Every block and class once, by the lowest member of each family.
     """
-    edges = ((i * classes + own, k * classes + (own ^ changed)) for i, k, changed in links for own in range(classes))
+    pairs = ((i * classes + own, k * classes + (own ^ changed)) for i, k, changed in links for own in range(classes))
+    edges = (pair for pair in pairs if pair[0] != pair[1])
     return [[divmod(member, classes) for member in part] for part in connected_parts(count * classes, edges)]
