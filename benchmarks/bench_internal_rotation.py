@@ -8,7 +8,6 @@ Times are processor seconds of the second of two runs, in memory. Without --shar
 from __future__ import annotations
 
 import argparse
-import re
 import subprocess
 import sys
 import time
@@ -24,6 +23,7 @@ from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.search import FitOptions
 from rotor.fitting.top_constants import TopConstants
+from rotor.formats.belgi import read_belgi_levels
 from rotor.quantum.internal_rotation.labels import counted_k
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.truncation import truncation_mhz
@@ -41,31 +41,18 @@ def model(constants_cm: dict[str, float], rho: float) -> RamModel:
     return RamModel({name: value * CM for name, value in constants_cm.items()} | {"rho": rho})
 
 
-def belgi_rows(text: str) -> list[tuple[int, int, int, int, float]]:
-    """(σ, J, v_t, K, cm-1) of either listing."""
-    rows = [row.split(",") for row in text.splitlines() if row.count(",") == 5]
-    if rows:
-        return [(int(s), int(j), int(v), int(k), float(e)) for v, k, e, j, _, s in rows]
-    found = []
-    for head in re.split(r"(?=N= +\d+ ISIG=)", text)[1:]:
-        j, sigma = map(int, re.findall(r"\d+", head)[:2])
-        levels = re.findall(r"VT= *(\d+) K= *(-?\d+) E= *([\d.]+) CM-1", head)
-        found += [(sigma, j, int(v), int(k), float(e)) for v, k, e in levels]
-    return found
-
-
 def belgi(folder: Path) -> tuple[int, float]:
     """Levels compared by name, and the largest difference in kHz."""
     count, largest = 0, 0.0
     for barrier in (20, 200):
-        reference = belgi_rows((folder / "belgi" / f"v{barrier}.txt").read_text())
+        listed = read_belgi_levels(folder / "belgi" / f"v{barrier}.txt")
         ram = model(BELGI | {"V3": float(barrier)}, 0.05)
         for sigma in (0, 1):
             ours = ram.blocks(sigma, 6).solve(ram.coefficients, 3)
             quanta = ours.quanta
             k = counted_k(quanta["j"], quanta["vt"], ours.energies) if sigma == 0 else quanta["k"]
             names = np.column_stack([quanta["j"], quanta["vt"], k])
-            theirs = np.array([row[1:] for row in reference if row[0] == sigma])
+            theirs = np.column_stack([listed.j, listed.vt, listed.k, listed.energy_cm])[listed.species == sigma]
             a = names[order := np.lexsort([ours.energies, *names.T])], ours.energies[order]
             order = np.lexsort([theirs[:, 3], *theirs[:, :3].T])
             assert (a[0] == theirs[order, :3]).all(), "a level has another name"

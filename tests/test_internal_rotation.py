@@ -1,7 +1,6 @@
 """Internal rotation of one top: levels of BELGI, full matrices written out here, limits, lines."""
 
 import math
-import re
 from importlib import import_module
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 
 import rotor
+from rotor.formats.belgi import read_belgi_levels
 from rotor.quantum.internal_rotation.labels import counted_k
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
@@ -69,18 +69,10 @@ def test_levels_of_belgi_with_their_names():
 @pytest.mark.oracle
 @pytest.mark.parametrize("barrier", [20, 200])
 def test_every_level_of_belgi(shared, barrier):
-    text = (shared / "reference" / "internal_rotation" / "belgi" / f"v{barrier}.txt").read_text()
-    reference = []
-    if barrier == 20:
-        for row in text.splitlines():
-            if row.count(",") == 5:
-                vt, k, energy, j, _, sigma = row.split(",")
-                reference.append((int(sigma), int(j), int(vt), int(k), float(energy)))
-    else:
-        for head in re.split(r"(?=N= +\d+ ISIG=)", text)[1:]:
-            j, sigma = map(int, re.match(r"N= +(\d+) ISIG= +(\d+)", head).groups())
-            levels = re.findall(r"VT= *(\d+) K= *(-?\d+) E= *([\d.]+) CM-1", head)
-            reference += [(sigma, j, int(vt), int(k), float(energy)) for vt, k, energy in levels]
+    listed = read_belgi_levels(shared / "reference" / "internal_rotation" / "belgi" / f"v{barrier}.txt")
+    reference = list(
+        zip(*(listed.columns[name].tolist() for name in ("species", "j", "vt", "k", "energy_cm")), strict=True)
+    )
     assert len(reference) == 392
     compare_with_belgi(float(barrier), reference)
 
@@ -281,7 +273,6 @@ def test_terms_that_are_summed_first_give_the_same_levels_and_slopes(sigma):
     assert np.abs(apart.energies[order[0]] - once.energies[order[1]]).max() < 1e-6  # MHz; rounding of 4e7
     slopes = apart.slopes()[order[0]], once.slopes()[order[1]]
     assert np.allclose(*slopes, rtol=1e-9, atol=1e-9 * np.abs(slopes[0]).max())
-    assert np.allclose(slopes[0], apart.solved.slopes(apart.rows)[order[0]], rtol=1e-12)
 
 
 def test_wrong_constants_are_refused():

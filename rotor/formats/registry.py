@@ -86,6 +86,12 @@ FORMATS = (
         "rotor.formats.westerfit:read_westerfit",
         recognises="rotor.formats.westerfit:is_westerfit_file",
     ),
+    Format(
+        "output of BELGI",
+        (".txt", ".out"),
+        "rotor.formats.belgi:read_belgi",
+        recognises="rotor.formats.belgi:is_belgi_file",
+    ),
     Format("molecule file", (".toml",), "rotor.formats.read_write:read_top_file"),
     Format(
         "comma-separated values",
