@@ -4,14 +4,16 @@
     python docs/make_notebooks.py 04 12            # those whose names begin so
     python docs/make_notebooks.py --check          # compare and execute, write nothing
 
-The script is the source. `agrees` says whether a notebook has the cells of its script, `executed` runs one and fails on an
-error, on a warning and on a notebook without a picture. A script with `# long: SECONDS` in its first lines may take so long;
+The script is the source: a story with its checks. The checks are assert statements: they run with the cells and do not stand in
+the notebook. `agrees` says whether a notebook has the cells of its script, `executed` runs one and fails on an error, a failed
+check, a warning and a notebook without a picture. A script with `# long: SECONDS` in its first lines may take so long;
 all others have 20 s of processor time. Needs the extra `docs` (jupytext, nbclient, ipykernel).
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import base64
 import os
 import re
@@ -53,6 +55,62 @@ def notebook_of(script: Path) -> Any:
     return notebook
 
 
+def without_checks(notebook: Any) -> Any:
+    """The notebook without its assert statements and without cells that had nothing else."""
+    for cell in notebook.cells:
+        if cell["cell_type"] == "code":
+            cell["source"] = _story(cell["source"])
+    notebook.cells = [cell for cell in notebook.cells if cell["cell_type"] != "code" or cell["source"].strip()]
+    code = [cell for cell in notebook.cells if cell["cell_type"] == "code"]
+    for cell in code:
+        cell["outputs"] = [output for output in cell.get("outputs", []) if not _is_bare_object(output)]
+    for number, cell in enumerate(notebook.cells):
+        cell["id"] = f"cell-{number}"
+    for count, cell in enumerate(code, 1):
+        if cell["execution_count"] is not None:
+            cell["execution_count"] = count
+            for output in cell["outputs"]:
+                if "execution_count" in output:
+                    output["execution_count"] = count
+    return notebook
+
+
+def _is_bare_object(output: Any) -> bool:
+    """Whether an output is the name of an object of matplotlib, which the last call of a cell returns beside its picture."""
+    text = output.get("data", {}).get("text/plain", "")
+    return len(output.get("data", {})) == 1 and re.match(r"\[?(<matplotlib\.|Text\()", text) is not None
+
+
+def _story(source: str) -> str:
+    """The source of a cell without asserts, and without loops and branches that consist of asserts."""
+    plain = re.sub(r"^[%!]", "#", source, flags=re.MULTILINE)  # of the same length: magics are no Python
+    dropped = {line for node in ast.parse(plain).body for line in _lines_of_checks(node)}
+    left = [line for number, line in enumerate(source.splitlines(), 1) if number not in dropped]
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(left)).strip("\n")
+
+
+def _lines_of_checks(node: ast.stmt) -> set[int]:
+    """Numbers of the lines of a statement that hold checks alone, with the else of nothing but checks."""
+    last = node.end_lineno or node.lineno
+    if isinstance(node, ast.Assert):
+        return set(range(node.lineno, last + 1))
+    if isinstance(node, ast.FunctionDef):
+        return {line for inner in node.body for line in _lines_of_checks(inner)}
+    if not isinstance(node, ast.For | ast.If | ast.With):
+        return set()
+    otherwise = getattr(node, "orelse", [])
+    if _are_checks(node.body) and (not otherwise or _are_checks(otherwise)):
+        return set(range(node.lineno, last + 1))
+    dropped = {line for inner in (*node.body, *otherwise) for line in _lines_of_checks(inner)}
+    if otherwise and _are_checks(otherwise):
+        dropped |= set(range((node.body[-1].end_lineno or 0) + 1, last + 1))
+    return dropped
+
+
+def _are_checks(nodes: list[ast.stmt]) -> bool:
+    return all(node.lineno in _lines_of_checks(node) for node in nodes)
+
+
 def cells(notebook: Any) -> list[tuple[str, str]]:
     """What has to agree between a script and its notebook."""
     return [(cell["cell_type"], cell["source"].rstrip()) for cell in notebook.cells]
@@ -63,11 +121,13 @@ def agrees(script: Path) -> bool:
     import nbformat
 
     written = script.with_suffix(".ipynb")
-    return written.exists() and cells(nbformat.read(written, as_version=4)) == cells(notebook_of(script))
+    return written.exists() and cells(nbformat.read(written, as_version=4)) == cells(
+        without_checks(notebook_of(script))
+    )
 
 
 def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
-    """The notebook of a script after a run in examples/, and the processor seconds that it took, start of the kernel included.
+    """The notebook of a script after a run with its checks in examples/, and the processor seconds, start of the kernel included.
 
     patience: factor on the seconds allowed to a cell, for a busy machine. Raises nbclient's CellExecutionError for an error
     in a cell, ValueError for a warning on standard error and for a notebook without a picture.
@@ -99,7 +159,7 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
         raise ValueError(f"{script.name}: a notebook writes nothing to standard error; this one: {spoken[:300]}")
     if not pictures(notebook):
         raise ValueError(f"{script.name}: a notebook has a picture; end a cell with the figure, or draw it with pyplot")
-    return notebook, _spent_by_children() - start
+    return without_checks(notebook), _spent_by_children() - start
 
 
 def _spent_by_children() -> float:

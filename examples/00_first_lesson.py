@@ -12,6 +12,8 @@ import rotor
 
 # %matplotlib inline
 
+rotor.api.use_style()
+
 # %% [markdown]
 # ## A book in the air
 #
@@ -33,12 +35,11 @@ figure, panels = plt.subplots(1, 3, figsize=(10, 3), sharey=True, layout="constr
 for panel, (name, throw) in zip(panels, throws.items(), strict=True):
     motion = throw.to_pandas()
     size = np.sqrt(motion.m1**2 + motion.m2**2 + motion.m3**2)
-    for component, colour in zip(("m1", "m2", "m3"), ("tab:blue", "tab:orange", "tab:green"), strict=True):
+    for component, colour in zip(("m1", "m2", "m3"), ("C0", "C1", "C2"), strict=True):
         panel.plot(motion.t, motion[component] / size, color=colour, label=f"axis {component[1]}")
-    panel.set(title=f"Spin about the axis of {name}", xlabel="Time (s)")
-    panel.title.set_size(9)
+    panel.set(title=f"Axis of {name}", xlabel="Time (s)")
 panels[0].set_ylabel("Angular momentum in the book / size")
-panels[0].legend(frameon=False)
+panels[0].legend()
 
 # %% [markdown]
 # The angular momentum in space never changes, since no torque acts. Seen from the book it moves: in the middle panel it swings from
@@ -64,12 +65,12 @@ for error in errors:
     flips.append(motion.t[np.argmax(motion.m2 < 0)])
 
 figure, panel = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
-panel.semilogx(errors, flips, "o", color="tab:orange", label="first flip")
+panel.semilogx(errors, flips, "o", color="C1", label="first flip")
 line = flips[0] + np.log(errors[0] / np.array(errors)) / growth
 panel.semilogx(errors, line, color="black", lw=0.8, label=f"slope from λ = {growth:.2f} 1/s")
 panel.set(xlabel="Angular velocity about the other axes (rad/s)", ylabel="Time of the first flip (s)")
 panel.set_title("Care delays the flip, but only by its logarithm")
-panel.legend(frameon=False)
+panel.legend()
 
 # %% [markdown]
 # ## A molecule turns in steps
@@ -90,7 +91,7 @@ hydrogen.to_pandas()[["j", "energy_cm", "energy_k", "weight", "degeneracy"]]
 table = hydrogen.to_pandas()
 figure, panel = plt.subplots(figsize=(5, 4), layout="constrained")
 for row in table.itertuples():
-    colour = "tab:blue" if row.j % 2 == 0 else "tab:red"
+    colour = "C0" if row.j % 2 == 0 else "C1"
     panel.hlines(row.energy_cm, row.weight - 0.4, row.weight + 0.4, color=colour, lw=2)
     panel.annotate(f"J = {row.j}", (row.weight + 0.45, row.energy_cm), va="center", fontsize=9)
 panel.set(xticks=[1, 3], xticklabels=["para (weight 1)", "ortho (weight 3)"], xlim=(0.2, 4.2), ylabel="Energy (cm⁻¹)")
@@ -115,7 +116,7 @@ panel.axhline(1, color="black", lw=0.7, ls=":")
 panel.annotate("classical", (590, 0.92), ha="right", fontsize=9)
 panel.set(xlabel="Temperature (K)", ylabel="Rotational heat capacity / R", ylim=(0, 2.3))
 panel.set_title("Rotational heat capacity of hydrogen")
-panel.legend(frameon=False)
+panel.legend()
 
 # %% [markdown]
 # ## The spectrum of carbon monoxide
@@ -127,7 +128,7 @@ panel.legend(frameon=False)
 spectrum = rotor.spectrum("CO", temperature_k=300, jmax=40)
 lines = spectrum.to_pandas()
 figure, panel = plt.subplots(figsize=(8, 3), layout="constrained")
-panel.vlines(lines.frequency_mhz / 1e6, 0, 10**lines.lgint, color="tab:blue")
+panel.vlines(lines.frequency_mhz / 1e6, 0, 10**lines.lgint, color="C0")
 panel.set(xlabel="Frequency (THz)", ylabel="Absorption (nm² MHz)", xlim=(0, 4), ylim=(0, None))
 panel.set_title("Carbon monoxide at 300 K")
 

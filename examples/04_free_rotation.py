@@ -3,7 +3,7 @@
 #
 # Set spinning about its axis of smallest or of largest moment, a book keeps spinning about it; about the intermediate axis it
 # turns over, again and again. The same equations turn a water molecule, some 10¹² times faster. Everything here is the exact
-# motion, not stepped in time, and every claim is asserted.
+# motion, not stepped in time.
 
 # %%
 import math
@@ -28,6 +28,8 @@ from rotor.api import (
 )
 
 # %matplotlib inline
+
+rotor.api.use_style()
 
 # %% [markdown]
 # ## The book
@@ -95,7 +97,7 @@ assert abs(sigma / turn_per_s - math.sqrt(1 / 3)) < 1e-14  # a factor of 37.6 in
 # %%
 tumbling = rotor.api.free_motion(book, off_intermediate_axis(book, book[1] * turn_per_s, math.radians(0.5)))
 seconds = np.linspace(0, 2 * tumbling.period, 400)
-polhode_figure(tumbling, seconds, time_label="$t$ (s)", title="A book, half a degree off")
+polhode_figure(tumbling, seconds, time_label="Time (s)", title="A book, half a degree off")
 
 # %%
 path = tumbling.at(seconds)[0]
@@ -123,8 +125,8 @@ for panel, (moments, (expected, expected_period)) in zip(panels, problems.items(
     panel.plot(np.linspace(0, 10, 500), motion.at(np.linspace(0, 10, 500))[0], label=["$L_1$", "$L_2$", "$L_3$"])
     panel.plot([10] * 3, expected, "k.", ms=8)
     panel.set(title=f"I = {moments}; dots: 50 digits", ylabel="L in the body", xlim=(0, 10.2))
-panels[0].legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
-panels[1].set_xlabel("t")
+panels[0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
+panels[1].set_xlabel("Time")
 
 racket = np.array([0.3, 0.35, 0.4])
 period = float(rotor.api.free_motion(racket, racket * [0.1, 15.0, 0.1]).period)
@@ -167,7 +169,7 @@ size = float(mean_thermal_momentum(moments, EV_PER_K * 300))
 molecule = rotor.api.free_motion(moments, off_intermediate_axis(moments, size, math.radians(0.5)))
 period_ps = float(molecule.period) * ASE_TIME_PS
 polhode_figure(
-    molecule, np.linspace(0, 2 * molecule.period, 400), axis_names=("a", "b", "c"), time_label="$t$ (ps)",
+    molecule, np.linspace(0, 2 * molecule.period, 400), axis_names=("a", "b", "c"), time_label="Time (ps)",
     time_factor=ASE_TIME_PS, title="Water at 300 K, half a degree off its axis b",
 )  # fmt: skip
 

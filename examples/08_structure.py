@@ -2,7 +2,7 @@
 # # From isotopologues to a structure
 #
 # Moments of inertia of isotopologues hold the places of the atoms. OCS, from measured lines to bond lengths, with no number typed in
-# between; then what vibration does to them, and symmetry. Every claim is asserted.
+# between; then what vibration does to them, and symmetry.
 
 # %%
 from pathlib import Path
@@ -21,8 +21,9 @@ from rotor.api import (
 
 # %matplotlib inline
 
-folders = (folder / "tests/oracles/fits" for folder in (Path.cwd(), *Path.cwd().parents))
-samples = next(folder for folder in folders if folder.is_dir())
+rotor.api.use_style()
+
+samples = Path("../tests/oracles/fits")  # measured lines, in this repository
 
 # %% [markdown]
 # ## OCS

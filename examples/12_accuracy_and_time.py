@@ -2,7 +2,7 @@
 # # What accuracy costs
 #
 # Every approximation has a setting, and every setting a price. Each section varies one setting, measures the error against a
-# calculation that is much finer, and the processor time. The errors are asserted; the times belong to the machine that made this
+# calculation that is much finer, and the processor time. The times belong to the machine that made this
 # notebook, so only their ratios matter.
 
 # %%
@@ -24,6 +24,8 @@ from rotor.api import (
 
 # %matplotlib inline
 
+rotor.api.use_style()
+
 
 def timed(work, repeats=3):
     """The answer, and the milliseconds of processor time of the fastest of several runs."""
@@ -39,8 +41,9 @@ def two_axes(x_label, title):
     """A diagram with errors on the left and times on the right."""
     _, left = plt.subplots(figsize=(7, 4), layout="constrained")
     right = left.twinx()
-    left.set(xlabel=x_label, ylabel="error (solid)", yscale="log", title=title)
-    right.set(ylabel="processor time (ms, dashed)", yscale="log")
+    right.spines["right"].set_visible(True)
+    left.set(xlabel=x_label, ylabel="Error (solid)", yscale="log", title=title)
+    right.set(ylabel="Processor time (ms, dashed)", yscale="log")
     return left, right
 
 
@@ -53,7 +56,7 @@ def two_axes(x_label, title):
 # %%
 left, right = two_axes("J max", "Population above J max at 300 K")
 for color, (name, counts) in zip(
-    ("tab:blue", "tab:orange"), {"H2CO": range(10, 81, 10), "SO2": range(20, 161, 20)}.items(), strict=True
+    ("C0", "C1"), {"H2CO": range(10, 81, 10), "SO2": range(20, 161, 20)}.items(), strict=True
 ):
     top = rotor.read(name)
     rigid = rotor.Top(
@@ -73,7 +76,7 @@ for color, (name, counts) in zip(
     assert (np.diff(lost) < 0).all()
     assert lost[-1] < 1e-9
 left.set_ylim(1e-16, 2)
-left.legend(frameon=False, loc="lower left")
+left.legend(loc="lower left")
 
 # %% [markdown]
 # Choose J max by the population that you may lose; `rotor.api.line_list` does so from the cut of the intensities, and
@@ -86,8 +89,8 @@ left.legend(frameon=False, loc="lower left")
 
 # %%
 asked = np.logspace(-2, -10, 5)
-left, right = two_axes("relative error asked for", "Partition functions at 300 K: error reached")
-for color, name in zip(("tab:blue", "tab:orange", "tab:green"), ("OCS", "SO2", "CH3CN"), strict=True):
+left, right = two_axes("Relative error asked for", "Partition functions at 300 K: error reached")
+for color, name in zip(("C0", "C1", "C2"), ("OCS", "SO2", "CH3CN"), strict=True):
     top = rotor.read(name)
     full = float(rotor.api.partition_function(top, 300.0, 1e-13).q)
     reached, spent = [], []
@@ -104,7 +107,7 @@ for color, name in zip(("tab:blue", "tab:orange", "tab:green"), ("OCS", "SO2", "
 left.plot(asked, asked, "k:", lw=1)
 left.set_xscale("log")
 left.invert_xaxis()
-left.legend(frameon=False, loc="lower left")
+left.legend(loc="lower left")
 
 # %% [markdown]
 # Eight more digits cost less than a factor of three: there is no reason to ask for less than the default of 1e-6.
@@ -125,10 +128,10 @@ for cut in cuts:
     missing.append(abs(1 - lines.intensity_nm2_mhz.sum() / total))
     counts.append(len(lines))
     print(f"min_lgint {cut:5.1f}: {len(lines):6} lines, {milliseconds:6.0f} ms, absorption left out {missing[-1]:.1e}")
-left, right = two_axes("min_lgint, log10 of nm² MHz", "SO₂ below 2 THz, 300 K: absorption left out")
+left, right = two_axes("Cut of the intensity, log₁₀ (nm² MHz)", "SO₂ below 2 THz, 300 K: absorption left out")
 left.plot(cuts, missing, "o-", ms=4)
 right.plot(cuts, counts, "--")
-right.set(ylabel="lines (dashed)", yscale="linear", ylim=(0, None))
+right.set(ylabel="Lines (dashed)", yscale="linear", ylim=(0, None))
 left.invert_xaxis()
 
 # %%
@@ -176,11 +179,11 @@ error = float(distance(exact.at(1e6)[1], fifty_digits))
 axes.loglog([error], [1e3 * milliseconds / turns], "k*", ms=12, label="exact motion, after 48,000 periods")
 axes.invert_xaxis()
 axes.set(
-    xlabel="error of the attitude after 100 periods (rad)",
-    ylabel="processor time per period (µs)",
+    xlabel="Error of the attitude after 100 periods (rad)",
+    ylabel="Processor time per period (µs)",
     title="Free asymmetric top",
 )
-axes.legend(frameon=False, fontsize=8)
+axes.legend(fontsize=8)
 
 # %%
 for name, slope in slopes.items():
@@ -208,7 +211,7 @@ for count in counts:
         means.append((gas.momentum**2 / gas.moments).sum(axis=1).mean() / kt / 3)
     spread.append(float(np.sqrt(np.mean((np.array(means) - 1) ** 2))))
     spent.append(1e3 * (time.process_time() - start) / 40)
-left, right = two_axes("molecules", "Mean rotational energy per degree: error of one gas")
+left, right = two_axes("Molecules", "Mean rotational energy per degree: error of one gas")
 left.plot(counts, spread, "o-", ms=4)
 left.plot(counts, np.sqrt(2 / 3 / counts), "k:", lw=1)
 left.set_xscale("log")

@@ -2,12 +2,13 @@
 # # Rigid parts: base pairs of DNA, domains of a protein, and the bracket that parks a car
 #
 # A base pair of DNA, a domain of a protein and a car on a street are rigid bodies; what differs is what joins them. This notebook uses
-# `rotor.geometry` alone: `base_pair_steps`, `rigid_parts` and `rigid_motions`. Each section ends in numbers that are asserted.
+# `rotor.geometry` alone: `base_pair_steps`, `rigid_parts` and `rigid_motions`.
 
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 
+import rotor
 from rotor.api import (
     adjoint,
     bracket,
@@ -27,6 +28,8 @@ from rotor.api import (
 )
 
 # %matplotlib inline
+
+rotor.api.use_style()
 
 # %% [markdown]
 # ## Base pairs of DNA: how stiff is the double helix?
@@ -155,11 +158,11 @@ left.fill_between(
     n, mean - 2 * error, mean + 2 * error, color="#56B4E9", alpha=0.5, label="chains, two standard errors"
 )
 left.plot(n, exact, color="#D55E00", lw=1, label="$z^T\\langle R\\rangle^n z$")
-left.set(xlabel="base pairs", ylabel="$\\langle z_0\\cdot z_n\\rangle$", title=f"persistence length {whole:.1f} nm")
-left.legend(frameon=False)
+left.set(xlabel="Base pairs", ylabel="$\\langle z_0\\cdot z_n\\rangle$", title=f"Persistence length {whole:.1f} nm")
+left.legend()
 for chain in range(6):
     right.plot(*(0.1 * origins[:, chain, [0, 2]].T), lw=1.5)
-right.set(xlabel="nm", ylabel="nm", aspect="equal", title="six random sequences of 400 pairs")
+right.set(xlabel="x (nm)", ylabel="z (nm)", aspect="equal", title="Six random sequences of 400 pairs")
 plt.show()
 
 assert np.max(np.abs(mean - exact)[1:] / error[1:]) < 5  # standard errors, of 399 neighbouring values
@@ -199,14 +202,14 @@ off_line = np.linalg.norm(np.cross(screw.point - POINT, HINGE))
 print(f"the line passes {off_line:.2f} Å from where it was put")
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained", sharex=False)
-for where, cloud, title in ((axes[0], before, "before, and the screw axis"), (axes[1], after, "after")):
+for where, cloud, title in ((axes[0], before, "Before, and the screw axis"), (axes[1], after, "After")):
     where.scatter(*cloud[:, :2].T, s=8, color="0.75", label="no part")
     for part, colour in zip(parts, ("#0072B2", "#D55E00", "#009E73"), strict=False):
         where.scatter(*cloud[part.members][:, :2].T, s=12, color=colour, label=f"{len(part.members)} points")
     where.set(xlabel="x (Å)", ylabel="y (Å)", aspect="equal", title=title)
 ends = screw.point + np.outer([-30, 30], screw.axis)
 axes[0].plot(ends[:, 0], ends[:, 1], color="black", lw=1.5)
-figure.legend(*axes[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=3)
+figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
 plt.show()
 
 assert set(range(120)) <= set(first.members)
@@ -280,7 +283,7 @@ box = np.array([[-0.8, -0.9, 0], [3.4, -0.9, 0], [3.4, 0.9, 0], [-0.8, 0.9, 0], 
 for pose, colour in ((([1.0, 0, 0, 0], np.zeros(3)), "0.6"), ((attitude, place), "#D55E00")):
     outline = rotate(np.array(pose[0]), box) + pose[1]
     axes.plot(outline[:, 0], outline[:, 1], color=colour)
-axes.set(xlabel="m", ylabel="m", aspect="equal", title="the rear axle on the way to the kerb")
+axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="The rear axle on the way to the kerb")
 plt.show()
 rounds = (len(path) - 1) // 40
 expected = 2.0 / (2 * CURVATURE * 0.5**2)

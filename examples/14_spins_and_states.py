@@ -3,7 +3,7 @@
 #
 # A nucleus of spin 1 or more splits every rotational line; a second state, of tunnelling or of vibration, brings lines of its own
 # and pushes the levels of the first. Five sections: Casimir's formula for HCN; measured components of formamide and vinyl
-# cyanide; what the cheaper methods leave out; ammonia's inversion and an avoided crossing; sum rules. Every claim is asserted.
+# cyanide; what the cheaper methods leave out; ammonia's inversion and an avoided crossing; sum rules.
 # Names of constants and options: `docs/spins_and_states.md`; all molecules that were compared:
 # `docs/validation/measured_lines.md`.
 
@@ -19,7 +19,9 @@ from rotor.api import used_method
 
 # %matplotlib inline
 
-oracles = next(folder / "tests/oracles" for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "tests").is_dir())
+rotor.api.use_style()
+
+oracles = Path("../tests/oracles")  # reference values, in this repository
 
 
 def components(top, jmax, method="exact", temperature_k=300.0):
@@ -31,7 +33,7 @@ def components(top, jmax, method="exact", temperature_k=300.0):
 
 
 def measured(sample):
-    """The components of a file of tests/oracles/hyperfine by their quanta: MHz."""
+    """Components (MHz) of a file of measured lines by their quanta."""
     rows = (oracles / "hyperfine" / f"{sample}.csv").read_text(encoding="utf-8").splitlines()[1:]
     cells = [row.split(",") for row in rows]
     return {tuple(tuple(map(int, side.split())) for side in row[2:]): float(row[0]) for row in cells}
@@ -79,34 +81,38 @@ for (upper, lower), frequency, plain, strength in zip(
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained", width_ratios=(1, 1.4))
 for f, _, shift, *_ in rows:
-    left.plot([0.0, 0.6, 1.0, 2.0], [0, 0, shift, shift], color="tab:blue", lw=1)
+    left.plot([0.0, 0.6, 1.0, 2.0], [0, 0, shift, shift], color="C0", lw=1)
     left.text(2.05, shift, f"F = {f}", va="center")
 left.plot([0, 0.6], [0, 0], color="black", lw=2)
 left.set(
     xlim=(-0.1, 2.7),
     xticks=[0.3, 1.5],
     xticklabels=["without", "with ¹⁴N"],
-    ylabel="E - E(J = 1), MHz",
+    ylabel="E - E(J = 1) (MHz)",
     title="HCN J = 1",
 )
 origin = 88_630.0
 for f, frequency, *_, share in rows:
-    right.vlines(frequency - origin, 0, share, color="tab:blue", lw=3)
+    right.vlines(frequency - origin, 0, share, color="C0", lw=3)
     right.text(frequency - origin, share + 0.01, f"F = {f} - 1", ha="center")
 right.plot(
     [nu - origin for nu in laboratory.values()],
     [0.0] * 3,
     "^",
-    color="tab:orange",
+    color="C1",
     label="measured",
     clip_on=False,
     zorder=3,
 )
 right.axvline(centre - origin, color="gray", ls=":", lw=1, label="line without spins")
 right.set(
-    xlabel="frequency - 88 630 MHz", ylabel="share of the strength", xlim=(0, 4.5), ylim=(0, 0.65), title="J = 1 - 0"
+    xlabel="Frequency − 88 630 MHz (MHz)",
+    ylabel="Share of the strength",
+    xlim=(0, 4.5),
+    ylim=(0, 0.65),
+    title="J = 1 - 0",
 )
-right.legend(frameon=False)
+right.legend()
 
 # %%
 for f, _, shift, formula, off, share in rows:
@@ -121,7 +127,7 @@ assert abs(sum(share * shift for _, _, shift, _, _, share in rows)) < 1e-4  # th
 # No constant was fitted here to the lines that are compared: χ of ¹⁴N is as published, and the centre comes from the constants in
 # `data/molecules`. The frequencies are those of a list of rest frequencies for a radio telescope (sdhdfProc, G. Hobbs, 2019, 2020),
 # which gives neither errors nor F: two of its last digit, 2 kHz, are taken for the error, and each frequency has the F of the only
-# computed component within 20 kHz (`tests/oracles/hyperfine/README.md`).
+# computed component within 20 kHz.
 
 # %%
 targets = {"formamide": ("hconh2", "1(1,0) - 1(1,1)"), "vinyl cyanide": ("ch2chcn", "2(1,1) - 2(1,2)")}
@@ -138,7 +144,7 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
     for row in sorted(inside, key=lambda one: lines.frequency_mhz[one]):
         frequency, share = lines.frequency_mhz[row], lines.strength_debye2[row] / strongest
         tag = f"{quanta[row][0][-1]} - {quanta[row][1][-1]}"
-        panel.vlines(frequency, 0, share, color="tab:blue", lw=3)
+        panel.vlines(frequency, 0, share, color="C0", lw=3)
         panel.text(frequency, share + 0.02, tag, ha="center", fontsize=8)
         if quanta[row] in laboratory:
             seen = laboratory[quanta[row]]
@@ -148,7 +154,7 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
                 seen,
                 0,
                 "^",
-                color="tab:orange",
+                color="C1",
                 clip_on=False,
                 zorder=3,
                 label="measured" if len(off_khz[name]) == 1 else None,
@@ -156,12 +162,12 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
         else:
             print(f"  {tag}   not in the list {frequency:14.4f} {'':14} {share:20.3f}")
     panel.set(
-        xlabel="frequency, MHz", ylabel="strength, strongest = 1", ylim=(0, 1.15), title=f"{name} {label}, F' - F''"
+        xlabel="Frequency (MHz)", ylabel="Strength, strongest = 1", ylim=(0, 1.15), title=f"{name} {label}, F' - F''"
     )
     panel.ticklabel_format(useOffset=False)
     panel.locator_params(axis="x", nbins=5)
     panel.margins(x=0.08)
-    panel.legend(frameon=False, loc="upper left")
+    panel.legend(loc="upper left")
     assert len(off_khz[name]) == len(laboratory)  # each measured component is in the computed list
 
 # %%
@@ -206,17 +212,17 @@ figure, axes = plt.subplots(figsize=(8, 3.8), layout="constrained")
 for method, marker, shift in (("N-diagonal", "o", -0.1), ("first-order", "s", 0.1)):
     here = [row for row in found if row[1] == method]
     place = np.arange(len(here)) + shift
-    axes.plot(place, [row[2] for row in here], marker, color="tab:blue", label=f"{method}, largest difference")
-    axes.plot(place, [row[3] for row in here], marker, mfc="none", color="tab:orange", ms=8, label=f"{method}, stated")
+    axes.plot(place, [row[2] for row in here], marker, color="C0", label=f"{method}, largest difference")
+    axes.plot(place, [row[3] for row in here], marker, mfc="none", color="C1", ms=8, label=f"{method}, stated")
 axes.axhline(1e-4, color="gray", ls=":", lw=1, label="tolerance of auto, 0.1 kHz")
 axes.set(
     yscale="log",
-    ylabel="MHz",
+    ylabel="Difference (MHz)",
     xticks=range(len(tops)),
     xticklabels=list(tops),
     title="Lines to J = 5: difference from exact",
 )
-axes.legend(frameon=False, fontsize=8)
+axes.legend(fontsize=8)
 
 # %%
 assert all(largest <= stated for _, _, largest, stated, _ in found)
@@ -232,7 +238,7 @@ assert chosen["made up, ⁷⁹Br"].method == "exact"
 # Nitrogen tunnels through the plane of the protons; each level is a pair, 0⁺ and 0⁻, and the dipole connects the two halves. The
 # library's ammonia has both states, with a table of energies that comes from measured lines; so the lines by that table test labels and
 # selection rules more than physics. The constants of the two states alone, without the table, are the second column: a series in J and K.
-# Measured: list of rest frequencies of F. J. Lovas, NIST 2004, as in `tests/test_ammonia.py`.
+# Measured: list of rest frequencies of F. J. Lovas, NIST 2004.
 
 # %%
 LAB = {(1, 1): 23694.4955, (2, 2): 23722.6333, (3, 3): 23870.1292, (2, 1): 23098.8190}  # (J, K): MHz
@@ -258,7 +264,7 @@ assert (up[:, 0] != low[:, 0]).all()  # the dipole connects the halves of a pair
 assert (up[:, 2] > 0).all()  # K = 0 has no pairs: protons leave one half of each
 
 figure, axes = plt.subplots(figsize=(9, 3.6), layout="constrained")
-for ortho, color in ((True, "tab:orange"), (False, "tab:blue")):
+for ortho, color in ((True, "C1"), (False, "C0")):
     here = (up[:, 2] % 3 == 0) == ortho
     label = "ortho, K = 3, 6" if ortho else "para"
     axes.vlines(lines.frequency_mhz[here] / 1e3, 0, 10.0 ** lines.lgint[here] * 1e4, color=color, lw=2, label=label)
@@ -267,10 +273,10 @@ for row in np.flatnonzero((up[:, 1] == up[:, 2]) & (up[:, 1] <= 6)):
     axes.text(
         lines.frequency_mhz[row] / 1e3, height, f"({up[row, 1]},{up[row, 2]})", ha="center", va="bottom", fontsize=8
     )
-axes.set(xlabel="frequency, GHz", ylabel="intensity at 300 K, 10⁻⁴ nm² MHz", title="Inversion lines of NH₃, (J, K)")
+axes.set(xlabel="Frequency (GHz)", ylabel="Intensity at 300 K (10⁻⁴ nm² MHz)", title="Inversion lines of NH₃, (J, K)")
 axes.set_ylim(bottom=0)
 axes.margins(y=0.1)
-axes.legend(frameon=False)
+axes.legend()
 
 # %% [markdown]
 # ## Two states that cross
@@ -292,7 +298,7 @@ levels = rotor.api.solve_levels(pair, highest)
 js = np.arange(6, highest + 1)
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 worst, gaps = 0.0, {}
-for k, color in ((0, "tab:gray"), (1, "tab:blue"), (3, "tab:orange")):
+for k, color in ((0, "gray"), (1, "C0"), (3, "C1")):
     curves = []
     for j in js:
         mine = (levels.quanta["j"] == j) & (levels.quanta["ka"] == k)
@@ -310,14 +316,14 @@ for k, color in ((0, "tab:gray"), (1, "tab:blue"), (3, "tab:orange")):
         left.plot(js, (own - middle).T, color=color, ls=":", lw=0.8)
     lower = np.diff(curves[:, 0]) / (2 * (js[:-1] + 1))
     right.plot(js[:-1], lower, "o-", ms=3, lw=1, color=color, label=f"K = {k}")
-left.set(xlabel="J", ylabel="E - (E₀ + E₁)/2, MHz", title="Two states that meet near J = 15 (dotted: not coupled)")
+left.set(xlabel="J", ylabel="E - (E₀ + E₁)/2 (MHz)", title="Two states that meet near J = 15 (dotted: not coupled)")
 left.set_ylim(-500, 500)
 for axes in (left, right):
     axes.set_xticks(range(6, highest + 1, 3))
-left.legend(frameon=False)
-right.set(xlabel="J", ylabel="ν(J + 1 - J) / 2(J + 1), MHz", title="Lines of the lower levels")
+left.legend()
+right.set(xlabel="J", ylabel="ν(J + 1 - J) / 2(J + 1) (MHz)", title="Lines of the lower levels")
 right.ticklabel_format(useOffset=False)
-right.legend(frameon=False)
+right.legend()
 
 # %%
 print(

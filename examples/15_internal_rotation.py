@@ -26,9 +26,10 @@ from rotor.api import (
 
 # %matplotlib inline
 
+rotor.api.use_style()
+
 CM = rotor.units.MHZ_PER_CM
-folders = (folder / "tests/oracles" for folder in (Path.cwd(), *Path.cwd().parents))
-samples = next(folder for folder in folders if folder.is_dir())
+samples = Path("../tests/oracles")  # measured lines, in this repository
 
 # %% [markdown]
 # ## The barrier by itself
@@ -70,7 +71,7 @@ model = turning_tops(with_barrier(407.6), with_barrier(407.6).internal_rotation)
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))
 for name, sigma in model.species.items():
     left.plot(k, model.ground_energies(sigma, 12) / 1e3, "o-", ms=3, label=name)
-left.set(xlabel="K", ylabel="energy of the torsional ground state (GHz)", title="V3 = 408 cm⁻¹")
+left.set(xlabel="K", ylabel="Energy of the torsional ground state (GHz)", title="V3 = 408 cm⁻¹")
 left.margins(y=0.2)
 left.legend(ncols=2, loc="upper center")
 splittings = np.array([line_splitting(v3) for v3 in barriers])
@@ -105,10 +106,10 @@ assert abs(start["V3"] / CM - 407.6) < 8  # of a fit with V6 and forty more term
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(10, 3.4))
 species = rows[:, 3] > 0
-for axis, fit, title in zip(axes, fits, ("rigid, with V3", "with centrifugal distortion"), strict=True):
+for axis, fit, title in zip(axes, fits, ("Rigid, with V3", "With centrifugal distortion"), strict=True):
     for chosen, name in ((~species, "A"), (species, "E")):
         axis.plot(rows[chosen, 10] / 1e3, fit.difference_mhz[chosen], ".", ms=4, label=name)
-    axis.set(xlabel="frequency (GHz)", ylabel="observed - calculated (MHz)", title=title)
+    axis.set(xlabel="Frequency (GHz)", ylabel="Observed - calculated (MHz)", title=title)
     axis.legend()
 figure.tight_layout()
 

@@ -3,7 +3,7 @@
 #
 # From a raw spectrum of cold gas to the table of constants of a paper: peaks, the search for constants, what the peaks that are left
 # hold, a fit with the full Hamiltonian, and a check with known constants. The spectrum is synthetic (two molecules at 2 K, foreign
-# lines, a comb of spurs, noise), so that every claim can be asserted. Background: `docs/assign.md`.
+# lines, a comb of spurs, noise), so that the answer is known. Background: `docs/assign.md`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -13,6 +13,8 @@ import rotor
 from rotor.api import assignment_figure, fit_intensities, loomis_wood_figure, peaks_of_spectrum, publication_table
 
 # %matplotlib inline
+
+rotor.api.use_style()
 
 BAND = (8000.0, 14000.0)
 NAMES = ("A", "B", "C", "DJ", "DJK", "DK", "d1", "d2")
@@ -51,7 +53,7 @@ for centre, height in zip(*(np.concatenate(part) for part in zip(*sticks, strict
         spectrum[at] += height * np.exp(-4 * np.log(2) * ((grid[at] - centre) / 0.1) ** 2)
 figure, axes = plt.subplots(figsize=(9, 2.6))
 axes.plot(grid, spectrum, color="0.3", linewidth=0.5)
-axes.set(xlabel="frequency (MHz)", ylabel="signal", title="the raw spectrum")
+axes.set(xlabel="Frequency (MHz)", ylabel="Signal", title="The raw spectrum")
 plt.show()
 
 # %% [markdown]
@@ -88,7 +90,7 @@ assert [one.kind for one in answer.species] == ["bc", "a"]
 assert answer.spurs.sum() >= 20
 
 # %%
-assignment_figure(answer, "peaks above, predictions below, what is left")
+assignment_figure(answer, "Peaks above, predictions below, what is left")
 
 # %% [markdown]
 # ## What is left
@@ -125,4 +127,4 @@ assert abs(heights.temperature_k - 2.0) < 4 * heights.temperature_error_k + 0.02
 assert np.abs(heights.dipole_ratio - [0.0, 1.0, 0.6]).max() < 0.03
 
 # %%
-loomis_wood_figure(known, heights.heights(known), peaks, "peaks about the lines of the first molecule")
+loomis_wood_figure(known, heights.heights(known), peaks, "Peaks about the lines of the first molecule")

@@ -3,7 +3,7 @@
 #
 # From the spectrum of a telescope to a column density and a temperature: ethylene oxide around the protostar IRAS 16293-2422 B, in a
 # piece of an ALMA spectrum (PILS survey, J. K. Jørgensen et al., Astron. Astrophys. 595, A117 (2016)). Read it, fit it, test on
-# injected spectra what the errors are worth; a rotational diagram; which species a spectrum needs. Every claim is asserted.
+# injected spectra what the errors are worth; a rotational diagram; which species a spectrum needs.
 # Background: `docs/observed.md`.
 
 # %%
@@ -12,6 +12,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+import rotor
 from rotor.api import (
     Component,
     FitChoices,
@@ -33,7 +34,9 @@ from rotor.api import (
 
 # %matplotlib inline
 
-folder = next(one / "tests/oracles/observed" for one in (Path.cwd(), *Path.cwd().parents) if (one / "tests").is_dir())
+rotor.api.use_style()
+
+folder = Path("../tests/oracles/observed")  # observed spectra, in this repository
 
 # %% [markdown]
 # ## The spectrum and the lines
@@ -76,10 +79,10 @@ brightness = model(fit.components, spectrum.frequency_mhz, sight).brightness_k
 for axes, part in zip(panels, np.split(np.arange(len(spectrum)), gaps), strict=True):
     offset = spectrum.frequency_mhz[part] - spectrum.frequency_mhz[part].mean()
     axes.step(offset, spectrum.intensity[part], where="mid", color="0.4", linewidth=0.8)
-    axes.plot(offset, brightness[part], color="tab:red", linewidth=0.9)
+    axes.plot(offset, brightness[part], color="C1", linewidth=0.9)
     axes.set_title(f"{spectrum.frequency_mhz[part].mean() / 1e3:.4f} GHz", fontsize=8)
-    axes.set_xlabel("MHz")
-panels[0].set_ylabel("T_B (K)")
+    axes.set_xlabel("Offset (MHz)")
+panels[0].set_ylabel("Brightness temperature (K)")
 figure.tight_layout()
 
 # %% [markdown]

@@ -17,6 +17,8 @@ import rotor
 
 # %matplotlib inline
 
+rotor.api.use_style()
+
 truth = rotor.Constants(
     A=5210.331, B=2012.874, C=1533.209, DeltaJ=0.00021, DeltaJK=0.0009, DeltaK=0.0031, deltaJ=0.00006, deltaK=0.0007
 )
@@ -104,7 +106,7 @@ for name in "ABC":
 
 figure, axes = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True)
 axes[0].plot(frequency[::5], intensity[::5], lw=0.5)
-axes[0].set_ylabel("intensity")
+axes[0].set_ylabel("Intensity")
 state, residuals = widget.session.state, widget.service.facts()["lines"]
 axes[1].errorbar(
     [line.frequency_mhz for line in state.lines.values()],
@@ -113,7 +115,7 @@ axes[1].errorbar(
     fmt="o",
     ms=3,
 )
-axes[1].set(xlabel="frequency (MHz)", ylabel="obs − calc (kHz)")
+axes[1].set(xlabel="Frequency (MHz)", ylabel="Observed − calculated (kHz)")
 # %% [markdown]
 # ## The table
 #

@@ -18,6 +18,8 @@ from rotor.api import TurningTop, torsion_figure, turning_motion
 
 # %matplotlib inline
 
+rotor.api.use_style()
+
 U_ANGSTROM2_PS2 = constants.atomic_mass * 1e-20 / 1e-24  # J
 CM = constants.h * constants.c * 100 / U_ANGSTROM2_PS2  # of 1 cm-1, in u Å²/ps²
 K = constants.k / U_ANGSTROM2_PS2  # of kT, in u Å²/ps²
@@ -34,7 +36,7 @@ figure, axes = plt.subplots(1, 3, figsize=(11, 3.2))
 for axis, (name, answer) in zip(axes, answers.items(), strict=True):
     angles, _, v = answer.torsion.sampled()
     axis.plot(np.degrees(angles), v / rotor.units.MHZ_PER_CM)
-    axis.set(title=name, xlabel="angle (degrees)", ylabel="V (cm⁻¹)", xticks=range(0, 361, 90))
+    axis.set(title=name, xlabel="Angle (degrees)", ylabel="Potential (cm⁻¹)", xticks=range(0, 361, 90))
 figure.tight_layout()
 for name, answer in answers.items():
     facts = answer.facts()
@@ -72,7 +74,7 @@ for name, answer in answers.items():
 for rate, text in ((1e9, "fluorescence, 1 ns"), (1.0, "1 s")):
     axis.axhline(rate, color="grey", lw=0.8, ls="--")
     axis.text(595, rate * 3, text, ha="right", color="grey")
-axis.set(xlabel="temperature (K)", ylabel="passages per second", ylim=(1e-10, 1e14))
+axis.set(xlabel="Temperature (K)", ylabel="Passages per second", ylim=(1e-10, 1e14))
 axis.legend(loc="lower right")
 at_room = {name: crossings_per_s(answer, 298.0) for name, answer in answers.items()}
 print({name: f"{rate:.1e} per second" for name, rate in at_room.items()})
@@ -115,7 +117,7 @@ for axis, temperature in zip(axes, (100, 1000, 3000), strict=True):
     momentum, p, angle = ethane.thermal(K * temperature, 6, rng=rng)
     motion = turning_motion(ethane, momentum, p, angle, times, 0.005)
     axis.plot(times, motion.angle / (2 * np.pi / 3), lw=0.9)
-    axis.set(title=f"{temperature} K", xlabel="t (ps)", ylabel="angle / 120°")
+    axis.set(title=f"{temperature} K", xlabel="Time (ps)", ylabel="Angle / 120°")
     swing = np.ptp(motion.energy, axis=0).max() / (K * temperature)
     print(f"{temperature} K: energy within {swing:.1e} kT")
     assert swing < 0.1

@@ -51,14 +51,14 @@ class Table(ABC):
     def to_pandas(self) -> Any:
         """All columns as a pandas DataFrame.
 
-        Raises ImportError, with the command that installs it, where pandas is not there.
+        Raises ImportError, with the command that installs it, without pandas.
         """
         return _frame("pandas", self.columns)
 
     def to_polars(self) -> Any:
         """All columns as a polars DataFrame.
 
-        Raises ImportError, with the command that installs it, where polars is not there.
+        Raises ImportError, with the command that installs it, without polars.
         """
         return _frame("polars", self.columns)
 

@@ -1,9 +1,10 @@
-"""The notebooks: cells as in their scripts, pictures inside, and they run to their end, which means that they assert."""
+"""The notebooks: cells as in their scripts without the checks, pictures inside, and the checks of every script hold."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SUBJECTS = (
     "molecule_to_spectrum", "isotopologues", "levels", "free_rotation", "equipartition", "classical", "fit", "structure",
     "stark", "alignment", "hard_cases", "accuracy", "rigid_steps", "spins_and_states", "view", "assign",
-    "internal_rotation", "locked_rotation",
+    "internal_rotation", "locked_rotation", "simulation",
 )  # fmt: skip
 
 
@@ -54,7 +55,12 @@ def test_the_notebook_is_its_script_executed(script):
     assert all(cell["execution_count"] for cell in notebook.cells if cell["cell_type"] == "code")  # executed
     assert path.stat().st_size < MAKE.MOST_BYTES
     text = path.read_text(encoding="utf-8")
-    assert "assert " in text or script.stem == "00_first_lesson"  # its claims are in test_first_lesson.py
+    code = [cell["source"] for cell in notebook.cells if cell["cell_type"] == "code"]
+    assert not [
+        source for source in code if re.search(r"^\s*assert ", source, re.MULTILINE)
+    ]  # checks stay in the script
+    assert "assert " in script.read_text(encoding="utf-8") or script.stem == "00_first_lesson"  # test_first_lesson.py
+    assert 10 <= len(notebook.cells) <= 20
     assert str(ROOT) not in text  # no path of a machine
     assert "ipykernel_" not in text
 
@@ -84,6 +90,21 @@ def test_a_notebook_with(what, tmp_path):
     script, reason = tmp_path / "01_short.py", CELLS[what][1]
     script.write_text(CELLS[what][0], encoding="utf-8")
     with pytest.raises(Exception, match=reason):
+        MAKE.executed(script)
+
+
+@needs_extra
+def test_checks_run_and_do_not_stand_in_the_notebook(tmp_path):
+    script = tmp_path / "01_short.py"
+    story = "import matplotlib.pyplot as plt\n\nplt.plot([1, 2])\nx = 2\n"
+    loop = "for i in (1, 2):\n    print(i)\n    assert i < 3\nfor i in (1, 2):\n    assert i < 3\n"
+    script.write_text(f"# %%\n{story}{loop}assert x == 2\n\n# %%\nassert x < 3\n", encoding="utf-8")
+    notebook, _ = MAKE.executed(script)
+    assert [cell["source"] for cell in notebook.cells] == [f"{story}for i in (1, 2):\n    print(i)"]
+    MAKE.write(script, notebook)
+    assert MAKE.agrees(script)
+    script.write_text(f"# %%\n{story}assert x == 3\n", encoding="utf-8")
+    with pytest.raises(Exception, match="AssertionError"):
         MAKE.executed(script)
 
 

@@ -111,7 +111,7 @@ class AlignmentTrace(Table):
 
     @property
     def error_estimate(self) -> float:
-        """Of the cosines: steps, leakage, rounded phases and what the ensemble leaves out.
+        """Error of the cosines from the steps, leakage, rounded phases and the states that the ensemble leaves out.
 
         The difference to half the steps, twice, bounds their error from order 1 on; the steps have order 4 only where they are short
         (two of 100 random cases exceeded 16/15 of the difference, by up to 42 %). What is left out counts as isotropic, while it moves no

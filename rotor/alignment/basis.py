@@ -65,7 +65,7 @@ def least_jmax(trace: AlignmentTrace, allowed: float) -> tuple[int, float]:
 
 
 def trace_with(trace: AlignmentTrace, jmax: int) -> AlignmentTrace:
-    """The same cosines with another J max, however small: `align` itself refuses one that is too small for its tolerance.
+    """Cosines recomputed with any J max; `align` itself refuses a J max too small for its tolerance.
 
     jmax: at least that of the populated levels.
     """

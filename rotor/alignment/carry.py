@@ -1,4 +1,4 @@
-"""One block of states carried through all windows of the pulses: what has to be known of it, and what comes out."""
+"""One block of states carried through all windows of the pulses: its task and its outcome."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Problem:
         return slice(first, max(first, int(np.searchsorted(self.times, window.stop_ps))))
 
     def populations(self, levels: FreeLevels) -> Floats:
-        """Of one state of each level (n,), made once for all blocks."""
+        """Population (n,) of one state of each level, computed once for all blocks."""
         if self.known.get("levels") is not levels:
             self.known.update(levels=levels, populations=self.ensemble.populations(levels))
         return np.asarray(self.known["populations"])
@@ -128,7 +128,7 @@ class GradientOf:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of a block: coherences by free stretch and cosine, samples by window and cosine, final populations, edge, norm."""
+    """Outcome of a block: coherences by free stretch and cosine, samples by window and cosine, final populations, edge, norm."""
 
     free: tuple[tuple[Coherences, ...], ...]
     samples: tuple[Floats, ...]
@@ -203,7 +203,7 @@ class _Snapshots(list[Complexes]):
         self._task, self._made = task, [np.zeros((len(task.cosines), 0))]
 
     def append(self, states: Complexes) -> None:
-        """Of states (times, n, m) only the cosines stay."""
+        """Keep the cosines of states (times, n, m) and drop the states."""
         self._made.append(
             np.array([observe.expectation(states, self._task.weights, cosine) for cosine in self._task.cosines])
         )
@@ -261,7 +261,7 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
 
 
 def _gradient(top: Top, contraction: Contraction) -> GradientOf:
-    """Of a contraction of an axial top; its tensors have no trace."""
+    """Gradient of a contraction of an axial top, whose tensors have no trace."""
     axis = 2 if top.kind == "oblate" else 0
     a, b, _ = top.rotational_constants_mhz
     body, space = contraction.body, contraction.space

@@ -1,7 +1,7 @@
 """The classical gas of the same top under the same pulses: bodies drawn at the temperature, moved by the Euler core.
 
 Units: ps, rad/ps for energies and ħ for angular momenta, so that I = ħ/(4π B) is 1/(2B) with B in rad/ps. While a pulse acts the
-bodies are stepped with its torque; between pulses their motion is exact. What the classical gas has not is revivals: it
+bodies are stepped with its torque; between pulses their motion is exact. The classical gas has no revivals: it
 dephases once, as the quantum one does at first, and keeps the mean that the pulse left.
 """
 

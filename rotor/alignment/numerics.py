@@ -59,7 +59,7 @@ def _classical(request: Any) -> Sweep:
 
 
 def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
-    """The loosest tolerance of those tried whose error as it is found by a run is what was asked for, and then the smallest J max.
+    """The loosest tolerance whose error, measured by a run, meets the accuracy, and then the smallest J max.
 
     A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """
@@ -93,7 +93,7 @@ def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> 
 
 
 def plan_of_align(request: Any) -> Plan:
-    """The plan of a gas under pulses: timed with a coarse tolerance, by whose fourth root the steps grow."""
+    """The plan of a gas under pulses: timed with a coarse tolerance; the number of steps grows with its fourth root."""
     coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
     trace = answer_align(coarse).trace
     seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25

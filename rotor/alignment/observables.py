@@ -169,7 +169,7 @@ class Pattern(NamedTuple):
 
 
 def pattern(matrix: Any, rows: Ints) -> Pattern:
-    """Of a matrix over states of the levels `rows`, dense or sparse."""
+    """Nonzero elements of a dense or sparse matrix over states of the levels `rows`."""
     if isinstance(matrix, np.ndarray):
         i, j = np.nonzero(matrix)
         above = i < j
@@ -183,7 +183,7 @@ def pattern(matrix: Any, rows: Ints) -> Pattern:
 
 
 def coherences(states: Complexes, weights: Floats, patterns: Sequence[Pattern]) -> tuple[Coherences, ...]:
-    """Of states in columns (n, m) over the free states with weights (m,), for each observable."""
+    """Coherences of weighted states, columns (n, m) over the free states with weights (m,), for each observable."""
     weighted = states.conj() * weights
     few = len(states) * 8 > sum(len(pattern.i) for pattern in patterns)
     density = None if few else weighted @ states.T  # Σ w c_i* c_j

@@ -118,7 +118,7 @@ class Grid:
         return 2 * self.steps_taken
 
     def refined(self, factor: int) -> Grid:
-        """The same stretches with `factor` times as many steps."""
+        """These stretches with `factor` times as many steps."""
         return Grid(self.starts, self.steps / factor, self.counts * factor, self.sampled)
 
 
@@ -226,7 +226,7 @@ class Decomposed:
     gradient: Floats | None = None
 
     def phases(self, areas: Floats, gradients: Floats | None) -> Complexes:
-        """Of kicks with `areas` (kicks,), and with those of the gradient, (kicks, n)."""
+        """Phase factors (kicks, n) of kicks with `areas` (kicks,) and with those of the gradient."""
         angles = np.multiply.outer(areas, self.values)
         if gradients is not None and self.gradient is not None:
             angles += np.multiply.outer(gradients, self.gradient)
@@ -237,7 +237,7 @@ class Decomposed:
 
 
 def decompose(matrix: Any) -> Decomposed:
-    """Of a Hermitian matrix, dense or sparse; LAPACK's tridiagonal solver where it has one band."""
+    """Eigenvalues and vectors of a dense or sparse Hermitian matrix; a matrix of one band goes to LAPACK's tridiagonal solver."""
     matrix = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
     size = len(matrix)
     if size > 2 and not np.iscomplexobj(matrix) and _is_tridiagonal(matrix):

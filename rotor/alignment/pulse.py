@@ -137,7 +137,7 @@ def elliptical(ratio: float) -> Axis:
 
 
 def checked_intensity(intensity: float) -> float:
-    """An intensity in W/cm² that a pulse can have; ValueError for one that is negative, not finite or beyond 1e17."""
+    """An intensity in W/cm² that a pulse can have; ValueError for a negative or infinite intensity and above 1e17 W/cm²."""
     if not (math.isfinite(intensity) and 0 <= intensity <= HIGHEST_W_PER_CM2):
         raise ValueError(
             f"intensity {intensity:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} W/cm² is expected; check the unit"

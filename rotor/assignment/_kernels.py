@@ -174,7 +174,7 @@ def _inside(a: float, b: float, c: float, bounds: Floats, margin: float, planar:
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _linear(difference: Floats, jj: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Of two frequencies as the first two lines of a family, at each κ: factors of ½(A+C), one over the determinant, of the third line."""
+    """Factors that give ½(A+C) and the third line of a family from its first two lines, at each κ, and 1/determinant."""
     determinant = jj[0] * difference[1] - jj[1] * difference[0]
     inverse = np.where(np.abs(determinant) < 1e-6, 0.0, 1 / np.where(determinant == 0.0, 1.0, determinant))
     mean_a, mean_b = difference[1] * inverse, -difference[0] * inverse

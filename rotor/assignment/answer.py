@@ -153,7 +153,7 @@ class AssignAnswer(TextOf):
 
     @property
     def word(self) -> str:
-        """Of the first species: certain, likely or not found."""
+        """How sure the first species is: certain, likely or not found."""
         return self.species[0].word if self.species else NOT_FOUND
 
     @property

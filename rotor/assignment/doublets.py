@@ -18,8 +18,8 @@ def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
 
     alone : of the single peaks only those that are in no doublet.
 
-    A centre has the summed intensity. Of two components with unequal shares it is not the centre of gravity, so that its standard error
-    gets a hundredth of the splitting.
+    A centre has the summed intensity. With unequal shares the centre is not the centre of gravity; its standard error then gets a
+    hundredth of the splitting.
     """
     f, height = peaks.frequency_mhz, peaks.intensity
     members = [np.column_stack([np.arange(len(f)), np.arange(len(f))])]

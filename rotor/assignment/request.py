@@ -122,7 +122,7 @@ class AssignRequest:
 
     @property
     def bounds(self) -> Bounds:
-        """Of A, B, C, those of the first guess where there is one."""
+        """Bounds of A, B, C: those of the first guess, or of the range without a guess."""
         if self.guess_mhz is None:
             return self._range
         centre = np.array(self.guess_mhz[:3])
@@ -130,7 +130,7 @@ class AssignRequest:
 
     @property
     def root_bounds(self) -> Bounds:
-        """Of the constants of roots: of three lines the rigid A of a near-prolate top may be some per cent off."""
+        """Bounds of the constants of roots: the rigid A that three lines of a near-prolate top give may be some per cent off."""
         if self.guess_mhz is None:
             return self._range
         margin = np.array(ROOT_MARGINS)

@@ -56,7 +56,7 @@ class Torque(ClassicalEffect, ABC):
         return 0.0
 
     def compiled_form(self) -> TorqueForm | None:
-        """The same torque for compiled integrators; None: they call `torque` at every step."""
+        """This torque for compiled integrators; with None they call `torque` at every step."""
         return None
 
 

@@ -330,7 +330,7 @@ def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _P
 
 
 def _side_by_side(flow: Flow, count: int, plan: _Plan) -> Growth:
-    """The same of segments side by side, each from its own point of one orbit."""
+    """Rates of segments side by side, each from its own point of one orbit."""
     d = flow.start.size
     starts = plan.transient + plan.length * np.arange(plan.segments)
     points = orbit(flow, starts, plan.tolerance)

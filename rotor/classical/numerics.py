@@ -112,9 +112,9 @@ def plan_of_motion(request: Any) -> Plan:
 
 
 def planned(scene: Any, request: Any, allowed: float) -> tuple[Plan, Choice | None]:
-    """The plan of a motion with the tolerance that its run takes, and that choice where the whole motion was searched.
+    """The plan of a motion with the tolerance of its run; also the choice, if the search made the whole motion.
 
-    Of a long motion that is found by its first part; the run then makes a motion a hundred times finer beside it, for the error.
+    The search makes only the first part of a long motion; the run then adds a motion a hundred times finer, for the error.
     """
     if isinstance(request, TumbleRequest):
         choice = choose(scene, request, allowed)

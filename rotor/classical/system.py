@@ -83,7 +83,7 @@ class System:
         return np.asarray(self._relative(time, momentum) * self.inverse(time))
 
     def stepping_omega(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
-        """The same with `acting_inverse`, so that rounding about the axis of a linear rotor does not stay."""
+        """Angular velocity by `acting_inverse`, which removes rounding about the axis of a linear rotor."""
         relative = self._relative(time, momentum)
         if not self.added:
             return np.asarray(relative * self.acting(time))

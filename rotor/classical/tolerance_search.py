@@ -1,12 +1,12 @@
-"""Accuracy of a driven motion: the loosest tolerance of its steps whose attitudes are within what was asked for.
+"""Accuracy of a driven motion: the loosest tolerance of its steps whose attitudes meet the accuracy.
 
-The error of a tolerance t is the largest difference of an attitude, at all times asked for, from motions of t/100, t/10⁴, ..., see
+The error of a tolerance t is the largest difference of an attitude, at all times of the request, from motions of t/100, t/10⁴, ..., see
 `rotor.classical.step_errors.error_by_finer`.
 
-The search makes some five motions. Of a long motion, the first part alone is searched, to the accuracy divided by how much the error will
-still grow: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The
-run then takes that tolerance and one finer motion beside it, which gives the error that is stated; only where that is more than what was
-asked for, a finer tolerance follows.
+The search makes about five motions. It makes only the first part of a long motion, to the accuracy divided by the expected growth of the
+error: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The run
+then takes that tolerance and one finer motion beside it, which gives the stated error; if that exceeds the accuracy, a finer tolerance
+follows.
 """
 
 from __future__ import annotations
@@ -87,14 +87,14 @@ class Planned:
 
     @property
     def tolerance(self) -> float:
-        """Of a step."""
+        """Tolerance of a step."""
         return tolerance_of(self.decade)
 
 
 def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
     """The loosest tolerance, in decades, that reaches an accuracy in radians, by the whole motion or, of a long one, by its first part.
 
-    The same for a plan and for a run. Raises ValueError where a knob is given too, and where double precision does not reach it.
+    A plan and a run choose the same. Raises ValueError where a knob is given too, and where double precision does not reach it.
     """
     from rotor.classical.driven import DEFAULT_TOLERANCE
 

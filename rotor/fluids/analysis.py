@@ -167,7 +167,7 @@ def yeh_hummer_correction(
 
     Parameters
     ----------
-    found : Diffusion
+    diffusion : Diffusion
         In the periodic cell.
     temperature_k : float
         Temperature.

@@ -49,11 +49,11 @@ class Body:
         return self.tensor + self.mass * _steiner(shift)
 
     def moved(self, shift: ArrayLike) -> Body:
-        """The same body elsewhere."""
+        """This body moved by a vector."""
         return Body(self.mass, self.centre + np.asarray(shift, dtype=float), self.tensor)
 
     def turned(self, rotation: ArrayLike) -> Body:
-        """The same body turned about the origin by a rotation matrix (3, 3)."""
+        """This body turned about the origin by a rotation matrix (3, 3)."""
         r = np.asarray(rotation, dtype=float)
         return Body(self.mass, r @ self.centre, r @ self.tensor @ r.T)
 
@@ -266,7 +266,7 @@ def _far(vectors: Floats, masses: Floats) -> list[Floats]:
 
 
 def _across(axis: Floats, positions: Floats, masses: Floats) -> list[Floats]:
-    """The same for the parts of the positions across an axis; any direction where all lie on it."""
+    """Principal directions of the positions projected across an axis; any direction where all lie on it."""
     across = positions - np.outer(positions @ axis, axis)
     spread = float((positions**2).sum(axis=1).max())
     if (across**2).sum(axis=1).max() > 1e-10 * spread:

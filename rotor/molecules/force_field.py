@@ -86,7 +86,7 @@ class ForceField:
         object.__setattr__(self, "hessian_ev_per_angstrom2", hessian)
 
     def with_isotopes(self, changes: Mapping[int | str, str] | str) -> ForceField:
-        """The same force field with other isotopes: in the approximation of Born and Oppenheimer it does not change."""
+        """This force field with other isotopes: in the approximation of Born and Oppenheimer it does not change."""
         return replace(self, molecule=self.molecule.with_isotopes(changes))
 
     def vibrations(self) -> Vibrations:

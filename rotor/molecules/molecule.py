@@ -138,7 +138,7 @@ class Molecule:
         return _hill(self.nuclei) + _charge_text(self.charge)
 
     def with_isotopes(self, changes: Mapping[int | str, str] | str) -> Molecule:
-        """The same geometry with other isotopes, in the same frame.
+        """This geometry with other isotopes, in the same frame.
 
         Parameters
         ----------

@@ -322,7 +322,7 @@ class Contribution:
 
 
 def contributions(fit: SourceFit) -> list[Contribution]:
-    """Of every component, what the others, fitted again without it, do not explain."""
+    """What each component explains that the others, fitted again without it, do not."""
     out = []
     for k, component in enumerate(fit.components):
         others = _without(fit, k)

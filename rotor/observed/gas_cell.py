@@ -48,7 +48,7 @@ class CellFit:
 
     @property
     def temperature_k(self) -> float:
-        """Of the gas."""
+        """Temperature of the gas."""
         return self.components[0].excitation_k
 
 

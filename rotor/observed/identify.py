@@ -97,7 +97,7 @@ class Identification(Table):
 
     @property
     def names(self) -> list[str]:
-        """Of the species, the one with most evidence first."""
+        """Names of the species, the one with most evidence first."""
         return [evidence.component.species.name for evidence in self.species]
 
     @property
@@ -238,7 +238,7 @@ class _Bank:
         return gain.reshape(shape), column.reshape(shape)
 
     def best(self, residual_k: Floats, sigma: Floats) -> tuple[Floats, list[Component]]:
-        """Of every candidate the gain at its best temperature, and a component that begins there."""
+        """The gain of every candidate at its best temperature, and a component that starts there."""
         gain, column = self.gains(residual_k, sigma)
         at = gain.argmax(axis=1)
         rows = np.arange(len(at))
@@ -288,7 +288,7 @@ class _Search:
         return np.asarray(np.hypot(self.spectrum.noise, self.choices.model_error * brightness_k))
 
     def guarded(self, brightness_k: Floats) -> Floats:
-        """The same, larger where the spectrum is far above the model: lines of unknown species do not draw the others to them."""
+        """Noise raised where the spectrum is far above the model, so that lines of unknown species do not attract the others."""
         above = (self.spectrum.intensity - brightness_k) / _GUARD
         return np.asarray(np.maximum(self.sigma(brightness_k), above))
 

@@ -98,7 +98,7 @@ def _source(file: str, geometry: str, fwhm_km_s: float) -> Any:
 def excited_lines(component: NonLteComponent, sight: Sight | None = None) -> ExcitedLines:
     """Excitation temperatures and optical depths of all lines of a component.
 
-    Raises ValueError for a file that cannot be read, a temperature beyond its rates, and a collider that it has not.
+    Raises ValueError for an unreadable file, a temperature beyond its rates, and a collider that the file lacks.
     """
     sight = sight or Sight()
     background = sight.background_k * (1 + sight.redshift)

@@ -12,13 +12,12 @@ from rotor import units
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, DipolePulse, Kick
 from rotor.arrays import Floats
-from rotor.plots.picture import GREY, checked_suffix, joined, new_figure, save_described, styled
-from rotor.plots.stark import COLOURS
+from rotor.plots.picture import GREY, PALETTE, checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (7.2, 4.6)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ$_{2D}$⟩"}
-NARROW = 1 / 300  # of the times shown: shorter pulses are drawn as a line at their middle
+NARROW = 1 / 100  # of the times shown: shorter pulses are drawn as a line at their middle
 PER_TW = 1e12  # W/cm²
 
 
@@ -107,7 +106,7 @@ def _scale(trace: AlignmentTrace) -> tuple[str, float | None]:
 
 def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) -> None:
     for place, (name, values) in enumerate(trace.cosines.items()):
-        colour = COLOURS[place % len(COLOURS)]
+        colour = PALETTE[place % len(PALETTE)]
         axes.plot(trace.t_ps, values, color=colour, linewidth=1.0, label=NAMES.get(name, name))
         if name in classical:
             label = f"{NAMES.get(name, name)}, classical"

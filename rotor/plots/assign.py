@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.plots.picture import GREY, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import GREY, PALETTE, checked_suffix, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
-
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito, for all kinds of sight
 
 
 def plot_assignment(
@@ -52,7 +50,7 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         peaks = answer.request.peaks
         upper.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
         for number, species in enumerate(answer.species):
-            colour = COLOURS[number % len(COLOURS)]
+            colour = PALETTE[number % len(PALETTE)]
             f, height = predicted_sticks(species, peaks.band_mhz)
             upper.vlines(f, -height, 0, color=colour, lw=0.7, label=_label(species))
             rows = np.unique(species.peak)
@@ -64,7 +62,7 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         lower.set_ylabel("Unexplained")
         lower.set_xlabel("Frequency (MHz)")
         upper.set_title(title, loc="left")
-        upper.legend(frameon=False, fontsize=7, loc="upper left")
+        figure.legend(*upper.get_legend_handles_labels(), fontsize=7, loc="outside lower right", ncols=2)
         show_part(upper, view)
         if view.horizontal is not None:
             lower.set_xlim(*view.horizontal)

@@ -39,7 +39,7 @@ def plot_comparison(
 
     Parameters
     ----------
-    found : Comparison
+    comparison : Comparison
         What is drawn, see `comparison_figure`.
     path : path
         A .png, .pdf or .svg file.
@@ -68,7 +68,7 @@ def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "
 
     Parameters
     ----------
-    found : Comparison
+    comparison : Comparison
         The reference is drawn upwards, the other list downwards, each by log10 of intensity; lines of one list alone in a
         colour of their own.
     names : (2,) strings

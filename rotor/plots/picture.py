@@ -14,12 +14,14 @@ from rotor.tops.top import Top
 from rotor.version import version
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#555555"  # Okabe and Ito's palette, for the colour-blind
-PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.labelsize": 9.0,
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
+    "figure.labelsize": 9.0,
+    "figure.titlesize": 10.0,
     "axes.prop_cycle": f"cycler('color', {list(PALETTE)})",
     "axes.spines.top": False,
     "axes.spines.right": False,

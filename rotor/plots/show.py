@@ -1,4 +1,4 @@
-"""`rotor.plot`: a matplotlib figure of whatever the package computes, for notebooks; or a picture in a file."""
+"""`rotor.plot`: a matplotlib figure of every result of the package, for notebooks; or a picture in a file."""
 
 from __future__ import annotations
 

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.plots.picture import GREY, checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.picture import GREY, PALETTE, checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 SIZE_INCHES = (7.2, 6.4)
 LEAST_DRAWN = 1e-4  # of the strongest line
 MOST_LABELS = 40  # on an axis of energies: the height of a name is a fortieth of it
@@ -126,7 +125,7 @@ def _curves(field_map: FieldMap, view: View) -> list[Ints]:
 
 
 def _colour(m: float) -> str:
-    return COLOURS[int(m) % len(COLOURS)] if m >= 0 else COLOURS[0]
+    return PALETTE[int(m) % len(PALETTE)] if m >= 0 else PALETTE[0]
 
 
 def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]]) -> None:

@@ -119,7 +119,7 @@ def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floa
 
 
 def _radius(symbol: str) -> float:
-    """Of the circle of an atom, Å."""
+    """Radius of the circle of an atom, Å."""
     from ase.data import atomic_numbers, covalent_radii
 
     return float(0.42 * covalent_radii[atomic_numbers[symbol]])

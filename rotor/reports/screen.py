@@ -79,7 +79,7 @@ def show_facts(facts: Iterable[tuple[str, str]]) -> None:
 
 
 def plain(thing: Any) -> Any:
-    """The same content in JSON's types: arrays as lists, numbers that are not finite as None."""
+    """This content in the types of JSON: arrays as lists, numbers that are not finite as None."""
     if isinstance(thing, Mapping):
         return {str(key): plain(value) for key, value in thing.items()}
     if hasattr(thing, "tolist"):

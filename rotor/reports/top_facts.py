@@ -133,7 +133,7 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
 
 
 def dipole_text(top: Top) -> str:
-    """The dipole of a top; of one that was estimated the first decimal, which its error of 0.2 D leaves."""
+    """The dipole of a top; an estimated dipole has one decimal, since its error is 0.2 D."""
     vector = top.dipole_abc_debye
     if vector is None or not top.dipole_source.startswith("estimate"):
         return vector_text(vector)

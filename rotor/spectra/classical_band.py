@@ -249,7 +249,7 @@ def compare_bands(ours: Spectrum, theirs: Spectrum) -> BandComparison:
 
 
 def rigid(top: Top) -> Top:
-    """The same top without distortion constants: the one that a classical gas of rigid bodies can be compared with."""
+    """This top without distortion constants, which a classical gas of rigid bodies can be compared with."""
     named: dict[str, Any] = {name: top.constants[name] for name in "ABC" if name in top.constants.values}
     return top.with_constants(Constants(**named, kind=top.kind), f"{top.source}, distortion left out")
 

@@ -47,7 +47,7 @@ class LinesAtRest(Protocol):
 
     @property
     def temperature_k(self) -> float:
-        """Of the levels."""
+        """Excitation temperature of the levels."""
 
     @property
     def frequency_mhz(self) -> Floats:

@@ -51,7 +51,7 @@ class CatalogueLines(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the molecule."""
+        """Name of the molecule."""
 
     @property
     def source(self) -> str:

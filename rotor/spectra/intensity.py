@@ -135,7 +135,7 @@ def largest(values: Floats, count: int) -> Ints:
 
 @dataclass(frozen=True)
 class IntensityCut:
-    """What an intensity needs besides frequency and strength, and the least one that counts.
+    """Temperature, partition function and populations behind an intensity, and the weakest intensity that counts.
 
     population: (levels,) intensity per MHz and D² of a line from each state, the photon factor apart. kt_mhz: kT/h.
     """
@@ -146,7 +146,7 @@ class IntensityCut:
 
     @property
     def needed(self) -> Floats:
-        """ν S in MHz D², (levels,), below which a line with this lower state is too weak, whatever its photon factor."""
+        """ν S in MHz D², (levels,), below which a line with this lower state is too weak at any photon factor."""
         if not self.least:
             return np.zeros(len(self.population))
         with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut

@@ -212,7 +212,7 @@ class Lines(TransitionTable):
         )
 
     def sorted(self) -> Lines:
-        """The same lines, rising in frequency."""
+        """These lines, rising in frequency."""
         if (self.frequency_mhz[1:] >= self.frequency_mhz[:-1]).all():
             return self
         return self.where(rising_order(self.frequency_mhz))

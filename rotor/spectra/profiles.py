@@ -82,7 +82,7 @@ def gaussian_reach(fwhm: ArrayLike, outside: float) -> Floats:
 
 
 def lorentzian_reach(fwhm: ArrayLike, outside: float) -> Floats:
-    """The same for a Lorentzian: (w/2) cot(π outside/2), about w/(π outside).
+    """Reach of a Lorentzian: (w/2) cot(π outside/2), about w/(π outside).
 
     >>> round(float(lorentzian_reach(2.0, 0.5)), 12)  # half of it lies beyond its half width
     1.0

@@ -5,7 +5,7 @@ S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = 
 the elastic term f = i among them, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
 209 (1933). Sums over M', M and p leave the squares of the reduced elements in `quantum.tensors`.
 
-Of levels with spins the polarizability touches none, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the
+The polarizability does not act on spins, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the
 element by
 
     ⟨F₁' (N' I)‖T²‖F₁ (N I)⟩ = (-1)^(N'+I+F₁+2) √((2F₁'+1)(2F₁+1)) {N' F₁' I; F₁ N 2} ⟨N'‖T²‖N⟩
@@ -72,8 +72,7 @@ def raman_transitions(
     1, 2 for an asymmetric top, between species of (Ka, Kc) parity that the tensor's elements connect (the same species
     for the diagonal ones); none for a spherical top. Levels must start at J = 0. spin_weights: those of the levels. With spins
     rules are those of N, and of every sum with a spin likewise.
-    Raises ValueError for a spherical top whose tensor is anisotropic, and for one that is not axial with spin weights by
-    K, which need an axis.
+    Raises ValueError for a spherical top with an anisotropic tensor, and for a tensor without an axis beside spin weights by K.
     """
     tensor = np.asarray(polarizability_abc, dtype=float)
     if levels.kind == "spherical":
@@ -181,7 +180,7 @@ def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTrans
 def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, representation: str) -> RamanTransitions:
     """Between Wang functions, which the states are whose K pairs have one weight each; one line for a pair of rows.
 
-    Of K = 1 both functions of a pair have different strengths, α_20 and α_2±2 adding up in one and not in the other.
+    Both functions of a K = 1 pair have different strengths: α_20 and α_2±2 add up in one and not in the other.
     """
     anisotropic = body_tensor(tensor, 2, representation)
     blocks = [

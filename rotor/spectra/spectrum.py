@@ -214,7 +214,7 @@ def _ends(lines: Lines, reach: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Shape:
-    """The widths of a Gaussian and a Lorentzian part for every line, (lines,) arrays; None for a part that is not there."""
+    """The widths of a Gaussian and a Lorentzian part for every line, (lines,) arrays; None for a missing part."""
 
     gaussian: Floats | None
     lorentzian: Floats | None

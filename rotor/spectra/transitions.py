@@ -210,7 +210,7 @@ def _many_f_transitions(
     levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
-    """The same of levels with spins that were solved for many F at once, and are looked at so; None for others."""
+    """All transitions of levels with spins that were solved for many F at once; None for other levels."""
     if not blocks or isinstance(blocks[0], SolvedBlock):
         return None
     from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
@@ -268,7 +268,7 @@ def _with_frequencies(
     levels: Levels, first: Indices, second: Indices, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip
-    """Lines between rows of levels, in whatever order of both, those that are in the range and reach the cut."""
+    """Lines between rows of levels, in any order of the two, that lie in the range and reach the cut."""
     difference = levels.energy_mhz[first] - levels.energy_mhz[second]
     return _in_order_of_energy(first, second, difference, strength, range_mhz, cut)
 

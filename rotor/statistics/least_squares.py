@@ -1,6 +1,6 @@
 """Nonlinear least squares by Levenberg and Marquardt, in scaled variables, which says how it ended.
 
-Of residuals r(p) = (observed - calculated)/σ and the Jacobian J = ∂(calculated/σ)/∂p the step δ minimises
+With residuals r(p) = (observed - calculated)/σ and the Jacobian J = ∂(calculated/σ)/∂p, the step δ minimises
 
     |J δ - r|² + λ |D δ|²,       D the norms of the columns of J,
 
@@ -240,8 +240,8 @@ def _without_decrease(
 def _are_smooth(refused: Sequence[tuple[float, float]], noise: float) -> bool:
     """Whether what the linear model did not foresee of steps falls with their square: lengths and |r(p + δ) - r + J δ| of each.
 
-    Where levels exchange their names it falls with their length, or not at all. Then χ² bends upwards on one side alone, and a point
-    where no step leads on is no minimum. What is below `noise` says nothing.
+    Where levels exchange their names it falls with their length, or not at all. Then χ² bends upwards on one side alone, and a point where
+    no step is accepted is no minimum. Values below `noise` are ignored.
     """
     known = sorted((length, off) for length, off in refused if off > noise)
     longer = [(length, off) for length, off in known if length > 3 * known[0][0]]

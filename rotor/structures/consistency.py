@@ -92,9 +92,9 @@ class Without:
 
 
 def without_each(family: Family, fitted: FittedStructure, refit: Callable[[Family], FittedStructure]) -> list[Without]:
-    """The fit without each isotopologue but the parent, the one that gains most first; those that the others need are left out.
+    """The fit without each isotopologue but the parent, sorted by the gain; those that the others need are left out.
 
-    Of k moments fewer F = ((χ₀² - χ₁²)/k)/(χ₁²/f₁) follows Fisher's distribution with k and f₁ where the isotopologue is like
+    With k moments fewer, F = ((χ₀² - χ₁²)/k)/(χ₁²/f₁) follows Fisher's distribution with k and f₁ where the isotopologue is like
     the others; the chance is that times the number of isotopologues (Bonferroni).
     """
     from scipy.special import fdtrc

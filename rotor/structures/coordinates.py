@@ -1,9 +1,9 @@
 """Bonds and angles by name, and moves of the atoms that keep the symmetry of a molecule.
 
-A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
-every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group whatever is
-fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_asked - q(x)), B the matrix of Wilson; what the
-names leave open moves as little as it can (the pseudo-inverse).
+A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that every
+operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group in every fit. Named coordinates
+q(x) are set by Newton's method, S δu = S (B S)⁺ (q_asked - q(x)), B the matrix of Wilson; what the names leave open moves as little as it
+can (the pseudo-inverse).
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _without_isotopes(molecule: Molecule) -> Molecule:
 def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
     """A coordinate of a molecule with those that symmetry makes equal to it.
 
-    Raises ValueError for other than 2, 3 or 4 different atoms, atoms that are not there, and a straight angle, which has no
+    Raises ValueError for other than 2, 3 or 4 different atoms, numbers of missing atoms, and a straight angle, which has no
     derivative: leave it out, symmetry or the geometry fixes it.
     """
     chosen, count = tuple(int(atom) for atom in atoms), len(molecule.symbols)

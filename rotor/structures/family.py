@@ -50,7 +50,7 @@ class Species:
 
     @property
     def equilibrium_moments(self) -> Floats:
-        """The same of B_0 + correction, nan where there is no correction."""
+        """Moments from B_0 + correction, nan without a correction."""
         both = {
             name: value + self.corrections_mhz[name]
             for name, value in self.constants_mhz.items()

@@ -220,7 +220,7 @@ def _interlaced(p: Floats, changed: Floats, mu: float) -> Floats:
 
 
 def _in_plane(moments: Floats, pair: str) -> Floats:
-    """P_a = I_b and P_b = I_a of a planar molecule, the one that is left out from I_c = I_a + I_b."""
+    """P_a = I_b and P_b = I_a of a planar molecule, the missing moment from I_c = I_a + I_b."""
     a, b, c = moments
     if pair == "ac":
         b = c - a

@@ -172,7 +172,7 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
 
 
 def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights]:
-    """The spin weights of each state, its own where it has some, without the classes that a species has not."""
+    """The spin weights of each state (its own, or those of the top) without the classes that the species lacks."""
     whole = weights or top.spin_weights
     if top.states is None:
         return [whole]

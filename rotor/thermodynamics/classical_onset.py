@@ -58,7 +58,7 @@ def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
 
 
 def _rigid(top: Top) -> Top:
-    """The same top without distortion."""
+    """This top without distortion."""
     from rotor.tops.top import Top, constants_of_moments
 
     constants = constants_of_moments(top.moments_u_angstrom2, top.kind)

@@ -1,7 +1,7 @@
 """Thermodynamic functions of a gas of tops: rotation by the quantum sum and classically, vibration, and the ideal gas.
 
-Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest level that
-exists in the molecule, whatever its species, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
+Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest existing
+level of the molecule, for all species, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
 
 Species that are frozen in a ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), whose last
 part is the entropy of mixing. `normal` is the ratio of high temperature, where species are as frequent as their spin
@@ -340,7 +340,7 @@ def _with_vibration(rotation: ThermoFunctions, vibrations: VibrationalStates | N
 
 
 def _with_gas(functions: ThermoFunctions, pressure_bar: float, electronic: ElectronicStates) -> ThermoFunctions:
-    """The same with the functions of the ideal gas at a pressure."""
+    """The functions of rotation with those of the ideal gas at a pressure."""
     if not (math.isfinite(pressure_bar) and pressure_bar > 0):
         raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
     if functions.top.mass_u is None:

@@ -7,7 +7,7 @@
 | C1 and C2 at each time, "2 %" or 0.02 | z s/√N, s of a small gas | from the spread in the run |
 
 The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
-kurtosis κ = 12/f. Of N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
+kurtosis κ = 12/f. For N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
 two-sided quantile of the confidence of the scene. What a gas of rigid classical molecules leaves out are parts of Q: a/T and d T of ln Q
 (`rotor.thermodynamics.classical_limit`).
 """

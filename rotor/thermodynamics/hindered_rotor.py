@@ -46,7 +46,7 @@ class LogPartition:
     cv: Floats
 
     def times(self, other: LogPartition, sign: float = 1.0) -> LogPartition:
-        """Of a product of partition functions, or with sign -1 of a ratio."""
+        """Sum of logarithms: of a product of partition functions, or with sign -1 of a ratio."""
         return LogPartition(self.ln_q + sign * other.ln_q, self.u + sign * other.u, self.cv + sign * other.cv)
 
 

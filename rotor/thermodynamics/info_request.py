@@ -1,4 +1,4 @@
-"""A request for what a molecule is as a top, and what answers it: sizes of effects, Q(T), conformers."""
+"""The request for the facts of a molecule as a top, and its answer: sizes of effects, Q(T), conformers."""
 
 from __future__ import annotations
 

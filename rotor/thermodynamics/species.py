@@ -63,7 +63,7 @@ def _only(weights: SpinWeights, names: tuple[str, ...]) -> SpinWeights:
 
 
 def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
-    """The weights of a state, all classes weighing 0 that a species of the molecule has not.
+    """The weights of a state, 0 for classes that the species of the molecule lacks.
 
     >>> state = SpinWeights.from_mapping({"0even": 0, "0odd": 4, "1": 1, "2": 1})
     >>> of_species(state, SpinWeights("K", ("0", "1", "2"), (0, 1, 1))).values

@@ -1,11 +1,10 @@
-"""Which levels of an effective Hamiltonian are energies of a molecule, and what stands for the others in a sum.
+"""Which levels of an effective Hamiltonian are energies of a molecule, and what replaces the others in a sum.
 
-Distortion constants serve up to some J and K; beyond, their polynomial bends down and makes levels that no molecule has.
-A level is not trusted whose energy is less than 0.6 or more than 2 of the rigid one; of a J with one that is too low, whose
-label has passed to others, no level is. For these stand the levels of the same top with quartic distortion alone, and where
-they fail by the same rule, rigid ones with quartic distortion to first order; how far distortion might bring them down
-further is taken as its quartic part once more. Rigid levels are solved only where their estimate, A Ka² + C Kc² +
-B (J(J+1) - Ka² - Kc²), is missed.
+Distortion constants serve up to some J and K; beyond, their polynomial bends down and makes levels that no molecule has. A level is not
+trusted if its energy is less than 0.6 or more than 2 times the rigid one. If a level of a J is too low, its label has passed to others,
+and no level of that J is trusted. These levels are replaced by those of the same top with quartic distortion alone, and where they fail by
+the same rule, rigid ones with quartic distortion to first order; how far distortion might bring them down further is taken as its quartic
+part once more. Rigid levels are solved only where their estimate, A Ka² + C Kc² + B (J(J+1) - Ka² - Kc²), is missed.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ def _j_squared(levels: Levels) -> Floats:
 
 
 def _squared_labels(top: Top, levels: Levels) -> tuple[Floats, Floats]:
-    """Ka² and Kc² of every level, (n,) each; 0 for what a kind of top has not."""
+    """Ka² and Kc² of every level, (n,) each; 0 for a number that the kind of top lacks."""
     quanta, none = levels.quanta, np.zeros(len(levels))
     if "kc" in quanta:
         return quanta["ka"] ** 2.0, quanta["kc"] ** 2.0

@@ -301,7 +301,7 @@ def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float])
 
 
 def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]) -> None:
-    """ValueError for a name that this kind of top has not; typed: every name as it was typed."""
+    """ValueError for a name that this kind of top lacks; typed: every name as it was typed."""
     allowed = vocabulary(kind, reduction)
     for name in typed:
         if powers := powers_of_spelled(name):

@@ -19,7 +19,7 @@ class Covariance:
     """Covariance of some constants of a set.
 
     names: which. matrix_mhz2: (n, n), symmetric, MHz². Constants that are not named are taken as exact.
-    Raises ValueError for names given twice, a matrix of another shape, and one that is no covariance.
+    Raises ValueError for names given twice, a matrix of another shape, and a matrix that is no covariance.
     """
 
     names: tuple[str, ...]

@@ -44,7 +44,7 @@ class Cylindrical:
 def tau_mhz(field: ForceField) -> Floats:
     """Wilson's τ (3, 3, 3, 3) in MHz along the principal axes a, b, c.
 
-    Of a linear molecule the components along a are 0: there is no J_a to stretch it.
+    For a linear molecule the components along a are 0: there is no J_a to stretch it.
     """
     top = Top.from_molecule(field.molecule)
     change = _constants_by_modes(field, top)

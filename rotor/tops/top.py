@@ -303,7 +303,7 @@ class Top:
 
     @property
     def rotational_constants_mhz(self) -> tuple[float, float, float]:
-        """A, B, C in MHz, whatever the kind; A of a linear top is infinite."""
+        """A, B, C in MHz for every kind of top; A of a linear top is infinite."""
         return self.constants.rigid
 
     @property
@@ -331,7 +331,7 @@ class Top:
         return c - a - b
 
     def with_symmetry_within(self, displacement_angstrom: float) -> Top:
-        """The same geometry with the symmetry that its nuclei miss by up to so much: kind, spin weights and axes follow.
+        """A top with the symmetry that its nuclei miss by at most this much: kind, spin weights and axes follow.
 
         A nucleus that is off by so much has images twice as far from each other. Raises ValueError for a top without geometry
         or with constants of its own, and for a displacement of more than a tenth of the shortest distance between nuclei.
@@ -351,38 +351,38 @@ class Top:
         return Top.from_molecule(self.molecule, symmetry_within=2.1 * displacement_angstrom / shortest)
 
     def with_constants(self, constants: Constants, source: str = "") -> Top:
-        """The same top with other constants, and without the covariance, the level energies and the further states of its own."""
+        """This top with other constants, without its covariance, level energies and further states."""
         return replace(
             self, constants=constants, source=source or self.source, covariance=None, level_table=None, states=None,
             internal_rotation=None,
         )  # fmt: skip
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
-        """The same top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""
+        """This top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""
         dipole = dipole_vector(dipole_abc_debye)
         states = self.states.with_dipole(self.dipole_abc_debye, dipole) if self.states and dipole else self.states
         return replace(self, dipole_abc_debye=dipole, dipole_source=source, states=states)
 
     def with_polarizability(self, polarizability_abc_angstrom3: ArrayLike, source: str) -> Top:
-        """The same top with another polarizability (3, 3) in principal axes, Å³."""
+        """This top with another polarizability (3, 3) in principal axes, Å³."""
         tensor = symmetric_tensor(polarizability_abc_angstrom3)
         return replace(self, polarizability_abc_angstrom3=tensor, polarizability_source=source)
 
     def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
-        """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
+        """This top with a dipole given in the frame of its geometry; components that symmetry forbids are left out."""
         if self.frame is None or self.symmetry is None:
             raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
         allowed = invariant_vector(np.asarray(dipole_debye, dtype=float), self.symmetry)
         return replace(self, dipole_abc_debye=in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
-        """The same top with other spin weights, which serve all of its states."""
+        """This top with other spin weights, for all its states."""
         states = replace(self.states, weights={}) if self.states else None
         return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source, states=states)
 
 
 def _near_notes(symmetry: Symmetry) -> list[str]:
-    """What is to be said where nuclei miss a higher symmetry by so little that noise may be the reason."""
+    """Notes where nuclei miss a higher symmetry by so little that noise may be the reason."""
     near = symmetry.near
     if near is None or near.displacement_angstrom > NOISE_ANGSTROM:
         return []

@@ -270,7 +270,7 @@ def constants_in(message: Message) -> dict[str, float]:
 
 
 def free(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:
-    """Which constants a refit varies; one that the species lacks is added at 0."""
+    """Which constants a refit varies; a constant that the species lacks is added at 0."""
     number, species = species_of(state, message)
     names = message.get("free")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):

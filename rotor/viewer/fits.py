@@ -162,7 +162,7 @@ def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str,
 
 
 def _differences(assigned: Assignments, upper: Any, lower: Any, labels: Any, energy: Any) -> list[dict[str, Any]]:
-    """Pairs of unblended lines with a level in common: what they measure, what is calculated."""
+    """Pairs of unblended lines with a level in common: measured and calculated values."""
     out = list[dict[str, Any]]()
     counts, single = ~assigned.is_excluded, ~assigned.blended
     for shared, other, sign in ((upper, lower, -1.0), (lower, upper, 1.0)):

@@ -148,7 +148,7 @@ def _session_beside(path: Path) -> Path:
 
 
 def _fill(service: Service, molecules: Sequence[str], lines: str | None, temperature_k: float, note: Note) -> None:
-    """Put in the molecules that are not there yet, and assigned lines."""
+    """Add the missing molecules, and assigned lines."""
     session = service.session
     for source in molecules:
         if any(species.source == service.predictions.stored(source) for species in session.state.species.values()):

@@ -140,7 +140,7 @@ class Model:
 
     @property
     def effects(self) -> tuple[Any, ...]:
-        """Of the Hamiltonian."""
+        """Effects of the Hamiltonian."""
         return self.constants.effects if isinstance(self.constants, TopConstants) else tuple(SEMI_RIGID)
 
     def calculated_mhz(self, upper: Ints, lower: Ints) -> Floats:
@@ -315,7 +315,7 @@ def _key(record: Species, temperature: bool = True) -> bytes:
 
 
 def _remembered(memory: OrderedDict[bytes, T], key: bytes, make: Callable[[], T]) -> T:
-    """The value of a key, made where it is not there; the oldest one leaves."""
+    """The value of a key, computed at its first use; the oldest one leaves."""
     if key not in memory:
         memory[key] = make()
         if len(memory) > REMEMBERED:

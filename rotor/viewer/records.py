@@ -116,7 +116,7 @@ Changes = Mapping[str, Record | None]
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One action: what it is called, and the records that it changed, before and after; None for one that is not there."""
+    """One action: what it is called, and the records that it changed, before and after; None for a missing record."""
 
     label: str
     before: dict[str, Record | None]

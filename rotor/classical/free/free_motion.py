@@ -1,6 +1,6 @@
 """The exact torque-free motion of any rigid body: momentum and attitude at any time, without stepping.
 
-The formulas stand at the head of `theta.py`. Here: what goes in, what comes out, and how exact it is.
+The formulas stand at the head of `theta.py`. Here: input, output and accuracy.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def separatrix_ratio(moments: ArrayLike) -> Floats:
 
 
 def precession_rates(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats, Floats]:
-    """Of a symmetric top (I, I, I3) with L (..., 3) in the body: rate in the body (I3/I - 1) ω3, rate in space |L|/I.
+    """Precession rates of a symmetric top (I, I, I3) with L (..., 3) in the body: (I3/I - 1) ω3 in the body, |L|/I in space.
 
     The first, with its sign, is the rate at which L and ω turn about the third axis as the body sees them (Landau and
     Lifshitz, equation 36.6), the second that of the axis about L in space (section 33).

@@ -77,7 +77,7 @@ def add_stepped(
     beta: Floats,
     sums: Floats,
 ) -> None:
-    """The same four sums for bodies (n, 3) that start upright, `steps` steps of `_kernels.py` between two times.
+    """The four sums of `add_bodies` for bodies (n, 3) that start upright, `steps` steps of `_kernels.py` between two times.
 
     rates (3,), turn (4,): those of `_kernels.py`; vector, axes: in its frame, turned by `turn`. A block is followed through all
     times before the next one. Behind its six runs stand q from the frame of L to space, and cosine and sine of half the turn

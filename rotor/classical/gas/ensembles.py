@@ -63,7 +63,7 @@ class Ensemble:
         return kinetic_degrees(masses=masses, velocities=self.velocity, moments=moments, momenta=self.momentum)
 
     def moved(self, time: float) -> Ensemble:
-        """The same molecules a time later, by the exact free motion; an atom only flies on."""
+        """These molecules a time later, by the exact free motion; an atom only flies on."""
         if not rotating_axes(self.moments).any():
             return self
         momentum, attitude = np.empty_like(self.momentum), np.empty_like(self.attitude)
@@ -288,7 +288,7 @@ def stepped_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """The same at times 0, interval, ... by steps of the splitting of `strang.py`.
+    """Correlation functions at times 0, interval, ... by steps of the splitting of `strang.py`.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def off_intermediate_axis(moments: ArrayLike, momentum: float, tilt_rad: float) 
     """L (3,) of one body, of length `momentum`, tipped by `tilt_rad` off its axis of intermediate moment.
 
     It is tipped half way between the other two axes; in a linear rotor, which has no L along its own, to the third.
-    Where two moments coincide, the one that stands second after sorting (first come, first) counts as intermediate.
+    Where two moments coincide, the second after a stable sort counts as intermediate.
 
     >>> off_intermediate_axis([3.0, 1.0, 2.0], 10.0, math.radians(0.5)).round(4)
     array([0.0617, 0.0617, 9.9996])

@@ -55,7 +55,7 @@ def _inner_turn(row: Floats, time: float) -> None:
 
 @njit(cache=True, fastmath=FINITE, error_model="numpy")
 def _outer_turn(row: Floats, time: float) -> None:
-    """The same about the first axis."""
+    """Turns of all bodies about the first axis."""
     for i in range(LANES):
         half = 0.5 * time * row[OUTER + i] * row[i]
         s, c = sine_cosine(half)

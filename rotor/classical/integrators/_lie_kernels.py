@@ -61,7 +61,7 @@ def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out:
 def _rolling_rate(
     forms: Any, inverse: Floats, time: float, state: Any, change: Any, out: Any, stage: int, i: int
 ) -> None:
-    """The same of a body that rolls; forms: the parameters of its contacts beside those of `_rate`."""
+    """Rates of a body that rolls; forms: the parameters of its contacts beside those of `_rate`."""
     rolling, (codes, parameters, inner) = forms
     u = (change[i, 3], change[i, 4], change[i, 5])
     cosine, half_sinc, factor = turn_of(u)

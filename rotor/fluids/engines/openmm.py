@@ -312,7 +312,7 @@ def session(
 
 
 def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int) -> Any:
-    """A context; where the choice of the platform is left to OpenMM and it is not the CPU, it finds one that works."""
+    """A context; where OpenMM chooses the platform and it is not the CPU, the first platform that works is taken."""
     known = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
     chosen = platform or max(known, key=lambda candidate: float(candidate.getSpeed())).getName()
     if chosen == "CPU":

@@ -82,7 +82,7 @@ def _sum_charges(block: Floats) -> Any:
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _turn_and_sum(block: Floats, sign: float) -> Any:
-    """The same one wave vector further, phases times e^{±i 2π z/L}."""
+    """Turn the phases by e^{±i 2π z/L} to the next wave vector and sum."""
     real, imaginary = 0.0, 0.0
     for k in range(LANES):
         c, s = block[NOW_C * LANES + k], block[NOW_S * LANES + k]
@@ -103,7 +103,7 @@ def _push(block: Floats, real: float, imaginary: float) -> None:
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _turn_and_push(block: Floats, sign: float, real: float, imaginary: float, kz: float) -> None:
-    """The same one wave vector further, and its multiple by kz."""
+    """Turn the phases to the next wave vector and add its forces, and those times kz."""
     for k in range(LANES):
         c, s = block[NOW_C * LANES + k], block[NOW_S * LANES + k]
         tc, ts = block[TURN_C * LANES + k], sign * block[TURN_S * LANES + k]

@@ -40,7 +40,7 @@ def _sorted_into_bins(centres: Floats, low: Floats, width: Floats, bins: Integer
 
 @njit(cache=True)
 def _longer(array: Any, more: int) -> Any:
-    """The same numbers with space for more behind them."""
+    """A copy of the list with free space at its end."""
     out = np.empty(len(array) + more, dtype=array.dtype)
     for i in range(len(array)):
         out[i] = array[i]

@@ -21,7 +21,7 @@ def spreading_weights(model: RigidModel) -> Floats:
     """Each site as a linear combination of the real atoms, (sites, atoms); rows add to 1.
 
     r_site = Σ w r_atom places the site, f_atom = w f_site carries its force: Σ w = 1 keeps the force, Σ w r_atom = r_site the
-    torque. Of many solutions the shortest. A site that no combination reaches (off the line of a linear molecule) is an error.
+    torque. Among many solutions the shortest is taken. A site that no combination reaches (off the line of a linear molecule) is an error.
     """
     places, real = model.positions_angstrom, len(model.symbols)
     equations = np.vstack((places[:real].T, np.ones(real)))
@@ -107,7 +107,7 @@ class Assembly:
         return np.asarray(steps + np.repeat(self.first_site[:-1], np.diff(self.first_atom)))
 
     def check_geometry(self, sites_angstrom: Floats) -> None:
-        """A ValueError where a molecule has not the distances of its model."""
+        """Raise ValueError if the distances in a molecule differ from those of its model."""
         for kind, model in enumerate(self.models):
             first = self.first_site[:-1][self.kinds == kind]
             real = model.positions_angstrom[: self.atoms[kind]]

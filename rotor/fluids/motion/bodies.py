@@ -101,7 +101,7 @@ class Bodies:
     def wrench(self, vectors: Floats, attitude: Floats) -> tuple[Floats, Floats]:
         """Sum (n, 3) in space, and sum of s x v (n, 3) in body axes, of vectors (atoms, 3) on the atoms.
 
-        Of forces it is force and torque; of momenta of a rigid motion, momentum and angular momentum.
+        For forces these are force and torque; for momenta of a rigid motion, momentum and angular momentum.
         """
         from rotor.fluids.motion._body_kernels import wrench
 

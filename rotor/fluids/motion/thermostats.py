@@ -3,7 +3,7 @@
 Acting between two half drifts, on the momenta of the half step, leaves the positions with a smaller error than acting at
 the ends of the step: for a harmonic libration with none (B. Leimkuhler and C. Matthews, J. Chem. Phys. 138, 174102 (2013);
 Z. Zhang et al., J. Chem. Phys. 147, 034109 (2017), for chains too). Angular momenta and noise are in principal axes, moments
-beside them: a component L_i has the variance I_i kT, in whatever way the body is turned.
+beside them: a component L_i has the variance I_i kT in every attitude.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Langevin(Thermostat):
         return {"heat": self._heat, "rng": self._rng.bit_generator.state}
 
     def restore(self, state_dict: dict[str, Any]) -> None:
-        """The same heat and the same random numbers to come."""
+        """Restore the heat and the state of the random numbers."""
         self._heat = float(state_dict["heat"])
         self._rng.bit_generator.state = state_dict["rng"]
 
@@ -208,6 +208,6 @@ class NoseHoover(Thermostat):
         return {"x": [c.x.tolist() for c in self._chains], "v": [c.v.tolist() for c in self._chains]}
 
     def restore(self, state_dict: dict[str, Any]) -> None:
-        """The same links."""
+        """Restore the links of the chains."""
         for chain, x, v in zip(self._chains, state_dict["x"], state_dict["v"], strict=True):
             chain.x, chain.v = np.array(x), np.array(v)

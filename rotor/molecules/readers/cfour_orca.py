@@ -1,8 +1,7 @@
 """Outputs that cclib 1.8 cannot read: CFOUR, for which it has no parser, and ORCA from version 6, whose dipole it fails at.
 
-The same few numbers are read that cclib gives of other programs, under the names that it gives them. Real outputs that this
-was made from: `tests/oracles/outputs/README.md`. CFOUR's polarizability is not read, since no real output with one was
-at hand; a note says so.
+The few numbers that cclib reads from other programs are read, under its names. Real outputs that this
+was made from: `tests/oracles/outputs/README.md`. CFOUR's polarizability is not read: no real output with one was available; a note says so.
 """
 
 from __future__ import annotations

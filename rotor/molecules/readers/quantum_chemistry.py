@@ -188,7 +188,7 @@ def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
 
 
 def _printed_masses(data: Any) -> Floats | None:
-    """Masses in u as printed, None where they are not there for every atom."""
+    """Masses in u as printed; None unless every atom has one."""
     masses = np.asarray(getattr(data, "atommasses", ()), dtype=np.float64)
     n = len(data.atomnos)
     return masses[-n:] if len(masses) and len(masses) % n == 0 else None

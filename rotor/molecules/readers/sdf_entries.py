@@ -29,7 +29,7 @@ def entry_names(path: Path) -> tuple[str, ...]:
 def entry_bytes(path: Path, number: int) -> bytes:
     """The text of one molecule, numbered from 1, as the file has it.
 
-    Raises ValueError for a number that the file has not.
+    Raises ValueError for a number beyond the entries of the file.
     """
     if not path.is_file():
         raise ValueError(f"{path}: no such file")

@@ -42,7 +42,7 @@ class Operation:
     def axis(self) -> Floats:
         """Unit vector (3,) of the rotation, or of the rotation part of an improper operation; z for none.
 
-        Of the two directions the one is taken whose last component that is not 0 is positive.
+        The direction is chosen so that its last nonzero component is positive.
         """
         turn = self.matrix if self.proper else -self.matrix
         # turn + turnᵀ = 2 cos θ 1 + 2 (1 - cos θ) u uᵀ, so its largest eigenvalue belongs to u, also for θ = π

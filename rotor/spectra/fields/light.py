@@ -33,7 +33,7 @@ class Light:
     direction: Vector | None = None
 
     def about(self, field: Vector) -> Light:
-        """The same light by its angle with a field that has an axis of symmetry."""
+        """This light, described by its angle with a field that has an axis of symmetry."""
         if self.direction is None:
             return self
         cosine = float(np.dot(self.direction, field) / np.linalg.norm(field))

@@ -66,7 +66,7 @@ class FieldDistribution:
 
     @classmethod
     def uniform(cls, first_kv_per_cm: float, last_kv_per_cm: float) -> FieldDistribution:
-        """The same density from one field to another."""
+        """A uniform density between two fields."""
         return cls(np.linspace(first_kv_per_cm, last_kv_per_cm, LEAST_FIELDS), np.ones(LEAST_FIELDS))
 
     @property

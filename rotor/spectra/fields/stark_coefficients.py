@@ -3,7 +3,7 @@
     ΔE(E) = c1 E + c2 E² + c3 E³ + c4 E⁴ + ...
 
 c1 is not 0 where ±K coincide, c2 is what tables print (MHz/(kV/cm)²). They are perturbation sums over the blocks of the map
-(`rotor.quantum.fields.field_series`), so that no choice of fields enters. Of a linear top c2 of J = 0 is -μ²/6hB; of a symmetric one
+(`rotor.quantum.fields.field_series`), so that no choice of fields enters. For a linear top, c2 of J = 0 is -μ²/6hB; of a symmetric one
 c1 = -μ KM/[J(J+1)] (Encyclopedia of Physical Science and Technology, 3rd edition, Microwave Molecular Spectroscopy, eq. 106).
 
 A series has a range. It ends where E⁵ and E⁶ each add 1 % of the largest of the four terms: there the four coefficients give the shift to

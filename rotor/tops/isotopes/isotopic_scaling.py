@@ -81,7 +81,7 @@ def _proper_signs(axes: Floats) -> Iterator[Floats]:
 
 
 def _angle(rotation: Floats) -> float:
-    """Of a rotation matrix, in degrees, exact for small ones too."""
+    """Angle of a rotation matrix in degrees, exact for small angles too."""
     vector = np.array(
         [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
     )

@@ -44,7 +44,7 @@ class _Change:
 
 
 def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | None, tuple[str, ...]]:
-    """The constants of the parent's spins as its isotopologue `top` has them, and what is to be said of them.
+    """The constants of the parent's spins as its isotopologue `top` has them, and remarks.
 
     angle: by how many degrees the axes turned. None where no spin has constants any more.
     """

@@ -130,7 +130,7 @@ def isotopologue(parent: Top, changes: Changes) -> Isotopologue:
 def single_substitutions(parent: Top, element: str, name: str) -> tuple[Isotopologue, ...]:
     """The isotopologues with one atom of an element substituted, one for each set of equivalent atoms.
 
-    This is the set from which substitution structures are made. Raises ValueError for an element that is not there.
+    This is the set from which substitution structures are made. Raises ValueError for an element that the molecule lacks.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.0655], [0, 0, 0], [0, 0, 1.1532]])
@@ -173,7 +173,7 @@ def _without_masses(dipole: Floats, symmetry: Symmetry) -> Floats:
 
 
 def _abundant(molecule: Molecule) -> tuple[int, ...]:
-    """The most abundant isotope of every atom; of elements that nature lacks the one that is there."""
+    """The most abundant isotope of every atom; elements without natural isotopes keep the isotope of the molecule."""
     pairs = zip(molecule.symbols, molecule.mass_numbers, strict=True)
     return tuple(isotope(s).mass_number if natural_isotopes(s) else number for s, number in pairs)
 
@@ -269,7 +269,7 @@ def _name(parent: Top, molecule: Molecule, turned: Top) -> str:
 
 
 def _abundance(symbols: tuple[str, ...], numbers: tuple[int, ...]) -> float:
-    """Of one placement; the isotopes of an element that nature lacks count as all there is."""
+    """Abundance of one placement; the isotopes of an element that nature lacks count as all there is."""
     pairs = zip(symbols, numbers, strict=True)
     return math.prod(isotope(s, number).abundance if natural_isotopes(s) else 1.0 for s, number in pairs)
 

@@ -147,7 +147,7 @@ class SpinConstants:
 
 
 def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
-    """ValueError where a spin is called after an isotope that the molecule has not, or has not so often.
+    """ValueError where a spin is named after an isotope that the molecule lacks, or has less often.
 
     Without a molecule, and of spins with names of their own, there is nothing to compare.
     """

@@ -83,7 +83,7 @@ class SpinWeights:
     def with_pair(self, twice: int) -> SpinWeights:
         """The weights of all nuclei, where these are those of the nuclei beside two of spin `twice`/2 that half a turn exchanges.
 
-        Of the (2i+1)² functions of the two, (i+1)(2i+1) and i(2i+1) have the parity of their total spin 2i and the other one. Raises
+        Among the (2i+1)² functions of the two, (i+1)(2i+1) have the parity of the total spin 2i, and i(2i+1) the other. Raises
         ValueError as `exchanged`.
 
         >>> SpinWeights.from_mapping({"even": 1, "odd": 0}).with_pair(1).to_mapping()  # two protons

@@ -81,8 +81,8 @@ class LevelTable(Table):
     def line_errors(self, upper: Ints, lower: Ints) -> Floats:
         """One standard deviation of lines between rows (m,) of the table in MHz, nan where a row is -1.
 
-        Of two states of one rotation the own parts count, of others the whole errors, as if uncorrelated. Raises ValueError for a table
-        that does not know own parts.
+        Between two states of one rotation the states' own errors count; between other levels the whole errors, as if uncorrelated. Raises
+        ValueError for a table that does not know own parts.
         """
         if self.own_error_mhz is None:
             raise ValueError("errors of lines between levels of a table: expected a table with own_error_mhz")
@@ -102,7 +102,7 @@ def tabulated_energies(
     """Energies (n,) in MHz of solved levels, those that the table has replaced, and which these are, (n,).
 
     quanta, energy_mhz: labels by name and energies (n,) of the solved levels, counted from the Hamiltonian's zero, the level J = 0.
-    A level that the table has not keeps the energy of the distortion series.
+    A level that is missing in the table keeps the energy of the distortion series.
     """
     rows = table.rows_of(quanta)
     known = rows >= 0

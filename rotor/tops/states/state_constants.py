@@ -1,4 +1,4 @@
-"""Vibrational or tunnelling states beyond the one that a top's constants describe: their constants, what couples them, their dipoles.
+"""Vibrational or tunnelling states beyond the state of a top's constants: their constants, what couples them, their dipoles.
 
     E[1] = 23785.9 MHz     B[1] = 298041 MHz      G_c[0,1] = 450 MHz      F_ab[0,1], W[0,1] ...
 
@@ -45,7 +45,7 @@ class StateConstants:
 
     names: by number from 0 on, such as "0+", "0-". weights: of states, 0 among them, that differ from the top's. dipoles: (μa, μb, μc)
     in debye by pairs (v', v), within states and between them; a state that is not named has the top's dipole, and no pair that is not
-    named has one. symmetry: a group of which the states are, such as "C2v" or "Cs(ab)", with the plane or the axis; "" where none is
+    named has one. symmetry: the group of the states, such as "C2v" or "Cs(ab)", with the plane or the axis; "" where none is
     declared. uncertainties: in MHz, of the constants that have one.
 
     Raises ValueError for names without a state, for a coupling or dipole of a state that has no constants, and for two couplings that
@@ -118,7 +118,7 @@ class StateConstants:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said of couplings that exist together without a symmetry only, where none is declared.
+        """Notes on couplings that exist together only without a symmetry, if no symmetry is declared.
 
         Two kinds of coupling have a group that allows both, such as Cs(ab) G_c and W; three have C1 and Ci alone.
 
@@ -164,7 +164,7 @@ class StateConstants:
             )
 
     def refuse_couplings(self, group: str, even: str) -> None:
-        """ValueError for two couplings of one pair of states of which the group takes only one for allowed.
+        """ValueError for two couplings of one pair of states if the group allows only one of them.
 
         even: the axes, of "abc", about which a rotation is totally symmetric in the group.
         """
