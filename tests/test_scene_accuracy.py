@@ -16,7 +16,7 @@ from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
-from rotor.fluids.numerics import answer_followed, conserved_bound_k, conserved_k, followed, force_error, made_of
+from rotor.fluids.numerics import answer_followed, conserved_bound_k, conserved_k, followed, force_error, with_box
 from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
@@ -312,7 +312,7 @@ BOX = FluidConditions(model="spce", molecules=27, steps=40, every=1)
 def test_the_bound_of_a_fluid_covers_other_boxes():
     """Root mean squares of the conserved energy with other velocities are below the bound."""
     scene = FluidScene(conditions=BOX, numerics=FluidNumerics(cutoff="4 Å"), accuracy="1 K")
-    request = made_of(kind_of(scene).request(scene, "."))
+    request = with_box(kind_of(scene).request(scene, "."))
     bound, found = conserved_bound_k(request, 2.0), []
     for seed in range(50, 62):
         other = replace(request, settings=replace(request.settings, seed=seed))

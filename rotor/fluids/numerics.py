@@ -58,7 +58,7 @@ FINEST_EWALD = 1e-10
 SETTLING_STEPS, SHORT_STEPS = 50, (5, 20)  # after which forces are nearly those of a fluid; of the calibration
 
 
-def made_of(request: FluidRequest) -> FluidRequest:
+def with_box(request: FluidRequest) -> FluidRequest:
     """The request with its box, made once."""
     if not isinstance(request.box, NewBox):
         return request
@@ -71,7 +71,7 @@ def _of_rotor(request: FluidRequest) -> FluidRequest:
     """The request with its box; ValueError for another engine."""
     if request.engine != "rotor":
         raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
-    return made_of(request)
+    return with_box(request)
 
 
 def choose_step(scene: Any, request: FluidRequest, asked: float) -> Choice:
@@ -144,7 +144,7 @@ def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
     """The step, by energy and positions over a short time; cutoff and Ewald's tolerance, by forces."""
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
-    made = replace(request, box=box_of(request)) if isinstance(request.box, NewBox) else request
+    made = with_box(request)
     return Sweeps(
         (_step(made), _cutoff(made), *_ewald(made)), ("conditions.steps: the error of a mean is in its report",)
     )
@@ -274,8 +274,7 @@ def plan_of_fluid(request: Any) -> Plan:
     settings = request.settings
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
-    made = request if not isinstance(request.box, NewBox) else replace(request, box=box_of(request))
-    made = replace(made, box_equilibration_ps=0.0)
+    made = replace(with_box(request), box_equilibration_ps=0.0)
     least_ps, most_ps = equilibration_range(request.equilibration_ps)
     before = round(1e3 * least_ps / settings.step_fs)
 

@@ -30,7 +30,6 @@ from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import (
     like_line_before,
     note_of_defaults,
@@ -55,7 +54,6 @@ QUANTA = {
     "asymmetric": ("j", "ka", "kc"),
 }
 _YES, _NO = ("yes", "true", "1"), ("no", "false", "0", "")
-_WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
 _FIELD = {"field_kv_per_cm": 1.0, "field_v_per_cm": 1e-3}
@@ -94,7 +92,7 @@ def read_assigned_lines(
         found, notes = _from_westerfit(path, names, halves), []
     else:
         plain = "v" not in names and names[0] != "n"
-        read = _from_lin if text.endswith(".lin") else _from_catalogue if plain else _from_full_catalogue
+        read = _from_lin if text.endswith(".lin") else catalogue_lines if plain else whole_catalogue_lines
         found, notes = read(path, names)
         found = with_halves(found, halves)
     if not len(found):
@@ -391,84 +389,6 @@ def _blends(texts: Sequence[str]) -> list[int]:
     """Numbers of blends: lines with one text are one, a line without any is alone."""
     places: dict[str, int] = {}
     return [places.setdefault(text or f"\0{i}", len(places)) for i, text in enumerate(texts)]
-
-
-def _from_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    from rotor.formats.spcat.compare import in_mhz
-    from rotor.formats.spcat.text.cat import read_cat
-
-    catalogue = read_cat(path)
-    measured = catalogue.take(catalogue.tag < 0)
-    width = len(names)
-    beyond = np.concatenate([measured.quanta_upper[:, width:], measured.quanta_lower[:, width:]], axis=1)
-    split = (measured.qnfmt // 100 < _WITH_STATES) & (measured.qnfmt % 10 > width)
-    ground = ((beyond == 0) | (beyond == BLANK)).all(axis=1) | split
-    notes = []
-    if not ground.all():
-        notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left aside")
-    measured, split = measured.take(ground), split[ground]
-    frequency, error = in_mhz(measured)
-    upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (measured.quanta_upper, measured.quanta_lower))
-    weight = 10.0 ** (measured.lgint - measured.lgint.max(initial=0.0)) if len(measured) else np.zeros(0)
-    first = _first_of_each(upper, lower, frequency)
-    if split.all() and len(split):
-        first, frequency, error = _centres(upper, lower, frequency, error, weight)
-        notes.append(
-            f"{len(split)} components of spins are put together by rotational line, at their mean by intensity: "
-            f"{counted(len(first), 'line')}"
-        )
-    groups = [(round(float(f), 6), round(float(e), 6)) for f, e in zip(frequency, error, strict=True)]
-    order = {key: i for i, key in enumerate(dict.fromkeys(groups))}
-    return assignments(
-        names, upper[first], lower[first], frequency[first], error[first],
-        weight=weight[first] if len(measured) else 1.0,
-        blend=np.array([order[key] for key in groups], dtype=np.int64)[first], source=Path(path).name,
-    ), notes  # fmt: skip
-
-
-def _from_full_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    """The measured lines of a catalogue that has all of the quantum numbers, v and F among them."""
-    from rotor.formats.spcat.compare import in_mhz
-    from rotor.formats.spcat.text.cat import read_cat
-
-    catalogue = read_cat(path)
-    measured = catalogue.take(catalogue.tag < 0)
-    width = len(names)
-    whole = (measured.qnfmt % 10 == width) & ((measured.qnfmt // 1000 % 2 == 1) == ("v" in names))
-    notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left aside"]
-    measured = measured.take(whole)
-    frequency, error = in_mhz(measured)
-    upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (measured.quanta_upper, measured.quanta_lower))
-    weight = 10.0 ** (measured.lgint - measured.lgint.max(initial=0.0)) if len(measured) else np.zeros(0)
-    first = _first_of_each(upper, lower, frequency)
-    pairs = np.stack([frequency.round(6), error.round(6)], axis=1)
-    blend = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1) if len(pairs) else np.zeros(0, dtype=np.int64)
-    return assignments(
-        names, upper[first], lower[first], frequency[first], error[first], weight=weight[first], blend=blend[first],
-        source=Path(path).name,
-    ), notes  # fmt: skip
-
-
-def _centres(
-    upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray, error: np.ndarray, weight: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position of the first component of each rotational line, and all frequencies and errors with the line's in their place.
-
-    The mean by intensity over all components is the line without spins, to first order; the error is the smallest of them.
-    """
-    _, first, line = np.unique(np.concatenate([upper, lower], axis=1), axis=0, return_index=True, return_inverse=True)
-    line = line.reshape(-1)
-    means = np.bincount(line, weight * frequency) / np.bincount(line, weight)
-    least = np.full(len(first), np.inf)
-    np.minimum.at(least, line, error)
-    return np.sort(first), means[line], least[line]
-
-
-def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Positions of lines without the repetitions of a K doublet, which has one label and one frequency."""
-    keys = [(*u, *low, f) for u, low, f in zip(upper.tolist(), lower.tolist(), frequency.tolist(), strict=True)]
-    seen = {key: i for i, key in reversed([*enumerate(keys)])}
-    return np.array(sorted(seen.values()), dtype=np.int64)
 
 
 def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> None:

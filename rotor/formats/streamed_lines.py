@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,9 +36,6 @@ from rotor.thermodynamics import PartitionFunction
 from rotor.thermodynamics.trusted_levels import are_trusted
 from rotor.tops.top import Top
 from rotor.version import version
-
-if TYPE_CHECKING:
-    pass
 
 PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
 MEMORY_MB = 500  # for the sort, beside the program itself

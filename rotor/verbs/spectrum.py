@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
@@ -23,9 +23,6 @@ from rotor.verbs.molecule import range_without_unit, with_some_dipole
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
-
-if TYPE_CHECKING:
-    pass
 
 MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
 HITRAN_K = 296.0

@@ -70,18 +70,7 @@ def application(service: Service, guard: Guard) -> Starlette:
         from starlette.websockets import WebSocket
     except ImportError as error:
         raise ValueError(f"{error.name} is not installed; {MISSING}") from None
-    shell = page(
-        '<link rel="stylesheet" href="page.css">',
-        '<script src="bokeh.js"></script>\n<script type="module" src="page.js"></script>',
-    )
-    files = {
-        "": ("text/html", shell),
-        "page.js": ("text/javascript", page_file("page.js")),
-        "page.css": ("text/css", page_file("page.css")),
-        "bokeh.js": ("text/javascript", bokeh_js()),
-    }
-    bodies = {name: (kind, text.encode()) for name, (kind, text) in files.items()}
-    pages = Pages(service)
+    bodies, pages = page_bodies(), Pages(service)
 
     async def serve(request: Any) -> Response:
         """One of the files; every refusal looks the same."""
@@ -109,6 +98,21 @@ def application(service: Service, guard: Guard) -> Starlette:
         Route("/{path:path}", nothing, methods=["GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"]),
     ]
     return Starlette(routes=routes)
+
+
+def page_bodies() -> dict[str, tuple[str, bytes]]:
+    """Kind and content of the four files by their names; the page itself has none."""
+    shell = page(
+        '<link rel="stylesheet" href="page.css">',
+        '<script src="bokeh.js"></script>\n<script type="module" src="page.js"></script>',
+    )
+    files = {
+        "": ("text/html", shell),
+        "page.js": ("text/javascript", page_file("page.js")),
+        "page.css": ("text/css", page_file("page.css")),
+        "bokeh.js": ("text/javascript", bokeh_js()),
+    }
+    return {name: (kind, text.encode()) for name, (kind, text) in files.items()}
 
 
 class Pages:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -68,6 +68,43 @@ def view(
     return widget_class()(service, height)
 
 
+class SessionFace:
+    """What Python does with the session of a page."""
+
+    service: Service
+    send: Callable[[Any], object]
+    _sent: int
+
+    @property
+    def session(self) -> Any:
+        """The session: `session.state.species`, `session.state.lines`, `session.undo()`."""
+        return self.service.session
+
+    def do(self, name: str, **message: Any) -> Any:
+        """An action or a query by its name (docs/view.md), carried out from Python; every page shows the change.
+
+        Raises ValueError with the text that a page would show.
+        """
+        answer = self.service.answer({"do": name, **message})
+        self._announce()
+        if "error" in answer:
+            raise ValueError(answer["error"])
+        return answer["ok"]
+
+    def export(self, path: str | os.PathLike[str]) -> None:
+        """Write the page with its data as one file."""
+        from rotor.formats.atomic_write import open_atomic
+        from rotor.viewer.export_page import export_page
+
+        with open_atomic(path, "w", encoding="utf-8") as handle:
+            handle.write(export_page(self.service))
+
+    def _announce(self) -> None:
+        if self.service.session.revision != self._sent:
+            self._sent = self.service.session.revision
+            self.send({"session": self.service.facts()})
+
+
 @cache
 def widget_class() -> type:
     """The class of the widget; ValueError where anywidget is not installed."""
@@ -77,7 +114,7 @@ def widget_class() -> type:
     except ImportError as error:
         raise ValueError(f"{error.name} is not installed; {MISSING}") from None
 
-    class ViewWidget(anywidget.AnyWidget):
+    class ViewWidget(SessionFace, anywidget.AnyWidget):
         """The page of a session in a notebook."""
 
         _esm = f"(function () {{ {bokeh_js()} }}).call(globalThis);\n{page_file('page.js')}"
@@ -90,30 +127,6 @@ def widget_class() -> type:
             self._sent = service.session.revision
             self.on_msg(self._received)
 
-        @property
-        def session(self) -> Any:
-            """The session: `session.state.species`, `session.state.lines`, `session.undo()`."""
-            return self.service.session
-
-        def do(self, name: str, **message: Any) -> Any:
-            """An action or a query by its name (docs/view.md), carried out from Python; every page shows the change.
-
-            Raises ValueError with the text that a page would show.
-            """
-            answer = self.service.answer({"do": name, **message})
-            self._announce()
-            if "error" in answer:
-                raise ValueError(answer["error"])
-            return answer["ok"]
-
-        def export(self, path: str | os.PathLike[str]) -> None:
-            """Write the page with its data as one file."""
-            from rotor.formats.atomic_write import open_atomic
-            from rotor.viewer.export_page import export_page
-
-            with open_atomic(path, "w", encoding="utf-8") as handle:
-                handle.write(export_page(self.service))
-
         def close(self) -> None:
             """End the widget and let other programs have the session."""
             self.service.session.release()
@@ -123,10 +136,5 @@ def widget_class() -> type:
             answer = self.service.answer(content)
             self._announce()
             self.send({"re": content.get("id") if isinstance(content, dict) else None, **answer})
-
-        def _announce(self) -> None:
-            if self.service.session.revision != self._sent:
-                self._sent = self.service.session.revision
-                self.send({"session": self.service.facts()})
 
     return ViewWidget
