@@ -28,6 +28,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
+from rotor.formats.assigned_catalogue import catalogue_lines, whole_catalogue_lines
 from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.lin import (
