@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.cli.shared import process
 from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
-from rotor.reports.screen import Table, json_with_rows, show_facts, show_table
+from rotor.reports.screen import Table, evenly, json_with_rows, show_facts, show_table
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
 from rotor.requests.fill import Given
 from rotor.requests.readers import Flag, Text, Whole
@@ -214,8 +214,7 @@ def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
 def _some_rows(table: Columns) -> Table:
     """Some rows of a table, evenly chosen."""
     count, columns = len(table), table.columns
-    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
-    cells = [[_cell(column[row]) for column in columns.values()] for row in rows]
+    cells = [[_cell(column[row]) for column in columns.values()] for row in evenly(count, SHOWN)]
     return Table("all rows" if len(cells) == count else f"{len(cells)} of {count} rows", list(columns), cells)
 
 

@@ -32,6 +32,15 @@ def show_table(table: Table) -> None:
         print(table_text(table))
 
 
+def evenly(count: int, most: int) -> list[int]:
+    """Rows of a long table that are shown, the first and the last among them.
+
+    >>> evenly(3, 5), evenly(9, 5)
+    ([0, 1, 2], [0, 2, 4, 6, 8])
+    """
+    return list(range(count)) if count <= most else [round(i * (count - 1) / (most - 1)) for i in range(most)]
+
+
 def table_text(table: Table) -> str:
     """The table as aligned text, two spaces between columns."""
     widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]

@@ -75,7 +75,8 @@ class Kind:
         shown = self.verb.read_shown(given)
         content = {**answer.facts(), **self.verb.content(answer, shown)}
         view: Any = {} if self.verb.spectral else WHOLE
-        return files_of(self.verb, answer, Report(content, shown, given, provenance, view))
+        head = {**provenance, **self.verb.stated_in(content)}
+        return files_of(self.verb, answer, Report(content, shown, given, head, view))
 
     @contextmanager
     def naming(self) -> Iterator[None]:

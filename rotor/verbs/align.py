@@ -16,7 +16,7 @@ from rotor.requests.fill import Given, read_fields
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Subject, Verb
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Subject, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -206,8 +206,7 @@ VERB = Verb(
     rows="trace",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the cosines as CSV", example="out.csv"),
-        Output("parquet", (".parquet",), "Write the cosines as Parquet", example="out.parquet"),
+        *tables("the cosines", "out"),
         Output("plot", PICTURES, "Draw the cosines (.png, .pdf, .svg)", draw, "out.png"),
     ),
     subject=OneMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),

@@ -22,7 +22,7 @@ from rotor.verbs.comparing import (
     temperature_note,
 )
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work
+from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work, tables
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue
@@ -245,8 +245,7 @@ VERB = Tool(
     show=show,
     outputs=(
         Output("out", (".cat", ".cat.gz"), "Write the lines that are left (.cat, .cat.gz)", write_lines),
-        Output("csv", (".csv",), "Write the lines that are left as CSV"),
-        Output("parquet", (".parquet",), "Write the lines that are left as Parquet"),
+        *tables("the lines that are left", "lines"),
         Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw),
     ),
     notes=lambda answer: temperature_note(answer.compared),

@@ -33,7 +33,7 @@ from rotor.verbs.molecule import (
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.tables import Section, entries_of, said
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.spectra.emitters import CatalogueLines
@@ -50,7 +50,6 @@ Examples:
   rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width"""
 _OF_ONE = ("isotopes", "spin_constants", "spins", *STATES)  # what belongs to a single molecule
 _OWN = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
-_PROVENANCE = ("molecules", "source", "range_mhz")
 
 
 @dataclass(frozen=True)
@@ -200,29 +199,11 @@ class EmissionShown(Shown):
     top_lines: int = declared(20, Whole(0), "How many of the brightest lines are shown", option="--top", panel=OUTPUT)
 
 
-def write_table(answer: EmissionAnswer, path: Path, report: Report) -> None:
-    """The lines as a file."""
-    from rotor.formats import write
-
-    write(answer.lines, path, settings=_provenance(report))
-
-
-def write_profile(answer: EmissionAnswer, path: Path, report: Report) -> None:
-    """The spectrum as a file."""
-    from rotor.formats import write
-
-    write(answer.spectrum, path, settings=_provenance(report))
-
-
 def draw(answer: EmissionAnswer, path: Path, report: Report) -> None:
     """The picture as a file."""
     from rotor.plots.emission import plot_emission
 
-    plot_emission(answer, path, provenance=_provenance(report), **report.view)
-
-
-def _provenance(report: Report) -> dict[str, Any]:
-    return {**report.provenance, **{name: report.content[name] for name in _PROVENANCE}}
+    plot_emission(answer, path, provenance=dict(report.provenance), **report.view)
 
 
 def show(answer: EmissionAnswer, report: Report) -> None:
@@ -325,16 +306,20 @@ VERB = Verb(
     rows="lines",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the lines as CSV", write_table, "lines.csv"),
-        Output("parquet", (".parquet",), "Write the lines as Parquet", write_table, "lines.parquet"),
+        *tables("the lines", "lines"),
         Output(
-            "profile_csv", (".csv",), "Write T_B and optical depth on the grid as CSV", write_profile, "profile.csv"
+            "profile_csv",
+            (".csv",),
+            "Write T_B and optical depth on the grid as CSV",
+            example="profile.csv",
+            of=lambda answer: answer.spectrum,
         ),
         Output("plot", PICTURES, "Draw T_B of every molecule (.png, .pdf, .svg)", draw, "emission.png"),
     ),
     subject=SeveralMolecules(),
     shown=EmissionShown,
     notes=lambda answer: answer.notes,
+    stated=("molecules", "source", "range_mhz"),
     drawn="MHz",
     spectral=True,
     numerics="rotor.spectra.numerics:EMISSION",

@@ -228,12 +228,11 @@ def draw(answer: Observed, path: Path, report: Report) -> None:
     plot_overlay(answer.spectrum, answer.components, path, sight=answer.sight, provenance=report.command)
 
 
-def write_profile(answer: Observed, path: Path, report: Report) -> None:
+def profile(answer: Observed) -> Columns:
     """Observed and modelled brightness."""
-    from rotor.formats import write
     from rotor.observed.overlay_table import overlay_table
 
-    write(overlay_table(answer.spectrum, answer.components, answer.sight), path, settings=dict(report.provenance))
+    return overlay_table(answer.spectrum, answer.components, answer.sight)
 
 
 LEFT = frozenset({"species", "parameter"})
@@ -297,7 +296,7 @@ OBSERVED = Tool(
     outputs=(
         Output("csv", (".csv",), "Write the lines, or the fitted parameters, as CSV"),
         Output("parquet", (".parquet",), "Write them as Parquet"),
-        Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", write_profile),
+        Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", of=profile),
         Output("plot", PICTURES, "Draw pages of panels", draw),
     ),
     instead="--over and --fit",

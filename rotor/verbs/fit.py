@@ -28,7 +28,7 @@ from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.verb import PICTURES, ErrorsShown, Extra, Output, Report, Verb, Work
+from rotor.verbs.verb import PICTURES, ErrorsShown, Extra, Output, Report, Verb, Work, tables
 
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
@@ -340,8 +340,7 @@ VERB = Verb(
     records=lambda answer: Parameters(answer.fit),
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the fitted parameters as CSV", example="fit.csv"),
-        Output("parquet", (".parquet",), "Write the fitted parameters as Parquet", example="fit.parquet"),
+        *tables("the fitted parameters", "fit"),
         Output("report", (".fit",), "Write the whole report", lambda answer, path, _: _text(path, report_of(answer)), "out.fit"),
         Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations",
                lambda answer, path, _: write_fitted_toml(answer, path), "out.toml"),

@@ -13,19 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import counting
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Table, evenly, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.fill import Given
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import STATES
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Verb, Work
+from rotor.verbs.verb import PICTURES, Output, Report, Verb, Work, tables
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
 
 SHOWN = 11  # rows of the correlation functions in the report
-_PROVENANCE = ("source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source")
 
 EXAMPLES = """\b
 Examples:
@@ -49,13 +48,6 @@ def answer(request: GasRequest, work: Work) -> GasAnswer:
         return answer_gas(request, pool, advance)
 
 
-def write_table(answer: GasAnswer, path: Path, report: Report) -> None:
-    """The correlation functions as a file."""
-    from rotor.formats import write
-
-    write(answer.correlations, path, settings=_provenance(report))
-
-
 def draw(answer: GasAnswer, path: Path, report: Report) -> None:
     """The picture of the test and of the correlation functions as a file."""
     from rotor.plots.gas import plot_gas
@@ -63,12 +55,8 @@ def draw(answer: GasAnswer, path: Path, report: Report) -> None:
 
     content, view = report.content, report.view
     title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
-    plateau, record = content["c1_plateau"], _provenance(report)
+    plateau, record = content["c1_plateau"], dict(report.provenance)
     plot_gas(answer.test, answer.correlations, path, title=title, plateau=plateau, view=view, provenance=record)
-
-
-def _provenance(report: Report) -> dict[str, Any]:
-    return {**report.provenance, **{name: report.content[name] for name in _PROVENANCE}}
 
 
 def show(answer: GasAnswer, report: Report) -> None:
@@ -124,10 +112,9 @@ def _degrees_table(content: Mapping[str, Any]) -> Table:
 
 def _curves_table(curves: Correlations) -> Table:
     count = len(curves)
-    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
     columns = ("t (ps)", *list(curves.columns)[1:])
     data = list(curves.columns.values())
-    cells = [[f"{data[0][i]:.4g}", *(f"{column[i]:.5f}" for column in data[1:])] for i in rows]
+    cells = [[f"{data[0][i]:.4g}", *(f"{column[i]:.5f}" for column in data[1:])] for i in evenly(count, SHOWN)]
     few = "" if len(cells) == count else f", {len(cells)} of {count} times"
     return Table(f"correlation functions{few}", columns, cells)
 
@@ -143,8 +130,7 @@ VERB = Verb(
     rows="correlation",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the correlation functions as CSV", write_table, "out.csv"),
-        Output("parquet", (".parquet",), "Write the correlation functions as Parquet", write_table, "out.parquet"),
+        *tables("the correlation functions", "out"),
         Output("plot", PICTURES, "Draw the test and the functions (.png, .pdf, .svg)", draw, "out.png"),
     ),
     subject=OneMolecule(
@@ -160,6 +146,7 @@ VERB = Verb(
             "symmetry_tolerance",
         )
     ),
+    stated=("source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source"),
     drawn="ps",
     scaled=False,
     adapt=adapt,

@@ -16,7 +16,7 @@ from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Output, Report, Subject, Verb, Work
+from rotor.verbs.verb import Report, Subject, Verb, Work, tables
 
 EXAMPLES = """\b
 Examples:
@@ -195,10 +195,7 @@ VERB = Verb(
     rows="partition_function",
     records=lambda answer: None,
     show=show,
-    outputs=(
-        Output("csv", (".csv",), "Write the table of Q(T) as CSV", example="q.csv"),
-        Output("parquet", (".parquet",), "Write the table of Q(T) as Parquet", example="q.parquet"),
-    ),
+    outputs=(*tables("the table of Q(T)", "q"),),
     subject=OneMolecule(("polarizability", "anisotropy", "internal_rotation")),
     build=build,
     drawn=None,

@@ -10,7 +10,7 @@ from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
 from rotor.verbs.molecule import STATES
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import ErrorsShown, Output, Report, Verb
+from rotor.verbs.verb import ErrorsShown, Report, Verb, tables
 
 EXAMPLES = """\b
 Examples:
@@ -86,8 +86,7 @@ VERB = Verb(
     records=lambda answer: None,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the isotopologues as CSV", example="family.csv"),
-        Output("parquet", (".parquet",), "Write the isotopologues as Parquet", example="family.parquet"),
+        *tables("the isotopologues", "family"),
     ),
     subject=OneMolecule(
         ("constants", "isotopes", "polarizability", "anisotropy", "spin_weights", *STATES, "internal_rotation", "calculator", "hessian",

@@ -16,7 +16,7 @@ from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Shown, Verb
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Shown, Verb, tables
 
 COLUMNS = {"MHz": ("energy_mhz", "{:.4f}"), "cm-1": ("energy_cm", "{:.6f}"), "K": ("energy_k", "{:.6f}")}
 
@@ -133,8 +133,7 @@ VERB = Verb(
     rows="levels",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write all levels as CSV", example="levels.csv"),
-        Output("parquet", (".parquet",), "Write all levels as Parquet", example="levels.parquet"),
+        *tables("all levels", "levels"),
         Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),
         Output("plot", PICTURES, "Draw the term diagram (.png, .pdf, .svg)", draw, "levels.png"),
     ),

@@ -17,7 +17,7 @@ from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import with_known_polarizability
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
@@ -108,8 +108,7 @@ VERB = Verb(
     rows="lines",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write all lines as CSV", example="lines.csv"),
-        Output("parquet", (".parquet",), "Write all lines as Parquet", example="lines.parquet"),
+        *tables("all lines", "lines"),
         Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw, "lines.png"),
     ),
     subject=OneMolecule(

@@ -184,13 +184,6 @@ def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     (int_files.write_catalogue if predicted else write_table)(answer, path, report)
 
 
-def write_profile(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The profile on its grid."""
-    from rotor.formats import write
-
-    write(answer.spectrum, path, settings=report.command)
-
-
 def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """The picture as a file."""
     if report.shown.over is not None:
@@ -314,7 +307,13 @@ VERB = Verb(
         ),
         Output("csv", (".csv",), "Write all lines as CSV", write_table, "lines.csv"),
         Output("parquet", (".parquet",), "Write all lines as Parquet", write_table, "lines.parquet"),
-        Output("profile_csv", (".csv",), "Write the profile on its grid as CSV", write_profile, "profile.csv"),
+        Output(
+            "profile_csv",
+            (".csv",),
+            "Write the profile on its grid as CSV",
+            example="profile.csv",
+            of=lambda answer: answer.spectrum,
+        ),
         Output("plot", PICTURES, "Draw the spectrum (.png, .pdf, .svg)", draw, "lines.png"),
         Output(
             "loomis_wood",

@@ -19,7 +19,7 @@ from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Writer
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Writer, tables
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -88,14 +88,6 @@ def _made(name: str, answer: StarkAnswer, report: Report) -> Any:
         sample = {one.name: getattr(report.shown, one.name) for one in fields(FieldSample)}
         report.made[name] = MAKERS[name](FieldRequest(answer.request, **sample), answer.states, report.executor)
     return report.made[name]
-
-
-def write_map(answer: StarkAnswer, path: Path, report: Report) -> None:
-    """The map as a file."""
-    from rotor.formats import write
-
-    dipole = {"dipole_abc_debye": answer.request.top.dipole_abc_debye}
-    write(answer.states, path, settings={**report.provenance, **dipole})
 
 
 def draw(answer: StarkAnswer, path: Path, report: Report) -> None:
@@ -178,8 +170,7 @@ VERB = Verb(
     rows="states",
     show=show,
     outputs=(
-        Output("csv", _CSV, "Write the map as CSV", write_map, "out.csv"),
-        Output("parquet", (".parquet",), "Write the map as Parquet", write_map, "out.parquet"),
+        *tables("the map", "out"),
         Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
         Output("lines", _CSV, "Write the lines in every field, resolved in M, as CSV", _further("lines"), scene=False),
         Output("lobes", PICTURES, "Draw the lines against the field (.png, .pdf, .svg)", draw_lines, scene=False),
@@ -210,6 +201,7 @@ VERB = Verb(
     ),
     subject=OneMolecule(("anisotropy", "spin_weights", "calculator", "hessian", *STATES), prepare),
     shown=StarkShown,
+    stated=("dipole_abc_debye",),
     drawn="kV/cm",
     scaled=False,
     workers="blocks of states",

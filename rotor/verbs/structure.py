@@ -19,7 +19,18 @@ from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import PICTURES, ErrorsShown, NoAnswerError, Output, Place, Report, Subject, SubjectKind, Verb
+from rotor.verbs.verb import (
+    PICTURES,
+    ErrorsShown,
+    NoAnswerError,
+    Output,
+    Place,
+    Report,
+    Subject,
+    SubjectKind,
+    Verb,
+    tables,
+)
 
 if TYPE_CHECKING:
     from rotor.structures.consistency import PlanarMoment, Without
@@ -200,8 +211,7 @@ VERB = Verb(
     records=lambda answer: None,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the values of all methods as CSV", example="structure.csv"),
-        Output("parquet", (".parquet",), "Write the values of all methods as Parquet", example="structure.parquet"),
+        *tables("the values of all methods", "structure"),
         Output(
             "xyz",
             (".xyz",),

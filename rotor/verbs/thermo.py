@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Table, evenly, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work
+from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work, tables
 
 if TYPE_CHECKING:
     from rotor.thermodynamics import ThermoFunctions
@@ -118,13 +118,8 @@ def _theta_text(theta: Sequence[float]) -> str:
     return ", ".join(known) + " K"
 
 
-def _rows(functions: ThermoFunctions) -> list[int]:
-    count = len(functions)
-    return sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else list(range(count))
-
-
 def _rotation_table(functions: ThermoFunctions) -> Table:
-    rows = _rows(functions)
+    rows = evenly(len(functions), SHOWN)
     columns = ("T (K)", "Q", "Q classical", "Q corrected", "U (J/mol)", "S (J/mol K)", "Cv/R", "classical", "corrected")
     formats = ("{:g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6f}", "{:.1f}", "{:.6f}")
     data = list(functions.columns.values())[: len(columns)]
@@ -140,7 +135,7 @@ def _gas_table(functions: ThermoFunctions) -> Table:
     assert gas is not None  # asked for by the caller
     data = (gas.cp_j_per_mol_k, gas.entropy_j_per_mol_k, gas.enthalpy_j_per_mol, gas.gibbs_j_per_mol_k)
     columns = ("T (K)", "Cp (J/mol K)", "S (J/mol K)", "H-H(0) (J/mol)", "-(G-H(0))/T (J/mol K)")
-    cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in _rows(functions)]
+    cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in evenly(len(functions), SHOWN)]
     states = "" if gas.electronic.degeneracies == (1,) else f"{gas.electronic.text}; "
     spin = f"{states}R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
     return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
@@ -157,8 +152,7 @@ VERB = Verb(
     show=show,
     notes=lambda answer: answer.notes,
     outputs=(
-        Output("csv", (".csv",), "Write the table as CSV, in full precision", example="out.csv"),
-        Output("parquet", (".parquet",), "Write the table as Parquet", example="out.parquet"),
+        *tables("the table", "out"),
         Output("plot", PICTURES, "Draw the heat capacity (.png, .pdf, .svg)", draw, "out.png"),
     ),
     subject=OneMolecule(

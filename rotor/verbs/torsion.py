@@ -46,11 +46,6 @@ def draw(answer: TorsionAnswer, path: Path, report: Report) -> None:
     plot_torsion(answer, path, view=report.view, provenance=report.command)
 
 
-def write_functions(answer: TorsionAnswer, path: Path, report: Report) -> None:
-    """The thermodynamic functions as a file."""
-    write(answer.functions, path, settings=dict(report.provenance))
-
-
 def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
     """The thermodynamic functions of every method."""
     return {"functions": rows_of(answer.functions)}
@@ -172,7 +167,8 @@ VERB = Verb(
     show=show,
     outputs=(
         Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
-        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of every method as CSV", write_functions, "thermo.csv"),
+        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of every method as CSV", example="thermo.csv",
+               of=lambda answer: answer.functions),
         Output("classical_csv", (".csv",), "Write the classical gas at times as CSV", write_motion, "gas.csv"),
         Output("plot", PICTURES, "Draw potential, levels and wave functions (.png, .pdf, .svg)", draw, "torsion.png"),
     ),

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
-from rotor.reports.screen import Table, plain, show_facts, show_table
+from rotor.reports.screen import Table, evenly, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import STATES
 from rotor.verbs.turning_body import TurningBody, build
-from rotor.verbs.verb import PICTURES, Output, Report, Verb
+from rotor.verbs.verb import PICTURES, Output, Report, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -23,11 +23,6 @@ if TYPE_CHECKING:
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # of the components of a column
 FEW_TIMES = 10_000  # half a second of plain Python, as long as loading the compiler takes
-_PROVENANCE = (
-    "command", "scene", "accuracy", "input", "source", "units", "moments", "angular_momentum", "angular_momentum_source",
-    "effects", "method",
-)  # fmt: skip
-
 EXAMPLES = """\b
 Examples:
   rotor tumble water --plot water.png --gif water.gif
@@ -67,18 +62,6 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
         raise ValueError(f"--gif {path}: a film needs two different times, a first and a last; give more --times")
 
 
-def write_rows(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
-    """The motion as a file."""
-    from rotor.formats import write
-
-    write(answer.table, path, settings=_provenance(report))
-
-
-def _provenance(report: Report) -> dict[str, Any]:
-    content = {**report.content, **report.provenance}
-    return {key: plain(content[key]) for key in (*_PROVENANCE, "errors") if key in content}
-
-
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
     """The polhodes as a file."""
     from rotor.plots.polhodes import plot_polhodes
@@ -89,7 +72,7 @@ def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
     label = f"Time ({units.time})" if units.time else "Time"
     plot_polhodes(
         answer.motion, answer.table.times / units.time_factor, path, axis_names=request.axes, time_label=label,
-        time_factor=units.time_factor, title=_picture_title(request), provenance=_provenance(report),
+        time_factor=units.time_factor, title=_picture_title(request), provenance=dict(report.provenance),
     )  # fmt: skip
 
 
@@ -102,7 +85,7 @@ def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
     request, units = answer.request, answer.request.units
     animate(
         answer.motion, answer.table.times / units.time_factor, path, atoms=_atoms(request), axis_names=request.axes,
-        time_unit=units.time, time_factor=units.time_factor, provenance=_provenance(report),
+        time_unit=units.time, time_factor=units.time_factor, provenance=dict(report.provenance),
     )  # fmt: skip
 
 
@@ -258,10 +241,9 @@ def _driven_table(answer: DrivenAnswer) -> Table:
 def _rows(columns: Mapping[str, Floats], names: Mapping[str, str], text: Any) -> Table:
     """Some rows of a motion, evenly chosen."""
     count = len(columns["t"])
-    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
     cells = [
         [f"{columns[name][i]:.6g}" if name == "t" else text(columns[name][i], columns[name]) for name in names]
-        for i in rows
+        for i in evenly(count, SHOWN)
     ]
     title = "the motion" if len(cells) == count else f"the motion, {len(cells)} of {count} times"
     return Table(title, list(names.values()), cells)
@@ -299,8 +281,7 @@ VERB = Verb(
     rows="motion",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the motion as CSV, in full precision", write_rows, "tumble.csv"),
-        Output("parquet", (".parquet",), "Write the motion as Parquet", write_rows, "tumble.parquet"),
+        *tables("the motion", "tumble"),
         Output("plot", PICTURES, "Draw the polhodes (.png, .pdf, .svg)", draw, "tumble.png"),
         Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif"),
     ),
@@ -309,6 +290,7 @@ VERB = Verb(
          "internal_rotation", "calculator", "hessian", "symmetry_tolerance"),
     ),
     drawn=None,
+    stated=("source", "units", "moments", "angular_momentum", "angular_momentum_source", "effects", "method"),
     build=build,
     check=check,
     short=is_short,

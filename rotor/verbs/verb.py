@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotor.reports.screen import json_text, json_with_rows
+from rotor.reports.screen import json_text, json_with_rows, plain
 from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
@@ -109,7 +109,7 @@ Writer = Callable[[Any, Path, Report], None]
 class Output:
     """A file that a verb writes. name: of the key in [outputs] and of the option. write: by default the table itself, by its suffix.
 
-    of: the table that is written. empty: why there is nothing to write. grows: the answer itself writes it. many: repeatable.
+    of: the table of an answer that is written, where it is not that of the verb. grows: the answer itself writes it. many: repeatable.
     scene: whether scenes have it too. required: a verb that is there to write this file.
     """
 
@@ -118,6 +118,7 @@ class Output:
     help: str
     write: Writer | None = None
     example: str = ""
+    of: Callable[[Any], Any] | None = None
     option: str = ""
     grows: bool = False
     many: bool = False
@@ -215,8 +216,8 @@ class Verb:
     withheld: of files that are named, why some are not written. failure: why an answer that is shown is no result.
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
     these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
-    stepwise: it shows every step from the first one on. other: a verb that takes the place of this one where an option that it alone has is
-    typed.
+    stepwise: it shows every step from the first one on. stated: keys of the JSON that its files have in their
+    provenance. other: a verb that takes the place of this one where an option that it alone has is typed.
     """
 
     name: str
@@ -252,6 +253,7 @@ class Verb:
     read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     records: Callable[[Any], Table | None] | None = None
     stepwise: bool = False
+    stated: tuple[str, ...] = ()
     other: Tool | None = None
     has_scenes: ClassVar[bool] = True
 
@@ -323,6 +325,10 @@ class Verb:
         """What a scene in a folder holds, by dotted key, to ask for the same again."""
         return {**self.subject.saved(request, subject, folder), **written_fields(request)}
 
+    def stated_in(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """What the provenance of files has of the content of the JSON."""
+        return {name: plain(content[name]) for name in self.stated if name in content}
+
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The content as JSON text, with all rows."""
         table = self.table(answer) if self.records is None else self.records(answer)
@@ -343,8 +349,16 @@ def report_of(
     """What the report, the JSON and the files are made from. head: command or scene, and input."""
     shown = verb.read_shown(given)
     content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}}
+    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}, **verb.stated_in(content)}
     return Report(content, shown, given, provenance, view, bool(getattr(shown, "sources", False)), executor)
+
+
+def tables(what: str, stem: str) -> tuple[Output, Output]:
+    """The table of a verb as CSV and as Parquet. stem: of the example of a template."""
+    return (
+        Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
+        Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
+    )
 
 
 def check_early(structure: type, given: Given) -> None:
@@ -357,13 +371,17 @@ def check_early(structure: type, given: Given) -> None:
 def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Path], None]]:
     """What writes each file of a verb, by its name."""
 
-    def rows(path: Path) -> None:
-        """The table as a file."""
-        from rotor.formats import write
-
-        write(verb.table(answer), path, settings=dict(report.provenance))
-
     def writer(one: Output) -> Callable[[Path], None]:
-        return rows if one.write is None else lambda path: one.write(answer, path, report)  # type: ignore[misc]
+        """What writes a file: by its function, or the table itself."""
+        if (by_function := one.write) is not None:
+            return lambda path: by_function(answer, path, report)
+
+        def rows(path: Path) -> None:
+            """The table as a file."""
+            from rotor.formats import write
+
+            write((one.of or verb.table)(answer), path, settings=dict(report.provenance))
+
+        return rows
 
     return {one.name: writer(one) for one in verb.outputs if not one.grows}

@@ -18,7 +18,7 @@ from rotor.requests.readers import Numbers
 from rotor.table import counted
 from rotor.verbs.molecule import FIELDS, STATES, Reading
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Subject, Verb
+from rotor.verbs.verb import PICTURES, Output, Report, Subject, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -31,8 +31,6 @@ Examples:
   rotor zeeman --constants "A=10 B=6 C=4 GHz" --g 0.6,-0.2,0.3 --magnetisability -3,2,-7 --field 0:20T:41 --states "J<=1"
   rotor zeeman HC3N --g -0.01 --field 0:200G --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
   rotor zeeman molecule.toml --field 1T --json -"""
-
-_PROVENANCE = ("g_abc", "magnetisability_abc", "nuclear_g")
 
 
 @dataclass(frozen=True)
@@ -114,14 +112,6 @@ def check(request: ZeemanRequest, outputs: Mapping[str, Any], shown: Any) -> Non
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
 
 
-def write_map(answer: ZeemanAnswer, path: Path, report: Report) -> None:
-    """The map as a file."""
-    from rotor.formats import write
-
-    tensors = {name: report.content[name] for name in _PROVENANCE}
-    write(answer.states, path, settings={**report.provenance, **tensors})
-
-
 def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
     """The picture of the map as a file."""
     from rotor.plots.picture import name_of_top
@@ -185,14 +175,14 @@ VERB = Verb(
     rows="states",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the map as CSV", write_map, "out.csv"),
-        Output("parquet", (".parquet",), "Write the map as Parquet", write_map, "out.parquet"),
+        *tables("the map", "out"),
         Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
     ),
     subject=MagneticMolecule(
         ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "calculator", "hessian", *STATES),
         with_tensors,
     ),
+    stated=("g_abc", "magnetisability_abc", "nuclear_g"),
     drawn="T",
     scaled=False,
     workers="blocks of states",
