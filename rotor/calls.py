@@ -17,7 +17,7 @@ from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Given
-from rotor.table import Table
+from rotor.table import Table, html_of_errors
 from rotor.verbs.verb import Place, Subject, Verb, Work, files_of, report_of, verb_of
 
 EXAMPLES = {
@@ -151,8 +151,8 @@ class Result:
         return f"{self.verb.name} of {self.subject.text or 'no molecule'}: {self.table!r}"
 
     def _repr_html_(self) -> str:
-        """The table for notebooks."""
-        return self.table._repr_html_()
+        """The table for notebooks, and how far it can be trusted."""
+        return self.table._repr_html_() + html_of_errors(self.answer)
 
 
 def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Result:

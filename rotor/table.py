@@ -117,12 +117,20 @@ class TextOf:
         return f"{type(self).__name__}: {getattr(self, self.shown)!r}"
 
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The same for notebooks, with the line of the error budget where there is one."""
         import html
 
         thing = getattr(self, self.shown)
         inner = thing._repr_html_() if hasattr(thing, "_repr_html_") else f"<pre>{html.escape(repr(thing))}</pre>"
-        return f"<p>{html.escape(type(self).__name__)}</p>{inner}"
+        return f"<p>{html.escape(type(self).__name__)}</p>{inner}{html_of_errors(self)}"
+
+
+def html_of_errors(answer: Any) -> str:
+    """The line of the error budget of an answer as a paragraph; empty without one."""
+    import html
+
+    errors = getattr(answer, "errors", None)
+    return "" if errors is None else f"<p>{html.escape(errors.line())}</p>"
 
 
 def _text(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from dataclasses import replace
 
@@ -78,6 +79,15 @@ def test_everything_has_a_short_text(things, kind):
     assert len(text) < 1500
     if kind != "motion":
         assert "<" in things[kind]._repr_html_()
+    if kind.endswith("answer"):
+        assert html.escape(things[kind].errors.line()) in things[kind]._repr_html_()
+
+
+def test_a_notebook_shows_how_far_a_result_can_be_trusted():
+    result = rotor.levels("CO", jmax=2)
+    line = f"<p>{html.escape(result.errors.line())}</p>"
+    assert result._repr_html_().endswith(line)
+    assert result.scene().run()._repr_html_().endswith(line)
 
 
 def test_tops_molecules_and_constants_are_one_line():

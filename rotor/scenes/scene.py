@@ -76,6 +76,12 @@ class SceneResult:
     seconds: float
     reached: Reached | None = None
 
+    def _repr_html_(self) -> str:
+        """The rows for notebooks, and how far they can be trusted."""
+        from rotor.table import html_of_errors
+
+        return self.table._repr_html_() + html_of_errors(self.answer)
+
 
 @cache
 def _scene_class(kind: str) -> Any:
