@@ -403,7 +403,7 @@ def test_pictures_of_a_fit_and_of_a_molecule_are_the_same_file_each_time(call, f
     for kind in ("fit", "molecule"):
         one, two = ((folder / f"{kind}_{name}.svg").read_text() for name in ("one", "two"))
         assert one.replace("one.svg", "two.svg") == two  # the command in the metadata apart
-        assert "(obs - calc)/error" in one or "1.15" in one
+        assert "(Obs. − calc.) / error" in one or "1.15" in one
 
 
 def test_the_family_of_samples_gives_the_published_structure(call, folder):

@@ -236,7 +236,7 @@ def test_a_run_is_drawn_with_temperatures_and_pair_distribution(call, folder):
     code, _, err = call(*VAPOUR, "--steps", "10", "--every", "5", "--plot", "run.svg")
     assert (code, err) == (0, "")
     text = Path("run.svg").read_text(encoding="utf-8")
-    assert "temperature (K)" in text
+    assert "Temperature (K)" in text
     assert "g(r) of 2 frames" in text
     assert [path.name for path in folder.iterdir()] == ["run.svg"]  # frames were taken along in a temporary folder
     assert call(*VAPOUR, "--steps", "5", "--plot", "run.txt")[0] == 2

@@ -135,7 +135,7 @@ def test_the_picture(call, folder):
     assert call("gas", "water", *SMALL, "--plot", "w.png", "--times", "0:2:21")[0] == 0
     assert call("gas", "water", *SMALL, "--plot", "w.svg")[0] == 0
     assert (folder / "w.png").stat().st_size > 20_000
-    assert "equipartition accepted" in (folder / "w.svg").read_text(encoding="utf-8")
+    assert "Equipartition accepted" in (folder / "w.svg").read_text(encoding="utf-8")
 
 
 def test_tables_of_the_test_itself(folder):
