@@ -86,6 +86,10 @@ def require_top(value: object) -> None:
         raise ValueError(f"top: {value!r:.60}: expected a Top; rotor.read makes one of a name, a file or a molecule")
 
 
+class NoAnswerError(RuntimeError):
+    """The input is sound, but no answer was reached: exit code 1; nothing is written."""
+
+
 class RunStopped(ValueError):
     """A run that began could not continue; what was written before stays."""
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.cli.shared.output import plain, rows_of
 from rotor.formats.spcat.model import top_of
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
@@ -21,6 +20,7 @@ from rotor.plots.levels import ladders, levels_figure, plot_levels
 from rotor.plots.view import View
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.request import LevelsRequest, answer_levels
+from rotor.reports.screen import plain, rows_of
 
 KEYS = {
     "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "hyperfine", "levels", "files",

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import rotor
-from rotor.cli.shared.output import plain, rows_of
 from rotor.formats import read
+from rotor.reports.screen import plain, rows_of
 from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
 
 ETHANE = ("torsion", "C2H6", "--bond", "1-2", "--potential", "V3=1013 cm-1")

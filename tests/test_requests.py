@@ -11,10 +11,10 @@ import pytest
 
 import rotor
 from rotor.classical.tumble import SI, TumbleRequest, answer_tumble
-from rotor.cli.shared.output import plain, rows_of
 from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels
+from rotor.reports.screen import plain, rows_of
 from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
 from rotor.thermodynamics import VibrationalStates

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotor.checks import NoAnswerError
 from rotor.reports.screen import show_facts
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import NoAnswerError, Output
+from rotor.verbs.verb import Output
 
 
 @dataclass(frozen=True)

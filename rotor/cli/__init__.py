@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
+from rotor.checks import NoAnswerError, RunStopped
 from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainGroup, folded
-from rotor.cli.shared.output import ComputationError, release_files
+from rotor.cli.shared.output import release_files
 from rotor.verbs.names import declared_verbs
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _run(arguments)
     except _ERROR_OF_USE as error:
         return _fail(WRONG_INPUT, _text_of_use(error), arguments)
-    except ComputationError as error:
+    except (NoAnswerError, RunStopped) as error:
         return _fail(NO_ANSWER, str(error), arguments)
     except BrokenPipeError:  # the reader of the pipe has closed it: nothing more is written, at exit neither
         _close_output()

@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
-from rotor.cli.shared.output import ComputationError, Files, answering, deliver, note
+from rotor.cli.shared.output import Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.reports.screen import Table, evenly, json_with_rows, show_facts, show_table
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
@@ -147,16 +148,11 @@ def _folder(options: Options) -> Path:
 
 
 def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
-    from rotor.checks import RunStopped
     from rotor.reports.progress import elapsed_time
-    from rotor.scenes.kind import NoResultError
     from rotor.scenes.run import run_scene
 
-    try:
-        with elapsed_time("computing"):
-            result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
-    except (RunStopped, NoResultError) as error:
-        raise ComputationError(str(error)) from error
+    with elapsed_time("computing"):
+        result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
     for remark in _notes(result):
         note(remark)
     _deliver(result, options, files, command)
@@ -250,7 +246,7 @@ def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, 
     deliver(files, {}, text, lambda: _show_sweep(result))
     print(_summary(result, record, seconds), file=sys.stderr)
     if failed:
-        raise ComputationError(_failures(result, record))
+        raise NoAnswerError(_failures(result, record))
 
 
 def _summary(result: SweepResult, record: str, seconds: float) -> str:

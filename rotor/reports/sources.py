@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -54,42 +54,3 @@ def source_facts(top: Top, tables: Sequence[str], whole: bool) -> list[tuple[str
     cited = [f"{table}: {short_source(text)}" for table, text in texts.items() if table != "spin weights"]
     longer = any(short_source(text) != text for text in texts.values())
     return [("sources", "; ".join(cited) + (" (--sources: all of it)" if longer else ""))] if cited else []
-
-
-def with_sources(
-    show: Callable[[], None],
-    top: Top | None,
-    tables: Sequence[str],
-    whole: bool,
-    further: Callable[[], list[tuple[str, str]]] = list,
-) -> Callable[[], None]:
-    """What prints a report and, below it, its sources and what the model leaves out.
-
-    Parameters
-    ----------
-    show : callable
-        Prints the report.
-    top : Top, optional
-        Without one there are no sources.
-    tables : sequence of str
-        Whose sources, see `source_facts`.
-    whole : bool
-        All of each source, not its citation alone.
-    further : callable
-        Gives what the model has and leaves out, as names and texts.
-
-    Returns
-    -------
-    callable
-        Prints all of it.
-    """
-    from rotor.reports.screen import show_facts
-
-    def show_all() -> None:
-        """The answer and what it was made from."""
-        show()
-        facts = ([] if top is None else source_facts(top, tables, whole)) + further()
-        if facts:
-            show_facts(facts)
-
-    return show_all

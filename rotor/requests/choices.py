@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,11 +47,11 @@ class Choices(Reader):
         name, texts = _words(line)
         kinds = self.load()
         if name not in kinds:
-            raise ValueError(f"{line!r}: no {self.word} is named {name!r}; {_nearest(name, kinds)}")
+            raise ValueError(f"{line!r}: no {self.word} is named {name!r}; {nearest(name, kinds)}")
         fields = {one.last: one for one in all_fields(kinds[name]).values()}
         for key in texts:
             if key not in fields:
-                raise ValueError(f"{line!r}: {name} has no {key!r}; {_nearest(key, fields)}")
+                raise ValueError(f"{line!r}: {name} has no {key!r}; {nearest(key, fields)}")
         if missing := [key for key, one in fields.items() if one.default is REQUIRED and key not in texts]:
             raise ValueError(f"{line!r}: {missing[0]} is missing; give {_usage(fields)}")
         values = {}
@@ -121,6 +121,7 @@ def _usage(fields: Mapping[str, Field]) -> str:
     return ", ".join(f"{key} ({one.help})" for key, one in fields.items())
 
 
-def _nearest(word: str, known: Mapping[str, Any]) -> str:
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The known word that is most like another one, or all of them, as a part of a sentence."""
     near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
     return f"the nearest is {near[0]!r}" if near else f"there are {', '.join(known)}"

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from rotor.checks import NoAnswerError
 from rotor.plots.view import WHOLE
 from rotor.requests.fill import renaming
 from rotor.scenes.scene import Scene
@@ -20,7 +21,7 @@ Writer = Callable[[Path], None]
 Where = str | os.PathLike[str]
 
 
-class NoResultError(RuntimeError):
+class NoResultError(NoAnswerError):
     """A scene that could be run and has no result, such as a fit that does not converge; nothing is written."""
 
 
@@ -60,7 +61,7 @@ class Kind:
         shown = self.verb.read_shown(given_of(scene, self.verb))
         with self.naming():
             provenance = {"scene": scene_text(scene)} if self.grows & outputs.keys() else {}  # of files that grow
-            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance=provenance))
+            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance=provenance, of_scene=True))
         if reason := self.verb.failure(answer):
             raise NoResultError(f"{reason}; 'rotor {self.verb.name}' shows it nevertheless")
         for name, reason in self.verb.withheld(answer, list(outputs)).items():

@@ -5,7 +5,6 @@ An unknown key is an error with the nearest right one; types are checked by msgs
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import os
@@ -17,6 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
+from rotor.requests.choices import nearest
 from rotor.scenes.scene import KINDS, SCHEMA, Scene
 
 _TYPES = {
@@ -75,7 +75,7 @@ def _kind_of(schema: Any, kind: Any, where: str) -> type[Scene]:
         found = "it has none" if schema is None else f"this one has {schema!r}"
         raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {found}")
     if not isinstance(kind, str) or kind not in KINDS:
-        found = "it has none" if kind is None else f"{kind!r} is none{_nearest(str(kind), KINDS)}"
+        found = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), KINDS)}"
         raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {found}")
     return KINDS[kind]
 
@@ -89,7 +89,9 @@ def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, plac
         if key not in kind.__struct_fields__:
             of = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
             elsewhere = "" if isinstance(value, Mapping) else _other_place(key, scene)
-            raise ValueError(f"{where}: {of} has no key {key!r}{elsewhere or _nearest(key, kind.__struct_fields__)}")
+            raise ValueError(
+                f"{where}: {of} has no key {key!r}{elsewhere or '; ' + nearest(key, kind.__struct_fields__)}"
+            )
         if not isinstance(value, Mapping | list):
             continue
         inside = f"{place}.{key}" if place else key
@@ -117,7 +119,7 @@ def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
         for word in {word for word in known.values() if word is not None and isinstance(item, Mapping)}:
             if isinstance(item.get(word), str) and item[word] not in known:
                 raise ValueError(
-                    f"{where}: {place}[{number}].{word}: {item[word]!r} is none{_nearest(item[word], known)}"
+                    f"{where}: {place}[{number}].{word}: {item[word]!r} is none; {nearest(item[word], known)}"
                 )
 
 
@@ -145,11 +147,6 @@ def structures_in(hint: Any) -> list[Any]:
     if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
         return [hint]
     return [one for part in get_args(hint) for one in structures_in(part)]
-
-
-def _nearest(key: str, known: Any) -> str:
-    near = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
-    return f"; the nearest is {near[0]!r}" if near else f"; there are {', '.join(known)}"
 
 
 def _said(error: msgspec.ValidationError) -> str:

@@ -9,10 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import NoAnswerError
 from rotor.table import counted
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.subjects import top_of_word
-from rotor.verbs.verb import NoAnswerError, Note
+from rotor.verbs.verb import Note
 
 if TYPE_CHECKING:
     import numpy as np

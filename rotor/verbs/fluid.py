@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import RunStopped
+from rotor.checks import NoAnswerError, RunStopped
 from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
 from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
@@ -22,7 +22,7 @@ from rotor.requests.fill import Given, read_fields, read_instance, written_field
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import PICTURES, NoAnswerError, Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -203,7 +203,7 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
     """
     growing = {name: [str(path) for path in work.files.get(name, ())] for name in ("csv", "trajectories", "checkpoint")}
     csv, checkpoint = (next(iter(growing[name]), None) for name in ("csv", "checkpoint"))
-    shown, of_scene = work.shown, "scene" in work.provenance
+    shown, of_scene = work.shown, work.of_scene
     outputs = Outputs(csv, tuple(growing["trajectories"]), shown.frames_every, checkpoint, shown.checkpoint_every)
     resume = shown.resume or (of_scene and checkpoint is not None and Path(checkpoint).is_file())
     head = {**work.provenance, **_settings(request)}

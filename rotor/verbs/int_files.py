@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import NoAnswerError
 from rotor.requests.fill import Given
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
-from rotor.verbs.verb import NoAnswerError, Note, Report
+from rotor.verbs.verb import Note, Report
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction

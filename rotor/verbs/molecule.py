@@ -153,10 +153,11 @@ class Reading:
     def path(self, name: str) -> str:
         """A file beside the scene, other words as they are."""
         beside = str(Path(self.folder) / name)
-        return beside if self.style == "key" and not name.startswith("SMILES:") and _is_file(beside) else name
+        return beside if self.style == "key" and not name.startswith("SMILES:") and is_file(beside) else name
 
 
-def _is_file(name: str) -> bool:
+def is_file(name: str) -> bool:
+    """Whether a text is the name of a file; one that no path can be, too long or with a zero byte, is none."""
     try:
         return Path(name).is_file()
     except (OSError, ValueError):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import NoAnswerError
 from rotor.formats.family_file import FamilyFile, read_family
 from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
 from rotor.reports.screen import Table, show_facts, show_table
@@ -22,7 +23,6 @@ from rotor.verbs.subjects import beside
 from rotor.verbs.verb import (
     PICTURES,
     ErrorsShown,
-    NoAnswerError,
     Output,
     Place,
     Report,

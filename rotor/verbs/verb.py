@@ -29,10 +29,6 @@ PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
 
 
-class NoAnswerError(RuntimeError):
-    """The input is sound, but no answer was reached: exit code 1; nothing is written."""
-
-
 def silent(_: str) -> None:
     """Discards a remark."""
 
@@ -67,7 +63,7 @@ class Subject:
 class Work:
     """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
     remarks. progress: whether a terminal shows it. provenance: of files that grow. view: of the picture. at_end: takes what is done at the
-    end of a command.
+    end of a command. of_scene: whether a scene asks.
     """
 
     executor: Executor | None = None
@@ -78,6 +74,7 @@ class Work:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     at_end: Callable[[Callable[[], object]], object] = lambda end: None
+    of_scene: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)

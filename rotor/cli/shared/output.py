@@ -9,14 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rotor.reports.screen import Table as Table
-from rotor.reports.screen import json_text as json_text
-from rotor.reports.screen import json_with_rows as json_with_rows
-from rotor.reports.screen import plain as plain
-from rotor.reports.screen import rows_of as rows_of
-from rotor.reports.screen import show_facts as show_facts
-from rotor.reports.screen import show_table as show_table
-from rotor.reports.screen import table_text as table_text
+from rotor.checks import NoAnswerError
 from rotor.temporary import locked_file
 
 Writer = Callable[[Path], None]
@@ -33,19 +26,15 @@ def at_end(done: Callable[[], object]) -> None:
     _HELD.callback(done)
 
 
-class ComputationError(Exception):
-    """The input is sound, but no answer was reached: exit code 1."""
-
-
 @contextmanager
 def answering() -> Iterator[None]:
     """Inside, a ValueError is no longer the user's mistake: what was given has been checked before."""
     try:
         yield
     except ValueError as error:
-        raise ComputationError(str(error)) from error
+        raise NoAnswerError(str(error)) from error
     except MemoryError as error:
-        raise ComputationError(
+        raise NoAnswerError(
             "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
         ) from error
 
@@ -134,7 +123,7 @@ def _resolved(option: str, path: Path) -> Path:
 def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:
     """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints.
 
-    Raises ComputationError at the end for files whose format cannot hold the result.
+    Raises NoAnswerError at the end for files whose format cannot hold the result.
     """
     left_out = files.write({**writers, "--json": lambda path: write_text(path, json())})
     if "--json" in files.screen:
@@ -142,7 +131,7 @@ def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str]
     else:
         show()
     if left_out:
-        raise ComputationError("; ".join(left_out))
+        raise NoAnswerError("; ".join(left_out))
 
 
 def write_text(path: Path, text: str) -> None:

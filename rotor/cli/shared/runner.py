@@ -8,12 +8,14 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
-from rotor.cli.shared.output import ComputationError, Files, answering, at_end, deliver, note
+from rotor.cli.shared.output import Files, answering, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
 from rotor.reports.progress import elapsed_time
 from rotor.requests.fill import Given, renaming
-from rotor.verbs.verb import NoAnswerError, Place, Report, Subject, Verb, Work, files_of, report_of
+from rotor.verbs.molecule import is_file
+from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, report_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -47,7 +49,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     process.begin_work()
     head = {"command": str(context.obj), "input": subject.text}
     with working(verb, there.get("workers", 1)) as executor:
-        with answering() if verb.sound else naming(verb), reaching():
+        with answering() if verb.sound else naming(verb):
             work = Work(executor, shown, outputs, note, True, head, view, at_end)
             with nullcontext() if verb.stepwise else elapsed_time("computing"):
                 answer = verb.answer(request, work)
@@ -63,12 +65,12 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
             named = by_name(verb, files, growing)
             named_files = {name: value for name, value in there.items() if name not in outputs or name in named}
             writers["--save-scene"] = scene_writer(verb, request, subject, given, named_files)
-        with naming(verb), reaching():
+        with naming(verb):
             deliver(
                 files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
             )
         if reason := verb.failure(answer):
-            raise ComputationError(reason)
+            raise NoAnswerError(reason)
 
 
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
@@ -78,15 +80,6 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
         from rotor.reports.error_table import show_errors
 
         show_errors(report.content)
-
-
-@contextmanager
-def reaching() -> Iterator[None]:
-    """Inside, an answer that is not reached is no mistake of the user."""
-    try:
-        yield
-    except NoAnswerError as error:
-        raise ComputationError(str(error)) from error
 
 
 def places_of(verb: Verb) -> set[str]:
@@ -165,17 +158,10 @@ def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) ->
     written: by option. typed: everything that may name a file that is read.
     """
     texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
-    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and _is_file(text)}
+    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)}
     for name, path in written.items():
         if os.path.realpath(path) in inputs:
             raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return Path(text).is_file()
-    except (OSError, ValueError):  # a text that no path can be: too long, or with a zero byte
-        return False
 
 
 def by_name(verb: Verb, *groups: Files) -> dict[str, tuple[Path, ...]]:
@@ -194,10 +180,10 @@ def _paths(value: Any) -> tuple[str, ...]:
 
 
 def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
-    """ComputationError where a picture or a profile is asked for and there is nothing to show in it."""
+    """NoAnswerError where a picture or a profile is asked for and there is nothing to show in it."""
     drawn = [name for name in ("--plot", "--profile-csv") if name in files.paths]
     if drawn and (reason := verb.nothing(answer)):
-        raise ComputationError(f"{drawn[0]}: {reason}")
+        raise NoAnswerError(f"{drawn[0]}: {reason}")
 
 
 @contextmanager

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
-from rotor.scenes.kind import NoResultError
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import Scene
 from rotor.scenes.scene_file import scene_of, scene_text
@@ -185,7 +185,7 @@ def run_point(job: Job) -> Record:
         if joined is not None:
             joined.write_part(job.key, job.values, result.table)
         results = point_results(scene.kind, result.answer, len(result.table))
-    except (ValueError, NoResultError) as error:
+    except (ValueError, NoAnswerError) as error:
         return _failed(job, str(error), time.perf_counter() - start)
     except MemoryError:
         return _failed(job, "not enough memory", time.perf_counter() - start)
