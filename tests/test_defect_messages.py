@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 
@@ -148,3 +149,30 @@ def test_an_intensity_that_underflows_has_a_bound(call, folder):
     assert "inf" not in out.split("in order of frequency")[1].split("sources")[0]
     assert out.count("<-300") == 2
     assert "inf" not in (folder / "a.csv").read_text(encoding="utf-8").split("frequency_mhz")[1]
+
+
+def test_a_line_with_an_f_that_no_spins_make_is_named(call):
+    """Spins of another molecule: no function of rotation and spins has some F of the lines. It ended in an IndexError."""
+    oracle = Path(__file__).parent / "oracles" / "spcat"
+    text = (oracle / "csf.par").read_text()
+    assert "l  -28 " in text
+    Path("csf.par").write_text(text.replace("l  -28 ", "l  -32 "))
+    Path("csf.lin").write_bytes((oracle / "csf.lin").read_bytes())
+    code, _, err = call("fit", "csf.par", "--iterations", "2", "--out", "o")
+    assert code == 2
+    line, level = re.fullmatch(
+        r"error: csf.lin: line \d+, (.*) at .* there is no level (.*) \(n, f1, f\) in this model\n", err
+    ).groups()
+    assert level in line.split(" - ")  # the level that is named is one of the line's
+
+
+def test_a_constant_that_no_line_determines_has_no_error(call):
+    """A code of a state that does not exist: neither the table nor the files print an infinite error."""
+    oracle = Path(__file__).parent / "oracles" / "fits"
+    Path("co.par").write_text((oracle / "co.par").read_text().replace("             400 ", "             342 "))
+    Path("co.lin").write_bytes((oracle / "co.lin").read_bytes())
+    code, out, _ = call("fit", "co.par", "--iterations", "2", "--out", "o")
+    assert code == 0
+    assert "(not determined)" in out
+    texts = [out, *(path.read_text() for path in Path().glob("o.*"))]
+    assert not [text for text in texts if re.search(r"\binf\b", text, re.IGNORECASE)]

@@ -259,9 +259,9 @@ def _with_levels(
 
 
 def missing_level(lines: Assignments, error: MissingLevelsError) -> ValueError:
-    """The error of the first line that has a level which does not exist."""
+    """The error of the first line that has the level which the error names, the first of its places."""
     _, upper, lower = levels_in(lines)
-    lost = np.isin(upper, error.places) | np.isin(lower, error.places)
+    lost = (upper == error.places[0]) | (lower == error.places[0])
     return ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}")
 
 

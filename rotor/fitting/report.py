@@ -105,7 +105,7 @@ def statistics_text(fit: Fit) -> list[str]:
         *_with_priors(fit),
         *([f"rms of lines in MHz {rms:.6f} MHz"] if math.isfinite(rms) else []),
         *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
-        f"condition number of the column-scaled Jacobian {condition:.3e}",
+        f"condition number of the column-scaled Jacobian {f'{condition:.3e}' if math.isfinite(condition) else 'infinite'}",
     ]
     out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
     out += [f"far off, {text}" for text in far_off(fit)]
@@ -127,12 +127,17 @@ def blend_counts(fit: Fit) -> tuple[int, int]:
 
 
 def scatter_text(value: float, form: str) -> str:
-    """A number that follows from the scatter of the lines; undefined with 0 degrees of freedom.
+    """A number that follows from the scatter of the lines; undefined with 0 degrees of freedom, a dash where nothing determines it.
 
-    >>> scatter_text(1.25, ".3f"), scatter_text(float("nan"), ".3f")
-    ('1.250', 'undefined')
+    >>> scatter_text(1.25, ".3f"), scatter_text(float("nan"), ".3f"), scatter_text(float("inf"), ".3f")
+    ('1.250', 'undefined', '-')
     """
-    return "undefined" if math.isnan(value) else format(value, form)
+    return "undefined" if math.isnan(value) else error_text(value, form)
+
+
+def error_text(error: float, form: str) -> str:
+    """An error, or a dash where there is none: the lines do not determine the constant, or it has no a-priori error."""
+    return format(error, form) if math.isfinite(error) else "-"
 
 
 def _with_priors(fit: Fit) -> list[str]:
@@ -226,7 +231,10 @@ def _hamiltonian(fit: Fit) -> list[str]:
 
 def _start(fit: Fit) -> list[str]:
     rows = zip(fit.parameters.names, fit.parameters.start.tolist(), fit.parameters.prior.tolist(), strict=True)
-    return [f"{i:5d}  {name:<16}{value:24.15E}  {prior:12.4E}" for i, (name, value, prior) in enumerate(rows, 1)]
+    return [
+        f"{i:5d}  {name:<16}{value:24.15E}  {error_text(prior, '12.4E'):>12}"
+        for i, (name, value, prior) in enumerate(rows, 1)
+    ]
 
 
 def _lines(fit: Fit) -> list[str]:
@@ -277,7 +285,7 @@ def _end(fit: Fit) -> list[str]:
         shown = value_text(value, error) if math.isfinite(error) else f"{value!r} (not determined)"
         change = value - float(fit.parameters.start[i])
         out.append(
-            f"{i + 1:5d}  {name:<16}{shown:>28}  {error:12.4E}  "
+            f"{i + 1:5d}  {name:<16}{shown:>28}  {error_text(error, '12.4E'):>12}  "
             f"{scatter_text(float(scaled[i]), '12.4E'):>12}  {change:12.4E}"
         )
     return out

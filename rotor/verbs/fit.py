@@ -266,7 +266,7 @@ def show(answer: FitAnswer, report: Report) -> None:
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     from rotor.fitting.publication import value_text
-    from rotor.fitting.report import parameter_units, scatter_text
+    from rotor.fitting.report import error_text, parameter_units, scatter_text
 
     columns = [
         "parameter",
@@ -284,7 +284,7 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
             else f"{float(fit.values[i])!r} (not determined)"
         )
         numbers = [
-            f"{error:.3g}",
+            error_text(error, ".3g"),
             scatter_text(float(fit.scaled_errors[i]), ".3g"),
             *([f"{spread[i]:.3g}"] if spread else []),
         ]

@@ -237,7 +237,9 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
 
 
 def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
-    """The parts of every block of an F whose patterns these are."""
+    """The parts of every block of an F whose patterns these are; none of an F that N and the spins do not make."""
+    if not len(every):
+        return
     n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
     bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
     rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}

@@ -175,7 +175,7 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
     if (total < 0).any():
-        first = " ".join(map(str, labels[here[int(np.argmin(total))]].tolist()))
+        first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
     if _direct(group, form):
         return _of_states(group, form, labels, here, names, values)
