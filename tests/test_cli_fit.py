@@ -389,8 +389,8 @@ SAMPLES = Path(__file__).parent / "oracles" / "fits"
 
 
 @pytest.mark.parametrize("script", ["07_fit", "08_structure"])
-def test_the_examples_assert_what_they_claim(script, monkeypatch):
-    monkeypatch.chdir(SAMPLES.parents[2])
+def test_the_examples_run_in_their_folder(script, monkeypatch):
+    monkeypatch.chdir(SAMPLES.parents[2] / "examples")
     runpy.run_path(str(SAMPLES.parents[2] / "examples" / f"{script}.py"))
 
 
