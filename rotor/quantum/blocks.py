@@ -26,7 +26,7 @@ from rotor.quantum.basis.elements import ROUND_OFF, Elements
 from rotor.quantum.basis.labelled import Basis
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.solvers.dominated import dominated_states
+from rotor.quantum.solvers.dominated import dominated_states, is_dominated
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
 
 
@@ -68,22 +68,46 @@ class LinearBlocks:
 
     def solve_dominated(self, coefficients: ArrayLike, by: NDArray[np.bool_]) -> SolvedBlocks:
         """Of each block the states with the largest shares in some of the functions (functions,), as many as these; or all."""
-        states = []
-        for stack, matrices in zip(self.stacks, self.matrices(coefficients), strict=True):
-            chosen = by[stack.functions]
-            counts = np.unique(chosen.sum(axis=1))
-            found = [
-                dominated_states(matrix, np.flatnonzero(few)) if len(counts) == 1 and counts[0] else None
-                for matrix, few in zip(matrices, chosen, strict=True)
-            ]
-            solved = [one for one in found if one is not None]
-            if len(solved) == len(found):
-                states.append(
-                    (np.stack([energies for energies, _ in solved]), np.stack([vectors for _, vectors in solved]))
-                )
-            else:
-                states.append(eigenstates(matrices))
-        return SolvedBlocks(self, tuple(states))
+        values = np.asarray(coefficients, dtype=float) @ self.values
+        return SolvedBlocks(
+            self, tuple(self._dominated_or_all(stack, values, by[stack.functions]) for stack in self.stacks)
+        )
+
+    def _dominated_or_all(
+        self, stack: Stack, values: NDArray[Any], chosen: NDArray[np.bool_]
+    ) -> tuple[Floats, NDArray[Any]]:
+        """Energies and vectors of the states of each block of a stack that lie in chosen functions (blocks, size), or of all."""
+        from scipy.sparse import csr_array
+
+        counts = chosen.sum(axis=1)
+        few: list[tuple[Floats, NDArray[Any]]] = []
+        if (counts == counts[0]).all() and is_dominated(stack.size, int(counts[0])):
+            for block, functions in zip(self.block[stack.functions[:, 0]].tolist(), chosen, strict=True):
+                here = self._by_block.get(block, slice(0, 0))
+                places = self.rank[self.rows[here]], self.rank[self.columns[here]]
+                lower = csr_array((values[here], places), shape=(stack.size, stack.size))
+                states = dominated_states(lower, np.flatnonzero(functions))
+                if states is None:
+                    break
+                few.append(states)
+        if len(few) == len(chosen):
+            return np.stack([energies for energies, _ in few]), np.stack([vectors for _, vectors in few])
+        return eigenstates(self._dense(stack, values))
+
+    @cached_property
+    def _by_block(self) -> dict[int, slice]:
+        """Where the elements of each block stand: they are sorted by block."""
+        numbers, starts = np.unique(self.block[self.rows], return_index=True)
+        stops = np.append(starts[1:], len(self.rows))
+        return {int(n): slice(int(a), int(b)) for n, a, b in zip(numbers, starts, stops, strict=True)}
+
+    def _dense(self, stack: Stack, values: NDArray[Any]) -> NDArray[Any]:
+        """The matrices (blocks, size, size) of one stack from the values of all elements."""
+        flat = np.zeros(stack.place.stop - stack.place.start, dtype=values.dtype)
+        for block in self.block[stack.functions[:, 0]].tolist():
+            here = self._by_block.get(block, slice(0, 0))
+            flat[self._position[here] - stack.place.start] = values[here]
+        return flat.reshape(-1, stack.size, stack.size)
 
     def energies(self, coefficients: ArrayLike) -> Floats:
         """Energies (functions,) at coefficients (terms,), without vectors; nan for blocks that are left out."""

@@ -20,16 +20,22 @@ TOLERANCE_MHZ = 1e-7  # of an energy
 STEPS = 10  # enlargements before all states are solved instead
 SMALLEST_GAP = 1e-3  # MHz, in place of smaller denominators
 SMALL = 150  # size up to which all states are solved as fast
+ORTHOGONAL = 1e-13  # overlap of new functions with the space, which moves energies of 1e8 MHz by its square
 SHARE = 0.2  # of the functions that are chosen, from which they are
 
 
-def dominated_states(lower: Floats, chosen: Ints) -> tuple[Floats, Floats] | None:
+def is_dominated(size: int, count: int) -> bool:
+    """Whether so many states of a matrix are fewer than all to solve."""
+    return size > SMALL and 0 < count <= SHARE * size
+
+
+def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
     """Energies (p,), rising, and vectors (n, p) of the p states with the largest shares in p chosen functions.
 
     Parameters
     ----------
-    lower : (n, n) array
-        A real symmetric matrix in MHz; its lower triangle is read.
+    lower : sparse (n, n) array
+        The lower triangle of a real symmetric matrix in MHz.
     chosen : (p,) array of int
         Functions.
 
@@ -40,17 +46,20 @@ def dominated_states(lower: Floats, chosen: Ints) -> tuple[Floats, Floats] | Non
 
     Examples
     --------
+    >>> from scipy.sparse import csr_array
     >>> rng = np.random.default_rng(1)
     >>> matrix = rng.normal(size=(200, 200)) + np.diag(np.where(np.arange(200) < 8, 0.0, 1e3) + np.arange(200))
     >>> matrix = (matrix + matrix.T) / 2
-    >>> energies, vectors = dominated_states(matrix, np.arange(8))
+    >>> energies, vectors = dominated_states(csr_array(np.tril(matrix)), np.arange(8))
     >>> bool(np.abs(energies - np.linalg.eigvalsh(matrix)[:8]).max() < 1e-7)
     True
     """
-    size, count = len(lower), len(chosen)
-    if size <= SMALL or count > SHARE * size or np.iscomplexobj(lower):
+    size, count = lower.shape[0], len(chosen)
+    if not is_dominated(size, count) or np.iscomplexobj(lower):
         return None
-    whole, diagonal = _symmetric(lower), np.diag(lower)
+    diagonal = lower.diagonal()
+    whole = lower + lower.T
+    whole.setdiag(diagonal)
     space = np.zeros((size, count))
     space[chosen, np.arange(count)] = 1.0
     image = whole @ space
@@ -75,21 +84,10 @@ def dominated_states(lower: Floats, chosen: Ints) -> tuple[Floats, Floats] | Non
     return None
 
 
-def _symmetric(lower: Floats) -> Any:
-    """The whole matrix of a lower triangle, sparse."""
-    from scipy.sparse import csr_array
-
-    rows, columns = np.nonzero(lower)
-    here = rows >= columns
-    rows, columns = rows[here], columns[here]
-    values, beside = lower[rows, columns], rows != columns
-    entries = np.concatenate([values, values[beside]])
-    places = np.concatenate([rows, columns[beside]]), np.concatenate([columns, rows[beside]])
-    return csr_array((entries, places), shape=lower.shape)
-
-
 def _orthonormal(vectors: Floats, space: Floats) -> Floats:
-    """The part of vectors outside a space as orthonormal columns; twice, against rounding."""
-    for _ in range(2):
-        vectors = np.linalg.qr(vectors - space @ (space.T @ vectors))[0]
-    return vectors
+    """The part of vectors outside a space as orthonormal columns; again where rounding has left some of the space."""
+    outside = np.linalg.qr(vectors - space @ (space.T @ vectors))[0]
+    inside = space.T @ outside
+    if np.abs(inside).max() < ORTHOGONAL:
+        return np.asarray(outside)
+    return np.asarray(np.linalg.qr(outside - space @ inside)[0])
