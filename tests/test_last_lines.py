@@ -38,7 +38,7 @@ COMMANDS = {
     "structure": ("family.toml",),
     "fit": ("l.csv", "--constants", "B=57600 D=0.18 MHz", "--free", "B,D"),
     "assign": ("p.csv", "--range", "8000:18000"),
-    "fluid": ("argon", "--molecules", "8", "--steps", "2", "--cutoff", "3"),
+    "fluid": ("argon", "--model", "argon", "--molecules", "8", "--steps", "2", "--cutoff", "3"),
 }
 SLOW = {"assign", "fluid"}
 
