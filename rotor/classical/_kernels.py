@@ -6,8 +6,8 @@ of their own file: after a change of a plain function remove the caches (CONTRIB
 
 from __future__ import annotations
 
-from rotor.classical import error_free
 from rotor.classical.integrators import strang
+from rotor.geometry import error_free
 from rotor.geometry._kernels import inlined
 
 halves = inlined(error_free.halves)

@@ -20,7 +20,6 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
-from rotor.quantum.spins.scheme import scheme_of
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
 from rotor.requests.knob import Knob, Measure
@@ -336,13 +335,15 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
     from rotor.thermodynamics import partition_function
 
     top, effects, kelvin = lines.top, lines.levels.effects, lines.temperature_k
-    scheme = scheme_of(top, effects)
-    if scheme.equivalent == 2:  # which of their functions exist follows from the weights of the rotation
-        return None
     of_states = [effect for effect in effects if effect.states(top)]
     others = tuple(effect for effect in effects if effect not in of_states and not effect.spins(top))
     if len(others) == len(effects):
         return partition_function(top, kelvin, effects=effects).q, False
+    from rotor.quantum.spins.scheme import scheme_of
+
+    scheme = scheme_of(top, effects)
+    if scheme.equivalent == 2:  # which of their functions exist follows from the weights of the rotation
+        return None
     bare = replace(top, states=None, spin_constants=None, level_table=None, symmetry_checked=False)
     first, sums = partition_function(bare, kelvin, effects=others).q, 1.0
     for effect in of_states:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.classical.error_free import two_product, two_sum
+from rotor.geometry.error_free import two_product, two_sum
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.classical.error_free import halves
 from rotor.formats.spcat.text.fields import BLANK, QUANTUM_RANGE, spell_degeneracy, spell_quantum
+from rotor.geometry.error_free import halves
 
 Text = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
