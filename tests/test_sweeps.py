@@ -516,6 +516,46 @@ def test_workers_have_the_environment_of_now_and_the_modules_of_the_work(monkeyp
         assert pool.submit(_setting, "ROTOR_MOLECULES").result() == "elsewhere"
 
 
+SHARED = """
+import sys
+
+def loaded(_):
+    return [name in sys.modules for name in ("rotor.verbs.levels", "rdkit.Chem", "rotor.verbs.tumble")]
+
+if __name__ == "__main__":
+    from rotor.cli.shared import process
+    process.begin()
+    process.start_workers_ahead(["run", "s.toml", "--workers", "2"])
+    heavy = "numpy" in sys.modules
+    from rotor.scenes.worker_processes import worker_processes
+    with worker_processes(2) as pool:
+        print(heavy, pool.submit(loaded, 0).result())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process imports by itself")
+def test_the_server_of_workers_starts_before_anything_is_loaded(folder):
+    """The imports of workers came after those of the process that began: two workers were 1.2 times as fast as one process."""
+    write_scene(levels(molecule="SMILES:C=O", sweep={"observables.jmax": [1, 2]}), "s.toml")
+    Path("shared.py").write_text(SHARED)
+    done = subprocess.run([sys.executable, "shared.py"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False [True, True, False]"
+
+
+def test_arguments_that_are_wrong_start_no_workers(monkeypatch):
+    from rotor.cli.shared import process
+    from rotor.scenes import worker_processes as processes
+
+    texts = []
+    monkeypatch.setattr(process, "_OWN", True)
+    monkeypatch.setattr(processes, "start_ahead", texts.append)
+    for words in ("run s.toml", "run s.toml --workers 1", "run s.toml --workers x", "run s.toml --workers 01"):
+        process.start_workers_ahead(words.split())
+    assert texts == []
+    process.start_workers_ahead(["run", "no such file", "--workers=2"])
+    assert texts == [""]
+
+
 def test_what_is_not_written_is_not_computed(monkeypatch, folder):
     """The facts of an answer, with its budgets and limits, took a third of a sweep that writes one table of all points."""
     from rotor.quantum.request import LevelsAnswer

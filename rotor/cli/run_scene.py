@@ -97,7 +97,7 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
     files.ask_json(typed.get("json"))
     refuse_overwriting(files.paths, {"scene": options.scene})
     process.begin_work()
-    with _workers(options, scene) as pool:
+    with _workers(options) as pool:
         if swept:
             _sweep(scene, options, files, pool, context.obj)
         else:
@@ -105,7 +105,7 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
 
 
 @contextmanager
-def _workers(options: Options, scene: Scene) -> Iterator[Executor | None]:
+def _workers(options: Options) -> Iterator[Executor | None]:
     """A pool of processes, or of workers of a cluster; None for one process."""
     number = options.workers
     if options.dask is not None:
@@ -119,10 +119,9 @@ def _workers(options: Options, scene: Scene) -> Iterator[Executor | None]:
     if number is None or number == 1:
         yield None
         return
-    from rotor.scenes.run import modules_of
     from rotor.scenes.worker_processes import worker_processes
 
-    with worker_processes(number, modules_of(scene)) as pool:
+    with worker_processes(number) as pool:
         yield pool
 
 

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from rotor.table import Table
 
 
-_RDKIT = ("rdkit.Chem", "rdkit.Chem.rdDistGeom", "rdkit.Chem.rdForceFieldHelpers")
-
-
 def run_scene(
     scene: Scene,
     *,
@@ -70,26 +67,6 @@ def run_scene(
         for path in sorted({resolved(path) for paths in targets.values() for path in paths}):
             stack.enter_context(locked_file(path))
         return _run(scene, targets, folder, out, executor)
-
-
-def modules_of(scene: Scene) -> tuple[str, ...]:
-    """The modules that computing a scene imports, for processes that share its work.
-
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> modules_of(LevelsScene(molecule="CO"))[0]
-    'rotor.verbs.levels'
-    """
-    from rotor.scenes.scene_file import scene_text
-
-    text = scene_text(scene)
-    of_smiles = "SMILES:" in text or any(suffix in text for suffix in (".csv", ".sdf", ".mol"))
-    common = (
-        f"rotor.verbs.{scene.kind}",
-        "rotor.formats.read_write",
-        "rotor.formats.tables",
-        "rotor.quantum.estimates.budgets",
-    )
-    return (*common, *(_RDKIT if of_smiles else ()))
 
 
 def _run(

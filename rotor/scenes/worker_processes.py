@@ -3,16 +3,19 @@
 A `ProcessPoolExecutor` is broken for good when one of its processes ends, as the system ends one that takes too much memory. Here every
 process is a pool of one, which is started again. Each takes one thread of BLAS: several processes of several threads wait for each other.
 
-On Linux the modules of the work are imported once, by a server from which the processes are forked; elsewhere by each of them.
+On Linux the modules of the work are imported once, by a server from which the processes are forked; elsewhere by each of them. The server
+can start before anything else of a command is loaded (`start_ahead`).
 """
 
 from __future__ import annotations
 
+import gc
 import os
+import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -25,6 +28,14 @@ T = TypeVar("T")
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTING = threading.Lock()  # the environment is that of the whole process
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # a fork after imports is not safe on macOS
+_COMMON = (
+    "rotor.scenes.sweep.run",
+    "rotor.formats.read_write",
+    "rotor.formats.tables",
+    "rotor.quantum.estimates.budgets",
+)
+_OF_SMILES = ("rdkit.Chem", "rdkit.Chem.rdDistGeom", "rdkit.Chem.rdForceFieldHelpers", "rotor.molecules.readers.smiles")
+_KIND = re.compile(r"""\bkind"?\s*[=:]\s*["'](\w+)["']""")
 
 
 class WorkerKilledError(RuntimeError):
@@ -34,11 +45,8 @@ class WorkerKilledError(RuntimeError):
 class WorkerProcesses(Executor):
     """An executor of processes that do not depend on each other."""
 
-    def __init__(self, number: int, modules: Sequence[str] = ()) -> None:
-        """So many processes. modules: those that the work needs, imported before the first piece comes."""
-        get_context(_METHOD).set_forkserver_preload(
-            ["rotor.scenes.sweep.run", *modules]
-        )  # without effect once the server runs
+    def __init__(self, number: int) -> None:
+        """So many processes."""
         self._threads = ThreadPoolExecutor(number)
         self._free: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
         self._ended = False
@@ -81,9 +89,9 @@ class WorkerProcesses(Executor):
 
 
 @contextmanager
-def worker_processes(number: int, modules: Sequence[str] = ()) -> Iterator[WorkerProcesses]:
+def worker_processes(number: int) -> Iterator[WorkerProcesses]:
     """So many processes until the end of the context; where it ends with an error or Ctrl-C, they are ended at once."""
-    pool = WorkerProcesses(number, modules)
+    pool = WorkerProcesses(number)
     try:
         yield pool
     except BaseException:
@@ -92,23 +100,48 @@ def worker_processes(number: int, modules: Sequence[str] = ()) -> Iterator[Worke
     pool.shutdown()
 
 
-def _started_process() -> ProcessPoolExecutor:
-    """A pool of one process that has started with one thread of BLAS, whatever this process has."""
-    pool = ProcessPoolExecutor(1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(),))
+def start_ahead(scene_text: str = "") -> None:
+    """Begin the server that imports what computing a scene needs, where there is one, and do not wait for it.
+
+    scene_text: of its file; what it needs beyond the rest, by its kind and by what names its molecules. Modules that cannot be imported
+    are left to the work itself. Without effect once the server runs.
+    """
+    if _METHOD != "forkserver":
+        return
+    from multiprocessing import forkserver
+
+    kinds = tuple(f"rotor.verbs.{name}" for name in _KIND.findall(scene_text)[:1])
+    smiles = _OF_SMILES if any(sign in scene_text for sign in ("SMILES:", ".csv", ".sdf", ".mol")) else ()
+    forkserver.set_forkserver_preload([*_COMMON, *kinds, *smiles])
+    with _one_thread():
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread of BLAS for processes that start inside."""
     with _STARTING:
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
         try:
-            try:
-                pool.submit(_nothing)
-            except (EOFError, ConnectionError):  # the server was ended from outside; another one is started
-                pool.submit(_nothing)
+            yield
         finally:
             for name, value in before.items():
                 if value is None:
                     os.environ.pop(name, None)
                 else:
                     os.environ[name] = value
+
+
+def _started_process() -> ProcessPoolExecutor:
+    """A pool of one process that has started with one thread of BLAS, whatever this process has."""
+    start_ahead()
+    pool = ProcessPoolExecutor(1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(),))
+    with _one_thread():
+        try:
+            pool.submit(_nothing)
+        except (EOFError, ConnectionError):  # the server was ended from outside; another one is started
+            pool.submit(_nothing)
     return pool
 
 
@@ -125,6 +158,7 @@ def _begin(environment: dict[str, str]) -> None:
     """Ctrl-C reaches all processes of a terminal: the one that began ends the others, which end with it whatever ends it."""
     os.environ.clear()
     os.environ.update(environment)
+    gc.freeze()  # modules stay: they are not searched for what is no longer used
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -75,6 +75,10 @@ class CombinedFile:
             return {str(key) for (key,) in rows}
         return set()
 
+    def load(self) -> None:
+        """Import what joining needs."""
+        import duckdb  # noqa: F401
+
     def open_folder(self) -> None:
         """Make the folder in which rows wait."""
         os.makedirs(self.folder, exist_ok=True)

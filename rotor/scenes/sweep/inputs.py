@@ -57,7 +57,7 @@ class InputHashes:
                     str(file.relative_to(self._folder) if file.is_relative_to(self._folder) else file),
                     self._hash(file),
                 )
-        if key in _MOLECULE_KEYS:
+        if key in _MOLECULE_KEYS and not word.startswith("SMILES:"):
             from rotor.formats.molecules.library import library_file
 
             known = library_file(word)

@@ -113,6 +113,8 @@ def run_sweep(
                         os.fspath(out),
                         tuple(every.combined.values()),
                     )
+            if joined is not None and executor is not None:  # while others compute
+                joined.load()
 
         if joined is not None:
             joined.open_folder()
