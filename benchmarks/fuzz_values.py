@@ -258,7 +258,7 @@ def run_case(number: int, folder: Path, weighted: Weighted, hostile: dict[str, b
     new = sorted({str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} - before)
     scene = folder / "s.toml"
     sweep = words[:2] == ["run", "s.toml"] and scene.exists() and b"[sweep]" in scene.read_bytes()
-    rows_stay = sweep or words[:1] in (["fluid"], ["catalogue"]) or any(name.endswith(".fit") for name in new)
+    rows_stay = sweep or words[:1] in (["fluid"], ["catalogue"], ["fit"])
     outcome.left = [
         name for name in new if Path(name).name.startswith(".rotor") or (outcome.code != 0 and not rows_stay)
     ]
@@ -476,7 +476,7 @@ def summary(lines: list[Answer]) -> str:
         counts: Counter[tuple[str, str]] = Counter()
         for piece in pieces:
             for name, count in piece["counts"].items():
-                kind, _, code = name.split(" ")
+                kind, code = name.split(" ")[0], name.split(" ")[-1]
                 counts[kind, code] += count
         cases = sum(piece["cases"] for piece in pieces)
         if not cases:

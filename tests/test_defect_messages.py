@@ -176,3 +176,18 @@ def test_a_constant_that_no_line_determines_has_no_error(call):
     assert "(not determined)" in out
     texts = [out, *(path.read_text() for path in Path().glob("o.*"))]
     assert not [text for text in texts if re.search(r"\binf\b", text, re.IGNORECASE)]
+
+
+@pytest.mark.parametrize("options", [(), ("--full-basis",), ("--as-spcat",)])
+@pytest.mark.parametrize("code", [115, 27115, 80109])
+def test_a_dipole_along_a_fourth_axis_is_refused(call, options, code):
+    """SYM of a dipole is 0 to 3: other digits ended in an IndexError."""
+    oracle = next((Path(__file__).parent / "oracles").rglob("moments_alone.int"))
+    lines = oracle.read_text().split("\n")
+    Path("a.int").write_text("\n".join([*lines[:5], f" {code} 0.3", *lines[6:]]))
+    Path("a.var").write_bytes(oracle.with_suffix(".var").read_bytes())
+    code_of_exit, _, err = call("spectrum", "a.int", *options, "--cat", "x.cat")
+    assert code_of_exit == 2
+    assert str(code) in err
+    assert "defect" not in err
+    assert not Path("x.cat").exists()

@@ -211,7 +211,7 @@ def moments_within_states(
     plain += [
         (code.states[0], code.axis, code.typ in EVEN_ORDER)
         for _, code in others
-        if code.axis and len(set(code.states)) == 1
+        if code.axis in (1, 2, 3) and len(set(code.states)) == 1
     ]
     return [
         (axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])
