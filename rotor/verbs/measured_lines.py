@@ -13,7 +13,7 @@ from rotor.requests.fill import Given, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.subjects import beside, optional_molecule, saved_molecule
+from rotor.verbs.subjects import beside, optional_molecule, saved_molecule, with_molecule_table
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -146,8 +146,7 @@ class MeasuredLines(SubjectKind):
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
         """The tables, a name alone being the source."""
-        molecule = content.get("molecule")
-        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
+        return with_molecule_table(content)
 
     def read(self, given: Given, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the top to start from."""

@@ -54,8 +54,7 @@ class OneMolecule(SubjectKind):
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
         """The tables, a name alone being the source."""
-        molecule = content.get("molecule")
-        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
+        return with_molecule_table(content)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of the molecule, files counted from the folder of the scene."""
@@ -72,6 +71,12 @@ def top_of_word(
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
     reading = Reading(read_molecule(Given(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
+
+
+def with_molecule_table(content: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a scene, a molecule that is a name alone being the source of its table."""
+    molecule = content.get("molecule")
+    return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
 
 
 def _molecule_type() -> Any:

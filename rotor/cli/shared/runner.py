@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,13 +63,12 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         report.content["files"] = [*growing.names, *files.names]  # type: ignore[index]
         writers = {verb.output(name).flag: write for name, write in files_of(verb, answer, report).items()}
         if "--save-scene" in files.paths:
-            named = by_name(verb, files, growing)
-            named_files = {name: value for name, value in there.items() if name not in outputs or name in named}
-            writers["--save-scene"] = scene_writer(verb, request, subject, given, named_files)
+            left_out = outputs.keys() - by_name(verb, files, growing).keys()
+            named = {name: value for name, value in there.items() if name not in left_out}
+            writers["--save-scene"] = scene_writer(verb, request, subject, given, named)
+        show = partial(show_answer, verb, answer, report)
         with naming(verb):
-            deliver(
-                files, writers, lambda: verb.json(answer, report.content), lambda: show_answer(verb, answer, report)
-            )
+            deliver(files, writers, lambda: verb.json(answer, report.content), show)
         if reason := verb.failure(answer):
             raise NoAnswerError(reason)
 
