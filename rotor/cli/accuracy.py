@@ -63,7 +63,7 @@ def answer(request: AccuracyRequest, work: Work) -> Swept:
     so_far: list[WorkPrecision] = []
     try:
         with _progress() as shown:
-            found = work_precision(
+            table = work_precision(
                 scene, folder=folder, limit_seconds=request.seconds, progress=shown, on_knob=so_far.append
             )
     except KeyboardInterrupt:
@@ -71,9 +71,9 @@ def answer(request: AccuracyRequest, work: Work) -> Swept:
         if so_far:
             show(Swept(request.scene, scene, so_far[-1]), None)
         raise
-    if "plot" in work.files and not found.rows:
-        raise ValueError(f"--plot: there is nothing to draw: {'; '.join(found.remarks)}")
-    return Swept(request.scene, scene, found)
+    if "plot" in work.files and not table.rows:
+        raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
+    return Swept(request.scene, scene, table)
 
 
 @contextmanager
@@ -110,16 +110,16 @@ def _title(scene: Scene) -> str:
 
 def show(answer: Swept, _: Any) -> None:
     """Print a table for each knob, and what they are held against."""
-    found = answer.found
+    table = answer.found
     print(_title(answer.scene))
-    for (knob, error_of, unit), rows in found.curves().items():
+    for (knob, error_of, unit), rows in table.curves().items():
         print()
         heading = f"error ({unit})" if unit else "error"
         show_table(Table(f"{knob}: {error_of}", ["setting", "", heading, "seconds"], [_cells(row) for row in rows]))
-    if found.rows:
+    if table.rows:
         print("\n* what the scene has; seconds of the processor, without start-up and compilation")
-    facts = [("against", f"{name}: {text}") for name, text in found.references.items()]
-    facts += [("remark", text) for text in found.remarks]
+    facts = [("against", f"{name}: {text}") for name, text in table.references.items()]
+    facts += [("remark", text) for text in table.remarks]
     show_facts([(name if not n or facts[n - 1][0] != name else "", text) for n, (name, text) in enumerate(facts)])
 
 

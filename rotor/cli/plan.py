@@ -64,14 +64,14 @@ def show(answer: Planned, _: Any) -> None:
         ("seconds", f"{plan.seconds:.2g} of the processor, without start-up and compilation"),
         ("memory", f"{plan.memory_mb:.2g} MB at the most, in use at one time"),
     ]
-    larger, others = larger_ones(plan.left_out, lambda one: one.size, lambda one: one.name)
-    texts = [_text(one) for one in larger] + ([others] if others else [])
+    larger, others = larger_ones(plan.left_out, lambda part: part.size, lambda part: part.name)
+    texts = [_text(part) for part in larger] + ([others] if others else [])
     show_facts([*facts, *(("left out" if not number else "", text) for number, text in enumerate(texts))])
 
 
-def _text(one: LeftOut) -> str:
-    size: Any = "not estimated" if one.size is None else f"about {one.size:.1g} {one.unit}"
-    return f"{one.name}: {size}; {one.basis}"
+def _text(part: LeftOut) -> str:
+    size: Any = "not estimated" if part.size is None else f"about {part.size:.1g} {part.unit}"
+    return f"{part.name}: {size}; {part.basis}"
 
 
 VERB = Tool(

@@ -227,9 +227,9 @@ def assignments(
 def levels_in(lines: Assignments) -> tuple[Ints, Ints, Ints]:
     """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
     there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
-    labels, found = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
+    labels, places_among = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
     places = np.full(2 * len(lines), -1, dtype=np.int64)
-    places[there] = found.reshape(-1)
+    places[there] = places_among.reshape(-1)
     return labels, places[: len(lines)], places[len(lines) :]
 
 
@@ -239,8 +239,8 @@ def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
     if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
         return np.unique(rows, axis=0, return_inverse=True)
     keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
-    _, first, found = np.unique(keys, return_index=True, return_inverse=True)
-    return rows[first], found
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    return rows[first], inverse
 
 
 def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 0.0) -> tuple[Assignments, list[str]]:

@@ -46,7 +46,7 @@ def predictions_budget(fit: Fit) -> ErrorBudget:
 def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: float) -> ErrorBudget:
     """scale: one standard error. rounding: beside that which moves constants. line: what a residual of 1 is."""
     if not math.isfinite(scale) or (of == CONSTANTS and not np.isfinite(fit.errors).all()):
-        lost = ", ".join(one.text for one in fit.statistics.undetermined)
+        lost = ", ".join(combination.text for combination in fit.statistics.undetermined)
         unknown = ErrorTerm(None, f"not determined by these lines: {lost}", LINES)
         return ErrorBudget(of, unit, unknown, unknown, unknown, unknown, unknown)
     free = fit.degrees_of_freedom

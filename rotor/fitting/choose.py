@@ -99,48 +99,48 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
     out = []
     for name in candidates:
-        own = constants.own_name(name)
-        if own in fit.parameters.names:
-            known = np.isfinite(fit.parameters.prior[fit.parameters.names.index(own)])
-            if own.partition("[")[0] not in ("A", "B", "C", "E") and not known:
-                out.append(_without(fit, own, options))
+        full_name = constants.own_name(name)
+        if full_name in fit.parameters.names:
+            known = np.isfinite(fit.parameters.prior[fit.parameters.names.index(full_name)])
+            if full_name.partition("[")[0] not in ("A", "B", "C", "E") and not known:
+                out.append(_without(fit, full_name, options))
         else:
-            out.append(_with(fit, constants, own, options))
-    return sorted([trial for trial in out if trial], key=lambda one: (not one.added, -one.f_ratio))
+            out.append(_with(fit, constants, full_name, options))
+    return sorted([trial for trial in out if trial], key=lambda trial: (not trial.added, -trial.f_ratio))
 
 
 def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
     others = [other for other in constants.values if other not in fit.named.values and other != name]
-    own, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
-    more = fit.parameters.moved(fit.values).with_free(own, [name])
+    extended, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
+    more = fit.parameters.moved(fit.values).with_free(extended, [name])
     try:
-        found = fit_lines(fit.lines, own, more, options)
+        trial_fit = fit_lines(fit.lines, extended, more, options)
     except ValueError:  # more constants than lines
         return None
-    ratio, chance = f_test(fit, found)
-    return _trial(name, True, fit, found, ratio, chance)
+    ratio, chance = f_test(fit, trial_fit)
+    return _trial(name, True, fit, trial_fit, ratio, chance)
 
 
 def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
     rest = fit.parameters.moved(fit.values).without(name)
     constants = dict(zip(rest.constant_names, rest.constants_of(rest.start).tolist(), strict=True))
     try:
-        found = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
+        trial_fit = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
     except ValueError:
         return None
-    ratio, chance = f_test(found, fit)
-    return _trial(name, False, fit, found, ratio, chance)
+    ratio, chance = f_test(trial_fit, fit)
+    return _trial(name, False, fit, trial_fit, ratio, chance)
 
 
-def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance: float) -> Trial:
+def _trial(name: str, added: bool, before: Fit, trial_fit: Fit, ratio: float, chance: float) -> Trial:
     return Trial(
         name,
         added,
-        found,
+        trial_fit,
         ratio,
         chance,
-        aicc(found),
-        cross_validated_rms(found),
+        aicc(trial_fit),
+        cross_validated_rms(trial_fit),
         aicc(before),
         cross_validated_rms(before),
     )
@@ -227,10 +227,10 @@ def _steps(
                 yield best
     while True:
         spare = [name for name in fit.parameters.names if name not in fixed]
-        needless = [one for one in try_constants(fit, _weakest(fit, spare), options) if one.better]
+        needless = [trial for trial in try_constants(fit, _weakest(fit, spare), options) if trial.better]
         if not needless:
             return
-        least = min(needless, key=lambda one: (-orders[one.name], one.f_ratio))
+        least = min(needless, key=lambda trial: (-orders[trial.name], trial.f_ratio))
         fit = least.fit
         yield least
 
@@ -249,13 +249,13 @@ def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | N
         i = left.index(name)
         alone[i], pairs[i], pairs[:, i] = np.inf, 0.0, 0.0
     few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
-    best = next((one for one in try_constants(fit, few, options) if one.added and one.better), None)
+    best = next((trial for trial in try_constants(fit, few, options) if trial.added and trial.better), None)
     if best is not None or len(left) < 2:
         return best
     upper = [(i, j) for i in range(len(left)) for j in range(i)]
-    order = sorted(upper, key=lambda one: -pairs[one])[:_TRIED]
-    found = [trial for i, j in order if (trial := _pair(fit, left[j], left[i], options)) and trial.better]
-    return max(found, key=lambda trial: trial.f_ratio, default=None)
+    order = sorted(upper, key=lambda pair: -pairs[pair])[:_TRIED]
+    pairs_better = [trial for i, j in order if (trial := _pair(fit, left[j], left[i], options)) and trial.better]
+    return max(pairs_better, key=lambda trial: trial.f_ratio, default=None)
 
 
 def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> tuple[Floats, Floats]:
@@ -265,11 +265,15 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     of them by b A⁻¹ b with b = x · r and A their products. A constant that the others make up promises 0.
     """
     search = search_of(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
-    own, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
-    columns = np.vstack([columns, np.zeros((len(own) - len(columns), len(names)))])  # a-priori values know no other
+    derivatives, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
+    columns = np.vstack(
+        [columns, np.zeros((len(derivatives) - len(columns), len(names)))]
+    )  # a-priori values know no other
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0, size, 1.0)
-    basis = np.linalg.qr(own / np.where(np.linalg.norm(own, axis=0) > 0, np.linalg.norm(own, axis=0), 1.0))[0]
+    basis = np.linalg.qr(
+        derivatives / np.where(np.linalg.norm(derivatives, axis=0) > 0, np.linalg.norm(derivatives, axis=0), 1.0)
+    )[0]
     for _ in range(2):  # once more for the digits that the first time cancels
         columns = columns - basis @ (basis.T @ columns)
     products, along = columns.T @ columns, columns.T @ fit.residuals
@@ -294,16 +298,16 @@ def _patient(options: FitOptions | None) -> FitOptions:
     return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
 
 
-def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
+def _pair(fit: Fit, first: str, other: str, options: FitOptions) -> Trial | None:
     """Two constants together, judged as one step; None where the lines are too few."""
-    constants, _ = beside_zero(with_names(fit.named, [one, other]), [one, other], fit.lines, options)
+    constants, _ = beside_zero(with_names(fit.named, [first, other]), [first, other], fit.lines, options)
     try:
-        free = fit.parameters.moved(fit.values).with_free(constants, [one, other])
+        free = fit.parameters.moved(fit.values).with_free(constants, [first, other])
         both = fit_lines(fit.lines, constants, free, options)
     except ValueError:
         return None
     ratio, chance = f_test(fit, both)
-    return _trial(f"{one} with {other}", True, fit, both, ratio, chance)
+    return _trial(f"{first} with {other}", True, fit, both, ratio, chance)
 
 
 @dataclass(frozen=True)

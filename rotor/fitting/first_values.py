@@ -98,7 +98,7 @@ def beside_zero(
     """
     changed = dict[str, float]()
     if isinstance(constants, TopConstants):
-        for name in (one for one in names if constants[one] == 0.0):
+        for name in (each for each in names if constants[each] == 0.0):
             if value := _seen(constants, name, lines, replace(options or FitOptions(), kmax=None)):
                 changed[name] = value
         constants = constants.replace(**changed)

@@ -135,12 +135,12 @@ class Fit:
 def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
     """The covariance (MHz²) of the constants that follow from free parameters."""
     if not np.isfinite(statistics.errors).all():
-        lost = ", ".join(one.text for one in statistics.undetermined)
+        lost = ", ".join(combination.text for combination in statistics.undetermined)
         raise ValueError(
             f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
         )
-    found = covariance_of_determined(parameters, statistics)
-    return found or Covariance((), np.zeros((0, 0)))
+    covariance = covariance_of_determined(parameters, statistics)
+    return covariance or Covariance((), np.zeros((0, 0)))
 
 
 def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
@@ -150,8 +150,8 @@ def covariance_of_determined(parameters: Parameters, statistics: Regression) -> 
     rows = np.flatnonzero(frequencies & parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
     if not len(rows):
         return None
-    own = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
-    matrix = parameters.matrix[rows] @ own @ parameters.matrix[rows].T
+    known = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
+    matrix = parameters.matrix[rows] @ known @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
 
 
@@ -238,10 +238,10 @@ def _with_levels(
     A label that no level has is an error, or, with `leave_out_missing`, its lines are left out.
     """
     labels, upper, lower = levels_in(lines)
-    one = np.flatnonzero(upper == lower)
-    if len(one):
+    same = np.flatnonzero(upper == lower)
+    if len(same):
         raise ValueError(
-            f"{_named(lines, int(one[0]))}: upper and lower state are one level, which makes "
+            f"{_named(lines, int(same[0]))}: upper and lower state are one level, which makes "
             "no line: correct its labels, or take the line out"
         )
     try:
@@ -370,7 +370,7 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
             "are no errors from the scatter"
         )
     if len(fit.statistics.undetermined):
-        named = "; ".join(one.text for one in fit.statistics.undetermined)
+        named = "; ".join(combination.text for combination in fit.statistics.undetermined)
         return True, f"{reason}; not determined by these lines and left at the start: {named}"
     return True, reason
 
@@ -397,11 +397,11 @@ def _unlikely(lines: Assignments) -> list[str]:
     even = there & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
     out = []
     for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
-        some = np.flatnonzero(rows)
-        if len(some):
-            first = f"line {lines.number(int(some[0]))}, {lines.text(int(some[0]))}"
+        unlikely = np.flatnonzero(rows)
+        if len(unlikely):
+            first = f"line {lines.number(int(unlikely[0]))}, {lines.text(int(unlikely[0]))}"
             out.append(
-                f"{counted(len(some), 'line')} that no dipole moment makes, {first}: {why}; are the labels right?"
+                f"{counted(len(unlikely), 'line')} that no dipole moment makes, {first}: {why}; are the labels right?"
             )
     return out
 
@@ -420,9 +420,9 @@ def _notes(fit: Fit) -> list[str]:
             f"line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}"
         )
     if fit.changed_states:
-        some = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
+        changed = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
         notes.append(
-            f"{counted(len(fit.changed_states), 'level is', 'levels are')} mostly another state than at the start (by overlap): {some}"
+            f"{counted(len(fit.changed_states), 'level is', 'levels are')} mostly another state than at the start (by overlap): {changed}"
         )
     twice = duplicates(lines)
     if twice:

@@ -35,7 +35,7 @@ def _order_of_named(name: str, constants: TopConstants) -> int:
         return 0 if head == "E" else order_of(head, constants.top.constants)
     parts = parse_name(name)
     kind, _, letters = parts.symbol.partition("_")
-    own = {"G": 1, "F": 2, "C": 1, "eps": 1, "gamma": 1}.get(kind, 0)
+    powers = {"G": 1, "F": 2, "C": 1, "eps": 1, "gamma": 1}.get(kind, 0)
     if kind == "W" and letters:
-        own = int(letters.removeprefix("pm"))
-    return own + 2 * (parts.n2 + parts.nz2) + parts.ns
+        powers = int(letters.removeprefix("pm"))
+    return powers + 2 * (parts.n2 + parts.nz2) + parts.ns

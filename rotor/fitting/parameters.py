@@ -90,22 +90,24 @@ class Parameters:
 
         constants : the set with the added ones, which start from it. Raises ValueError for one that is free or tied already.
         """
-        names, own = tuple(constants.values), [_known(name, constants, "free") for name in added]
+        names, full_names = tuple(constants.values), [_known(name, constants, "free") for name in added]
         moving = {name for name, row in zip(self.constant_names, self.matrix, strict=True) if row.any()}
-        if taken := [name for name in own if name in moving]:
+        if taken := [name for name in full_names if name in moving]:
             raise ValueError(f"{taken[0]} is free or tied already; leave it out, or take the tie away")
         held = dict(zip(self.constant_names, self.base.tolist(), strict=True))
         rows = dict(zip(self.constant_names, self.matrix, strict=True))
         none = np.zeros(len(self.names))
         first = np.array([rows.get(name, none) for name in names]).reshape(len(names), len(self.names))
         return Parameters(
-            names=(*self.names, *own),
-            start=np.append(self.start, [constants[name] for name in own]),
-            prior=np.append(self.prior, np.full(len(own), np.inf)),
-            centre=np.append(self.expected, [constants[name] for name in own]),
+            names=(*self.names, *full_names),
+            start=np.append(self.start, [constants[name] for name in full_names]),
+            prior=np.append(self.prior, np.full(len(full_names), np.inf)),
+            centre=np.append(self.expected, [constants[name] for name in full_names]),
             constant_names=names,
-            base=np.array([0.0 if name in own else held.get(name, constants[name]) for name in names]),
-            matrix=np.column_stack([first, *(np.array([one == name for one in names], dtype=float) for name in own)]),
+            base=np.array([0.0 if name in full_names else held.get(name, constants[name]) for name in names]),
+            matrix=np.column_stack(
+                [first, *(np.array([each == name for each in names], dtype=float) for name in full_names)]
+            ),
         )
 
 

@@ -73,16 +73,16 @@ def name_text(name: str, form: str) -> str:
     """
     head = re.match(r"[^(\[]*", name)
     assert head is not None  # an empty one matches too
-    own = name[head.end() :]  # spins and states, as in chi_aa(14N) or A[1]
+    quantum_numbers = name[head.end() :]  # spins and states, as in chi_aa(14N) or A[1]
     match = _NAME.fullmatch(head[0]) or _WITH_AXES.fullmatch(head[0])
     if not match:
         return f"\\texttt{{{_latex_text(name)}}}" if form == "latex" else name
     letter, below = match[1], match[2]
     if form != "latex":
         between = "_" if "_" in head[0] else ""
-        return _SHOWN.get(letter, letter) + between + below + own
+        return _SHOWN.get(letter, letter) + between + below + quantum_numbers
     symbol = _GREEK.get(letter, letter) + (f"_{{{below}}}" if below else "")
-    return f"${symbol}$" + _ISOTOPE.sub(r"$^{\1}$", own.replace("_", "\\_"))
+    return f"${symbol}$" + _ISOTOPE.sub(r"$^{\1}$", quantum_numbers.replace("_", "\\_"))
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,10 @@ def publication_table(
     if scaled and not fit.degrees_of_freedom:
         raise ValueError("scaled: with 0 degrees of freedom there are no errors from the scatter; take the stated ones")
     factor = fit.reduced_chi if scaled else 1.0
-    given = rows or _rows(fit)
-    cells = [_cells(row, factor, digits, form, any(one.states for one in given)) for row in given]
-    heads = ["constant", *(["states"] if any(one.states for one in given) else []), "unit", "value"]
-    facts = [*_facts(fit, scaled), *_of_states(given)]
+    table = rows or _rows(fit)
+    cells = [_cells(row, factor, digits, form, any(each.states for each in table)) for row in table]
+    heads = ["constant", *(["states"] if any(each.states for each in table) else []), "unit", "value"]
+    facts = [*_facts(fit, scaled), *_of_states(table)]
     return {"text": _plain, "markdown": _markdown, "latex": _latex}[form](heads, cells, facts)
 
 

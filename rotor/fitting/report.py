@@ -83,7 +83,7 @@ def fit_facts(fit: Fit) -> dict[str, Any]:
         "degrees_of_freedom": fit.degrees_of_freedom,
         "condition": fit.statistics.condition,
         "iterations": len(fit.minimum.iterations),
-        "undetermined": [one.text for one in fit.statistics.undetermined],
+        "undetermined": [combination.text for combination in fit.statistics.undetermined],
         "changed_states": list(fit.changed_states),
         "notes": list(fit.notes),
     }
@@ -107,7 +107,10 @@ def statistics_text(fit: Fit) -> list[str]:
         *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
         f"condition number of the column-scaled Jacobian {f'{condition:.3e}' if math.isfinite(condition) else 'infinite'}",
     ]
-    out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
+    out += [
+        f"not determined by these lines: {combination.text} (left at the start)"
+        for combination in fit.statistics.undetermined
+    ]
     out += [f"far off, {text}" for text in far_off(fit)]
     out += [f"influential, {text}" for text in influential(fit)]
     return out + [f"decisive, {text}" for text in decisive(fit)]
@@ -225,8 +228,11 @@ def _hamiltonian(fit: Fit) -> list[str]:
     """Kind of top, reduction and representation of the constants."""
     if fit.constants is None:
         return []
-    one = fit.constants
-    return [f"{one.kind} top" + (f", {one.reduction}-reduction, {one.representation}" if one.reduction else "")]
+    constants = fit.constants
+    return [
+        f"{constants.kind} top"
+        + (f", {constants.reduction}-reduction, {constants.representation}" if constants.reduction else "")
+    ]
 
 
 def _start(fit: Fit) -> list[str]:
@@ -293,8 +299,8 @@ def _end(fit: Fit) -> list[str]:
 
 def _search(fit: Fit) -> list[str]:
     return [
-        f"{one.number:5d}  {one.rms_before:14.6f} {one.rms_after:14.6f}  {one.damping:8.1e}{'' if one.taken else '  refused'}"
-        for one in fit.minimum.iterations
+        f"{step.number:5d}  {step.rms_before:14.6f} {step.rms_after:14.6f}  {step.damping:8.1e}{'' if step.taken else '  refused'}"
+        for step in fit.minimum.iterations
     ] or ["    0  the start was the minimum"]
 
 

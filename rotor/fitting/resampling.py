@@ -58,9 +58,11 @@ def bootstrap(
     groups = fit.lines.blend[fit.groups]
     members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
     at = fit.parameters.moved(fit.values)
-    asked = options or FitOptions()
-    most = max(asked.most_iterations, FitOptions().most_iterations)
-    own = replace(asked, poor_rms=1e12, most_iterations=most, pass_interrupt=True)  # no sample is judged by its rms
+    settings = options or FitOptions()
+    most = max(settings.most_iterations, FitOptions().most_iterations)
+    lenient = replace(
+        settings, poor_rms=1e12, most_iterations=most, pass_interrupt=True
+    )  # no sample is judged by its rms
     out: list[Floats] = []
     fewer = astray = 0
 
@@ -70,17 +72,17 @@ def bootstrap(
         blend = np.repeat(np.arange(len(drawn)), [len(members[b]) for b in drawn])
         widths = {i: fit.lines.widths_mhz[b] for i, b in enumerate(drawn) if b in fit.lines.widths_mhz}
         lines = replace(fit.lines.take(rows), blend=blend, comments=(), widths_mhz=widths)
-        return fit_lines(lines, fit.constants, at, own, model=model)
+        return fit_lines(lines, fit.constants, at, lenient, model=model)
 
     try:
         for _ in range(10 * samples):
-            one = sample()
-            if one.statistics.rank != fit.statistics.rank:
+            fit_of_sample = sample()
+            if fit_of_sample.statistics.rank != fit.statistics.rank:
                 fewer += 1
-            elif not one.converged:
+            elif not fit_of_sample.converged:
                 astray += 1
             else:
-                out.append(one.values)
+                out.append(fit_of_sample.values)
             if len(out) == samples:
                 break
     except KeyboardInterrupt:
@@ -92,5 +94,5 @@ def bootstrap(
             f"only {len(out)} of {10 * samples} samples determine all constants and converge ({fewer} determine fewer, {astray} do "
             "not converge); too few lines for a bootstrap, or a fit far from linear"
         )
-    found = np.array(out)
-    return found, np.where(np.isfinite(fit.errors), found.std(axis=0, ddof=1), np.inf)
+    values = np.array(out)
+    return values, np.where(np.isfinite(fit.errors), values.std(axis=0, ddof=1), np.inf)

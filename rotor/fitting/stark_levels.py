@@ -122,13 +122,13 @@ class StarkLevels(LevelModel):
         vectors = np.zeros((len(group.ranks), len(block)), dtype=states.vectors.dtype)
         vectors[:, states.places] = states.vectors[number, :, group.ranks]
         slopes = np.zeros((len(vectors), len(self.names)))
-        own = [i for i, name in enumerate(self.names) if name not in DIPOLES]
+        columns = [i for i, name in enumerate(self.names) if name not in DIPOLES]
         for i, name in enumerate(self.names):
             if name in DIPOLES:
                 cosine = block.dense(dipole_derivative(top, DIPOLES.index(name), constants.effects))
                 mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
                 slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
-        slopes[:, own] = self._of_constants(constants, block, vectors, [self.names[i] for i in own])
+        slopes[:, columns] = self._of_constants(constants, block, vectors, [self.names[i] for i in columns])
         return slopes
 
     def _of_constants(
@@ -143,9 +143,9 @@ class StarkLevels(LevelModel):
         elements, total = block.space.elements, np.zeros((len(vectors), len(names)))
         blocks = [elements.blocks[block.space.sectors[i].block] for i in block.members]
         linear = linear_blocks_of(top, elements.levels, names, blocks)
-        for i, (solved, one) in enumerate(zip(blocks, linear, strict=True)):
-            own = vectors[:, block.starts[i] : block.starts[i + 1]]
-            total[:, one.parameters] += _expectation(one, own @ solved.vectors.T)
+        for i, (solved, derivatives) in enumerate(zip(blocks, linear, strict=True)):
+            part = vectors[:, block.starts[i] : block.starts[i + 1]]
+            total[:, derivatives.parameters] += _expectation(derivatives, part @ solved.vectors.T)
         return total
 
 

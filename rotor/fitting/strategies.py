@@ -97,10 +97,10 @@ def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) 
     if 2 * near.sum() < search.used.sum() or too_few(search.lines, near, search.parameters):
         return search, first
     few = replace(search, used=near)
-    found = _continued(first, _minimised(few, start, progress, limit))
-    if found.status == INTERRUPTED:
-        return search, _better(first, found, replaced=False)
-    return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
+    minimum = _continued(first, _minimised(few, start, progress, limit))
+    if minimum.status == INTERRUPTED:
+        return search, _better(first, minimum, replaced=False)
+    return (few, minimum) if minimum.converged and not _is_poor(few, minimum) else (search, first)
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
@@ -130,27 +130,27 @@ def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
     def hopeless(taken: Sequence[Iteration]) -> bool:
         if len(taken) < _FIRST_ITERATIONS:
             return False
-        now = min(one.rms_after for one in taken)
-        lately = min(one.rms_after for one in taken[:-_LATELY])
+        now = min(iteration.rms_after for iteration in taken)
+        lately = min(iteration.rms_after for iteration in taken[:-_LATELY])
         return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
 
     return hopeless
 
 
-def _is_open(search: Search, found: Minimum) -> bool:
+def _is_open(search: Search, minimum: Minimum) -> bool:
     """Whether another way may lead further: the lines are not described, or the search has stalled, and iterations are left."""
-    if found.status == INTERRUPTED or len(found.iterations) >= search.options.most_iterations:
+    if minimum.status == INTERRUPTED or len(minimum.iterations) >= search.options.most_iterations:
         return False
-    return found.status == STALLED or _is_poor(search, found)
+    return minimum.status == STALLED or _is_poor(search, minimum)
 
 
-def _is_poor(search: Search, found: Minimum) -> bool:
+def _is_poor(search: Search, minimum: Minimum) -> bool:
     """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
-    limit, size = search.options.reject_above, np.abs(found.residuals[: len(search.group.first)])
-    if limit is not None and found.converged and 2 * int((size <= limit).sum()) >= len(size):
+    limit, size = search.options.reject_above, np.abs(minimum.residuals[: len(search.group.first)])
+    if limit is not None and minimum.converged and 2 * int((size <= limit).sum()) >= len(size):
         size = size[size <= limit]
         return bool(np.sqrt(size @ size / max(len(size), 1)) > search.options.poor_rms)
-    return found.rms > search.options.poor_rms
+    return minimum.rms > search.options.poor_rms
 
 
 def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
@@ -161,7 +161,10 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
     """
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
-        return len(taken) >= _TURNED_ITERATIONS and min(one.rms_after for one in taken) > search.options.poor_rms
+        return (
+            len(taken) >= _TURNED_ITERATIONS
+            and min(iteration.rms_after for iteration in taken) > search.options.poor_rms
+        )
 
     start, reached = search.parameters.start, first.parameters
     moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)

@@ -97,8 +97,8 @@ class TopConstants:
     @cached_property
     def uncertainties(self) -> Mapping[str, float]:
         """One standard deviation in MHz of the constants that have one."""
-        found = {self.own_name(name): error for part in self._parts for name, error in part.uncertainties.items()}
-        return MappingProxyType(found | dict(self.dipole_errors))
+        errors = {self.own_name(name): error for part in self._parts for name, error in part.uncertainties.items()}
+        return MappingProxyType(errors | dict(self.dipole_errors))
 
     @property
     def _parts(self) -> list[Constants | StateConstants | SpinConstants | InternalRotationConstants]:
@@ -154,14 +154,20 @@ class TopConstants:
         A changed constant loses its uncertainty, unless `uncertainties` has the whole table of them. Raises ValueError for a state or a
         spin that the top has not, and for names that states or spins do not have.
         """
-        given: Mapping[str, float] | None = changes.pop("uncertainties", None)
+        uncertainties: Mapping[str, float] | None = changes.pop("uncertainties", None)
         new = {self.own_name(name): value for name, value in changes.items()}
         for name in new:
             self._refuse_unknown(name)
         values = {name: value for name, value in {**self.values, **new}.items() if value is not None}
-        known = self.uncertainties if given is None else {self.own_name(name): error for name, error in given.items()}
+        known = (
+            self.uncertainties
+            if uncertainties is None
+            else {self.own_name(name): error for name, error in uncertainties.items()}
+        )
         errors = {
-            name: error for name, error in known.items() if name in values and (given is not None or name not in new)
+            name: error
+            for name, error in known.items()
+            if name in values and (uncertainties is not None or name not in new)
         }
         return self._of(values, errors)
 
@@ -179,7 +185,7 @@ class TopConstants:
             internal = replace(internal, values=moved[0], uncertainties=moved[1])
             values, errors = ({name: t[name] for name in t if not is_torsional(name)} for t in (values, errors))
         gone = {name: None for name in top.constants.values if name not in values}
-        own = top.constants.replace(**_plain(values), **gone, uncertainties=_plain(errors))
+        constants = top.constants.replace(**_plain(values), **gone, uncertainties=_plain(errors))
         states, spins = top.states, top.spin_constants
         if states is not None:
             states = replace(states, values=_of_states(values), uncertainties=_of_states(errors))
@@ -187,7 +193,7 @@ class TopConstants:
             spins = replace(spins, values=_of_spins(values), uncertainties=_of_spins(errors))
         made = replace(
             top,
-            constants=own,
+            constants=constants,
             states=states,
             spin_constants=spins,
             internal_rotation=internal,

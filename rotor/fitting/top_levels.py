@@ -99,9 +99,11 @@ def _text(constants: TopConstants, label: Ints) -> str:
 
 
 def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
-    asked = np.column_stack([columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]])
+    labels_by_row = np.column_stack(
+        [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
+    )
     values = np.array(list(begin.values.values()))
-    blocks = labelled_states(begin.top, begin.effects, names, asked, values)
+    blocks = labelled_states(begin.top, begin.effects, names, labels_by_row, values)
     missing = np.ones(len(labels), dtype=bool)
     missing[blocks.found] = False
     _refuse(begin, labels, missing)
@@ -113,32 +115,34 @@ def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names
 
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]
-    asked = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
+    quanta = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
-        return levels.rows_of(**{name: column[chosen] for name, column in asked.items()})
+        return levels.rows_of(**{name: column[chosen] for name, column in quanta.items()})
 
-    values, every = np.array(list(begin.values.values())), np.arange(len(names))
-    found = found_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
+    values, all_parameters = np.array(list(begin.values.values())), np.arange(len(names))
+    groups = found_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
     missing = np.ones(len(labels), dtype=bool)
-    for one in found:
-        missing[one.rows] = False
+    for group in groups:
+        missing[group.rows] = False
     _refuse(begin, labels, missing)
-    whole = [(one.blocks, one.rows, every) for one in found if isinstance(one.blocks, LabelledBlocks)]
+    whole = [(group.blocks, group.rows, all_parameters) for group in groups if isinstance(group.blocks, LabelledBlocks)]
     parts: list[tuple[Ints, LabelledBlocks | ContractedLevels]] = []
     if whole:
-        rows = np.concatenate([own for _, own, _ in whole])
-        starts = np.cumsum([0, *(len(own) for _, own, _ in whole)])
-        moved = [(one[0], np.arange(a, b), every) for one, a, b in zip(whole, starts, starts[1:], strict=False)]
+        rows = np.concatenate([group_rows for _, group_rows, _ in whole])
+        starts = np.cumsum([0, *(len(group_rows) for _, group_rows, _ in whole)])
+        moved = [
+            (group[0], np.arange(a, b), all_parameters) for group, a, b in zip(whole, starts, starts[1:], strict=False)
+        ]
         parts.append((rows, joined(moved, len(rows))))
-    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, LabelledBlocks)]
+    parts += [(group.rows, group.blocks) for group in groups if not isinstance(group.blocks, LabelledBlocks)]
     return TopLevels(names, len(labels), tuple(parts))
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
     """Tops whose levels are sums of constants times numbers."""
-    asked = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
-    levels = solve_levels(begin.top, int(asked["j"].max()), effects=begin.effects)
-    rows = levels.rows_of(**asked)
+    quanta = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
+    levels = solve_levels(begin.top, int(quanta["j"].max()), effects=begin.effects)
+    rows = levels.rows_of(**quanta)
     _refuse(begin, labels, rows < 0)
     return ClosedForm(names, level_derivatives(begin.top, levels, names, rows))

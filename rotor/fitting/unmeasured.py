@@ -59,6 +59,6 @@ def _components(fit: Fit) -> tuple[float, float, float]:
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
     change = (fit.lines.upper[:, 1:3] - fit.lines.lower[:, 1:3]) % 2
     kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
-    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
-    a, b, c = (float(axis in found) for axis in range(3))
+    axes = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
+    a, b, c = (float(axis in axes) for axis in range(3))
     return a, b, c

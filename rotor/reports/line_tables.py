@@ -17,14 +17,14 @@ def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dic
     from rotor.spectra.intensity import largest
     from rotor.spectra.patterns import patterns
 
-    found, levels = patterns(lines, resolution_mhz), lines.levels
+    groups, levels = patterns(lines, resolution_mhz), lines.levels
     quanta = of_rotation(levels.quanta)
-    rows = sorted(largest(found.intensity_nm2_mhz, shown).tolist()) if shown else []
-    sides = {s: labels(quanta, getattr(lines, s)[found.strongest], levels.halves) for s in ("upper", "lower")}
+    rows = sorted(largest(groups.intensity_nm2_mhz, shown).tolist()) if shown else []
+    sides = {s: labels(quanta, getattr(lines, s)[groups.strongest], levels.halves) for s in ("upper", "lower")}
     names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
     records = []
     for row in rows:
-        record: dict[str, Any] = {name: getattr(found, name)[row].item() for name in names}
+        record: dict[str, Any] = {name: getattr(groups, name)[row].item() for name in names}
         records.append(record | {side: text[row].strip() for side, text in sides.items()})
     return records
 
@@ -41,7 +41,10 @@ def the_first(count: int, what: str) -> str:
 def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
     """Patterns of lines by frequency; names: headings of the quantum numbers of their rotational levels."""
     forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
-    rows = [(*(form.format(one[name]) for name, form in forms.items()), one["upper"], one["lower"]) for one in records]
+    rows = [
+        (*(form.format(record[name]) for name, form in forms.items()), record["upper"], record["lower"])
+        for record in records
+    ]
     columns = ("frequency (MHz)", "nm² MHz", "components", "width (MHz)", "upper", "lower")
     title = f"the strongest lines at this resolution, in order of frequency (states: {names})"
     return Table(title, columns, rows)

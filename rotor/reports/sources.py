@@ -33,9 +33,9 @@ def short_source(text: str) -> str:
     rest = _SPECIES.sub("", rest, count=1) if _SPECIES.match(rest) else rest
     if scaled := re.match(r"scaled from [^(;]+", rest):
         return mark + scaled[0].rstrip()
-    if found := _CATALOGUE.search(rest):
-        verb = "fitted to " if "fitted" in rest[: found.start()] else "from "
-        return mark + verb + found[0]
+    if catalogue := _CATALOGUE.search(rest):
+        verb = "fitted to " if "fitted" in rest[: catalogue.start()] else "from "
+        return mark + verb + catalogue[0]
     dated = _DATED.match(rest)
     clause = dated[0] if dated else rest.partition(";")[0]
     if len(clause) > LONGEST:

@@ -41,14 +41,14 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     from rotor.quantum.estimates.beyond import Limit
     from rotor.requests.plan import larger_ones
 
-    present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
+    present = [f"{effect['name']} {effect['size_mhz']:.2g} MHz" for effect in content["effects"] if effect["present"]]
     sizes = (
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
     facts = [*error_facts(content.get("errors")), ("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
-    larger, others = larger_ones(content["limits"], lambda one: one["size_mhz"], lambda one: str(one["name"]))
+    larger, others = larger_ones(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
     verb = content["command"].split()[1:2]
     limits = [with_option(Limit(**limit).sentence, *verb) for limit in larger]
     limits += [others] if others else []
@@ -161,7 +161,9 @@ def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]
     if states is None or not states.weights:
         components = f" ({_COMPONENTS[top.kind]})" if mapping and top.kind in _COMPONENTS else ""
         return [("spin weights", weights_text(mapping) + components)]
-    texts = [f"{states.name_of(v)}: {weights_text(one.to_mapping())}" for v, one in sorted(states.weights.items())]
+    texts = [
+        f"{states.name_of(v)}: {weights_text(weights.to_mapping())}" for v, weights in sorted(states.weights.items())
+    ]
     texts[0] += f" ({_COMPONENTS[top.kind]})" if top.kind in _COMPONENTS else ""
     return [("" if i else "spin weights", text) for i, text in enumerate(texts)]
 

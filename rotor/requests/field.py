@@ -89,17 +89,17 @@ class Field:
         names = {"option": self.flag, "key": self.key, "name": self.name}
         return names[style] or self.flag or self.key or self.name
 
-    def read(self, given: Any, style: str) -> Any:
+    def read(self, raw: Any, style: str) -> Any:
         """The value of what was given; a ValueError calls the field by the name that the user knows."""
-        word = isinstance(given, str) and given.strip().lower() == self.none
-        if given is None or word:
+        word = isinstance(raw, str) and raw.strip().lower() == self.none
+        if raw is None or word:
             return None
         try:
-            return self.reader.read(given)
+            return self.reader.read(raw)
         except InsideError as error:
             raise ValueError(f"{self.called(style)}{error}") from None
         except ValueError as error:
-            none = f", or {self.none!r}" if self.none and isinstance(given, str) else ""
+            none = f", or {self.none!r}" if self.none and isinstance(raw, str) else ""
             raise ValueError(f"{self.called(style)}: {error}{none}") from None
 
     def write(self, value: Any) -> Any:
@@ -170,36 +170,36 @@ def own_fields(structure: Any) -> dict[str, Field]:
 
     assert is_dataclass(structure)
     return {
-        one.name: replace(one.metadata[_DECLARED], name=one.name)
-        for one in fields(structure)
-        if _DECLARED in one.metadata
+        item.name: replace(item.metadata[_DECLARED], name=item.name)
+        for item in fields(structure)
+        if _DECLARED in item.metadata
     }
 
 
 @cache
 def undeclared(structure: Any) -> list[Any]:
     """The fields of a dataclass that no file holds."""
-    return [one for one in fields(structure) if not one.metadata.keys() & {_DECLARED, _PART}]
+    return [item for item in fields(structure) if not item.metadata.keys() & {_DECLARED, _PART}]
 
 
 @cache
 def parts_of(structure: Any) -> dict[str, Part]:
     """The parts of a dataclass by their names."""
-    return {one.name: one.metadata[_PART] for one in fields(structure) if _PART in one.metadata}
+    return {item.name: item.metadata[_PART] for item in fields(structure) if _PART in item.metadata}
 
 
 @cache
 def all_fields(structure: Any) -> dict[str, Field]:
     """Every declared field of a request by its identity, those of its parts among them, in the order in which they stand."""
-    found: dict[str, Field] = {}
-    for one in fields(structure):
-        if _DECLARED in one.metadata:
-            field = own_fields(structure)[one.name]
-            found[field.identity] = field
-        elif _PART in one.metadata:
-            inner: Any = parts_of(structure)[one.name].inputs
-            found |= all_fields(inner)
-    return found
+    by_identity: dict[str, Field] = {}
+    for item in fields(structure):
+        if _DECLARED in item.metadata:
+            field = own_fields(structure)[item.name]
+            by_identity[field.identity] = field
+        elif _PART in item.metadata:
+            inner: Any = parts_of(structure)[item.name].inputs
+            by_identity |= all_fields(inner)
+    return by_identity
 
 
 def check_fields(request: Any) -> None:

@@ -18,54 +18,58 @@ class Given:
     values: Mapping[str, Any] = field(default_factory=dict)
     style: str = "name"
 
-    def of(self, one: Field) -> Any:
+    def of(self, field: Field) -> Any:
         """The value of a field as given; None for none."""
-        return self.values.get(one.identity)
+        return self.values.get(field.identity)
 
-    def has(self, one: Field) -> bool:
+    def has(self, field: Field) -> bool:
         """Whether a field was given."""
-        return self.values.get(one.identity) is not None
+        return self.values.get(field.identity) is not None
 
     def among(self, structure: Any) -> list[Field]:
         """The fields of a dataclass that were given."""
-        return [one for one in all_fields(structure).values() if self.has(one)]
+        return [field for field in all_fields(structure).values() if self.has(field)]
 
 
-def read_fields(structure: Any, given: Given, subject: Any = None) -> dict[str, Any]:
+def read_fields(structure: Any, entries: Given, subject: Any = None) -> dict[str, Any]:
     """Values of the fields of a dataclass that were given, by name, parts made for a subject; what was not given is left out."""
     values = {
-        name: one.read(given.of(one), given.style) for name, one in own_fields(structure).items() if given.has(one)
+        name: field.read(entries.of(field), entries.style)
+        for name, field in own_fields(structure).items()
+        if entries.has(field)
     }
-    for name, one in parts_of(structure).items():
-        made = _make(one, given, subject)
+    for name, part in parts_of(structure).items():
+        made = _make(part, entries, subject)
         if made is not None:
             values[name] = made
     return values
 
 
-def _make(part: Part, given: Given, subject: Any) -> Any:
-    present = given.among(part.inputs)
-    inner = read_fields(part.inputs, given, subject)
+def _make(part: Part, entries: Given, subject: Any) -> Any:
+    present = entries.among(part.inputs)
+    inner = read_fields(part.inputs, entries, subject)
     if part.whole and present and len(present) < len(all_fields(part.inputs)):
-        names = " and ".join(one.called(given.style) for one in all_fields(part.inputs).values())
+        names = " and ".join(field.called(entries.style) for field in all_fields(part.inputs).values())
         raise ValueError(f"{names}: {part.why}")
     if part.single and len(present) > 1:
-        raise ValueError(f"{' and '.join(one.called(given.style) for one in present)}: {part.why}")
+        raise ValueError(f"{' and '.join(field.called(entries.style) for field in present)}: {part.why}")
     if part.whole and not present:
         return None
-    with called(part.inputs, given.style):
+    with called(part.inputs, entries.style):
         return part.make(part.inputs(**inner), subject)
 
 
-def read_instance(structure: Any, given: Given, subject: Any = None) -> Any:
+def read_instance(structure: Any, entries: Given, subject: Any = None) -> Any:
     """An instance of a dataclass whose fields are all declared."""
-    missing = [one for one in own_fields(structure).values() if one.default is REQUIRED and not given.has(one)]
+    missing = [
+        field for field in own_fields(structure).values() if field.default is REQUIRED and not entries.has(field)
+    ]
     if missing:
-        name = missing[0].called(given.style)
+        name = missing[0].called(entries.style)
         texts = f"the key {name!r} is missing", f"{name} is missing; --help shows what the command takes"
-        raise ValueError(texts[given.style == "option"])
-    with called(structure, given.style):
-        return structure(**read_fields(structure, given, subject))
+        raise ValueError(texts[entries.style == "option"])
+    with called(structure, entries.style):
+        return structure(**read_fields(structure, entries, subject))
 
 
 @contextmanager
@@ -93,22 +97,22 @@ def renaming(names: Mapping[str, str]) -> Iterator[None]:
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """A text with fields called by other names."""
     patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b(?!\.)" for name in names]
-    return re.sub("|".join(patterns), lambda found: names[found[0]], text) if patterns else text
+    return re.sub("|".join(patterns), lambda match: names[match[0]], text) if patterns else text
 
 
 def written_fields(request: Any) -> dict[str, Any]:
     """What a scene holds of a request, by the key, values that are the default left out."""
-    found: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     structure: Any = type(request)
-    for name, one in own_fields(structure).items():
+    for name, declared_field in own_fields(structure).items():
         value = getattr(request, name)
-        if one.key and not equal(value, one.default):
-            found[one.key] = one.write(value)
+        if declared_field.key and not equal(value, declared_field.default):
+            table[declared_field.key] = declared_field.write(value)
     for name, each in parts_of(structure).items():
         inner = each.split(getattr(request, name), request)
         if inner is not None:
-            found |= written_fields(inner)
-    return found
+            table |= written_fields(inner)
+    return table
 
 
 def equal(value: Any, default: Any) -> bool:
@@ -145,11 +149,11 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 def flattened(tables: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
     """Values of tables by those dotted keys that they have."""
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key in keys:
         inner: Any = tables
         for name in key.split("."):
             inner = inner.get(name) if isinstance(inner, Mapping) else None
         if inner is not None:
-            found[key] = inner
-    return found
+            flat[key] = inner
+    return flat

@@ -105,16 +105,16 @@ class Knob:
 
     def sweep(self, field: Field, request: Any, answer: Callable[[Any], Any]) -> Sweep:
         """The settings of this knob for a request, that of the request among them."""
-        own, plain = getattr(request, field.name), self.prepare(request)
+        value_of_scene, plain = getattr(request, field.name), self.prepare(request)
         steps = self.steps(request) if callable(self.steps) else self.steps
         finest = self.finest(request) if callable(self.finest) else self.finest
 
         def make(value: Any) -> Any:
             """The request with a value."""
-            return plain if value == own else self.change(plain, field.name, value)
+            return plain if value == value_of_scene else self.change(plain, field.name, value)
 
-        settings = ladder(steps, own, make)
-        if own is None:
+        settings = ladder(steps, value_of_scene, make)
+        if value_of_scene is None:
             settings += (Setting(field.none or "none", plain, True),)
         against = self.against(finest) if callable(self.against) else self.against.format(finest)
         reference = self.change(plain, field.name, finest)
@@ -172,7 +172,10 @@ def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:
 
 
 def ladder(
-    values: Iterable[float], own: float | None, make: Callable[[Any], Any], text: Callable[[Any], str] = "{:g}".format
+    values: Iterable[float],
+    of_scene: float | None,
+    make: Callable[[Any], Any],
+    text: Callable[[Any], str] = "{:g}".format,
 ) -> tuple[Setting, ...]:
     """Settings of values that rise or fall from coarse to fine, that of the scene itself among them.
 
@@ -197,7 +200,9 @@ def ladder(
     >>> [(one.label, one.own) for one in ladder([1e-2, 1e-4], 1e-3, lambda tolerance: None)]
     [('0.01', False), ('0.001', True), ('0.0001', False)]
     """
-    values = [own if own is not None and math.isclose(one, own, rel_tol=1e-9) else one for one in values]
+    values = [
+        of_scene if of_scene is not None and math.isclose(value, of_scene, rel_tol=1e-9) else value for value in values
+    ]
     falling = len(values) > 1 and values[0] > values[-1]
-    every = sorted({*values, *(() if own is None else (own,))}, reverse=falling)
-    return tuple(Setting(text(one), make(one), one == own) for one in every)
+    ordered = sorted({*values, *(() if of_scene is None else (of_scene,))}, reverse=falling)
+    return tuple(Setting(text(value), make(value), value == of_scene) for value in ordered)

@@ -12,12 +12,12 @@ from rotor.requests.plan import Plan
 
 def numerical_error(answer: Any) -> float:
     """The numerical error that an answer states; ValueError, with the reason, where it is not estimated."""
-    found: float | None = answer.errors.numerical
-    if found is None:
+    error: float | None = answer.errors.numerical
+    if error is None:
         terms = (answer.errors.rounding, answer.errors.truncation)
         why = next(term.source for term in terms if term.value is None)
         raise ValueError(f"accuracy: the numerical error of {answer.errors.of} is not estimated: {why}; leave it out")
-    return found
+    return error
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,9 @@ class LeftOut:
     basis: str
 
 
-def largest_first(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
+def largest_first(parts: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
     """By size; what is not estimated comes last."""
-    return tuple(sorted(found, key=lambda one: (one.size is None, -(one.size or 0.0))))
+    return tuple(sorted(parts, key=lambda part: (part.size is None, -(part.size or 0.0))))
 
 
 def larger_ones(items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str]) -> tuple[list[T], str]:
@@ -41,10 +41,10 @@ def larger_ones(items: Sequence[T], size: Callable[[T], float | None], name: Cal
     >>> larger_ones([5.0, 4.0, 0.1], lambda one: one, str)
     ([5.0, 4.0], 'and smaller or not estimated: 0.1')
     """
-    least = SMALL * max((known for one in items if (known := size(one)) is not None), default=0.0)
-    larger = [one for one in items if (known := size(one)) is None or known >= least]
+    least = SMALL * max((known for item in items if (known := size(item)) is not None), default=0.0)
+    larger = [item for item in items if (known := size(item)) is None or known >= least]
     shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
-    others = [name(one) for one in items if one not in shown]
+    others = [name(item) for item in items if item not in shown]
     return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
 
 

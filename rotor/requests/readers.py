@@ -30,9 +30,9 @@ class Reader:
     many: bool = False
     unit: str = ""
 
-    def read(self, given: Any) -> Any:
+    def read(self, raw: Any) -> Any:
         """The value of a text, a TOML value or a Python value; ValueError, without a name, for anything else."""
-        return given
+        return raw
 
     def write(self, value: Any) -> Any:
         """What a scene file holds of a value; `read` gives the same value back."""
@@ -50,13 +50,13 @@ class Text(Reader):
     words: Collection[str] = ()
     metavar: str = "TEXT"
 
-    def read(self, given: Any) -> str:
+    def read(self, raw: Any) -> str:
         """The text."""
-        if not isinstance(given, str):
-            raise ValueError(f"{given!r}: expected a text")
-        if self.words and given not in self.words:
-            raise ValueError(f"{given!r}: expected one of {', '.join(self.words)}")
-        return given
+        if not isinstance(raw, str):
+            raise ValueError(f"{raw!r}: expected a text")
+        if self.words and raw not in self.words:
+            raise ValueError(f"{raw!r}: expected one of {', '.join(self.words)}")
+        return raw
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,11 +66,11 @@ class Flag(Reader):
     off: bool = False
     scene_type = bool
 
-    def read(self, given: Any) -> bool:
+    def read(self, raw: Any) -> bool:
         """The truth value."""
-        if not isinstance(given, bool):
-            raise ValueError(f"{given!r}: expected true or false")
-        return given
+        if not isinstance(raw, bool):
+            raise ValueError(f"{raw!r}: expected true or false")
+        return raw
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,16 +82,16 @@ class Whole(Reader):
     metavar: str = "N"
     scene_type = int
 
-    def read(self, given: Any) -> int:
+    def read(self, raw: Any) -> int:
         """The number."""
-        value = given
-        if isinstance(given, str):
+        value = raw
+        if isinstance(raw, str):
             try:
-                value = int(given)
+                value = int(raw)
             except ValueError:
-                raise ValueError(f"{given!r:.60}: expected a whole number") from None
+                raise ValueError(f"{raw!r:.60}: expected a whole number") from None
         if isinstance(value, bool) or not hasattr(value, "__index__"):
-            raise ValueError(f"{given!r}: expected a whole number")
+            raise ValueError(f"{raw!r}: expected a whole number")
         if abs(value) > MOST_WHOLE:
             raise ValueError(f"a number of {len(str(abs(value)))} digits; expected at most {MOST_WHOLE}")
         self.check(value)
@@ -119,12 +119,12 @@ class Quantity(Reader):
     metavar: str = "X"
     scene_type = float | str
 
-    def read(self, given: Any) -> float:
+    def read(self, raw: Any) -> float:
         """The number in `unit`."""
-        if isinstance(given, bool) or not isinstance(given, str | int | float):
-            raise ValueError(f"{given!r}: expected a number{' with a unit' if self.unit else ''}")
-        value = parse_quantity(given, "fraction" if self.is_fraction else self.unit)
-        self.check(value, given)
+        if isinstance(raw, bool) or not isinstance(raw, str | int | float):
+            raise ValueError(f"{raw!r}: expected a number{' with a unit' if self.unit else ''}")
+        value = parse_quantity(raw, "fraction" if self.is_fraction else self.unit)
+        self.check(value, raw)
         return value
 
     @property
@@ -133,9 +133,9 @@ class Quantity(Reader):
         low, high = self.least if self.above is None else self.above, self.most if self.below is None else self.below
         return not self.unit and low is not None and high is not None and 0 <= low < high <= 1
 
-    def check(self, value: float, given: Any = None) -> None:
+    def check(self, value: float, typed: Any = None) -> None:
         """ValueError for a number out of bounds; given: what was typed."""
-        text = given if isinstance(given, str) else f"{value:g}"
+        text = typed if isinstance(typed, str) else f"{value:g}"
         if not math.isfinite(value):
             raise ValueError(f"{text}: expected a finite number")
         if (self.above is not None and not value > self.above) or (self.below is not None and not value < self.below):
@@ -189,23 +189,23 @@ class Grid(Reader):
     metavar: str = "GRID"
     scene_type = list[float] | str
 
-    def read(self, given: Any) -> tuple[float, ...]:
+    def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
-        if isinstance(given, str):
-            values = self._of_text(given)
-        elif isinstance(given, int | float) and not isinstance(given, bool):
-            values = (float(given),)
+        if isinstance(raw, str):
+            values = self._of_text(raw)
+        elif isinstance(raw, int | float) and not isinstance(raw, bool):
+            values = (float(raw),)
         else:
-            values = tuple(map(float, given))
+            values = tuple(map(float, raw))
         if not all(map(math.isfinite, values)):
-            raise ValueError(f"{given!r:.60}: expected finite numbers")
+            raise ValueError(f"{raw!r:.60}: expected finite numbers")
         for value in values if self.each is not None else ():
             assert self.each is not None
             try:
                 self.each.check(value)
             except ValueError as error:
                 rule = str(error).partition(": ")[2]
-                raise ValueError(f"{given!r:.60}: {rule}" if isinstance(given, str) else str(error)) from None
+                raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
         return values
 
     def _of_text(self, text: str) -> tuple[float, ...]:
@@ -216,7 +216,7 @@ class Grid(Reader):
 
     def write(self, value: Any) -> list[float]:
         """The numbers as a list."""
-        return [float(one) for one in value]
+        return [float(number) for number in value]
 
     def show(self, value: Any) -> str:
         """The first and the last of them."""
@@ -230,11 +230,11 @@ class Range(Reader):
     unit: str = "MHz"
     metavar: str = "A:B"
 
-    def read(self, given: Any) -> tuple[float, float]:
+    def read(self, raw: Any) -> tuple[float, float]:
         """Both ends."""
-        if isinstance(given, str):
-            return parse_range(given, self.unit)
-        first, last = map(float, given)
+        if isinstance(raw, str):
+            return parse_range(raw, self.unit)
+        first, last = map(float, raw)
         if not first < last:
             raise ValueError(f"{first:g} to {last:g} {self.unit}: expected a range that rises")
         return first, last
@@ -258,27 +258,25 @@ class Numbers(Reader):
     metavar: str = "LIST"
     scene_type = list[float]
 
-    def read(self, given: Any) -> tuple[float, ...]:
+    def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
-        if isinstance(given, str):
-            values = tuple(parse_grid(given, self.unit).tolist()) if ":" not in given else ()
+        if isinstance(raw, str):
+            values = tuple(parse_grid(raw, self.unit).tolist()) if ":" not in raw else ()
         else:
-            values = tuple(map(float, given))
+            values = tuple(map(float, raw))
         if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
             words = {1: "one", 3: "three"}
             count = " or ".join(words.get(n, str(n)) for n in self.counts)
-            raise ValueError(
-                f"{given!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}"
-            )
+            raise ValueError(f"{raw!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
         return values
 
     def write(self, value: Any) -> list[float]:
         """The numbers as a list."""
-        return [float(one) for one in value]
+        return [float(number) for number in value]
 
     def show(self, value: Any) -> str:
         """The numbers between commas."""
-        return ",".join(f"{one:g}" for one in value)
+        return ",".join(f"{number:g}" for number in value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -289,9 +287,9 @@ class Names(Reader):
     scene_type = list[str]
     many: bool = True
 
-    def read(self, given: Any) -> tuple[str, ...]:
+    def read(self, raw: Any) -> tuple[str, ...]:
         """The texts."""
-        return (given,) if isinstance(given, str) else tuple(given)
+        return (raw,) if isinstance(raw, str) else tuple(raw)
 
     def write(self, value: Any) -> list[str]:
         """The texts as a list."""
@@ -313,16 +311,16 @@ class NameList(Reader):
     metavar: str = "LIST"
     scene_type: Any = list[str]
 
-    def read(self, given: Any) -> tuple[str, ...]:
+    def read(self, raw: Any) -> tuple[str, ...]:
         """The names."""
-        names = [name.strip() for name in _COMMAS.split(given)] if isinstance(given, str) else list(given)
+        names = [name.strip() for name in _COMMAS.split(raw)] if isinstance(raw, str) else list(raw)
         if self.words and not set(names) <= set(self.words):
-            raise ValueError(f"{given!r}: expected each of {', '.join(self.words)} once at most")
+            raise ValueError(f"{raw!r}: expected each of {', '.join(self.words)} once at most")
         if not names or not all(names):
-            raise ValueError(f"{given!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+            raise ValueError(f"{raw!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice:
-            raise ValueError(f"{given!r}: {twice} is named twice; once is enough")
+            raise ValueError(f"{raw!r}: {twice} is named twice; once is enough")
         return tuple(names)
 
     def write(self, value: Any) -> list[str]:
@@ -349,17 +347,17 @@ class Pairs(Reader):
         """A table of numbers."""
         return dict[str, int] if self.number is int else dict[str, float]
 
-    def read(self, given: Any) -> dict[str, Any]:
+    def read(self, raw: Any) -> dict[str, Any]:
         """The numbers by name."""
-        if isinstance(given, Mapping):
-            return {str(name): self.number(value) for name, value in given.items()}
+        if isinstance(raw, Mapping):
+            return {str(name): self.number(value) for name, value in raw.items()}
         table: dict[str, Any] = {}
-        for item in given.split(","):
+        for item in raw.split(","):
             name, _, number = (part.strip() for part in item.partition("="))
             name = name.lower() if self.lower else name
             if not name or not self._is_number(number) or name in table:
                 rule = f"{self.what}=number, each {self.what} once, such as {self.example}"
-                raise ValueError(f"{item.strip()!r} in {given!r}: expected {rule}")
+                raise ValueError(f"{item.strip()!r} in {raw!r}: expected {rule}")
             table[name] = self.number(number)
         return table
 
@@ -375,15 +373,15 @@ class Array(Reader):
     scene_type: Any = list[float]
     metavar: str = "LIST"
 
-    def read(self, given: Any) -> Any:
+    def read(self, raw: Any) -> Any:
         """Numbers of a text; lists and arrays as they are."""
-        if not isinstance(given, str):
-            return given
+        if not isinstance(raw, str):
+            return raw
         try:
-            rows = [[float(one) for one in row.split(",")] for row in given.split(";")]
+            rows = [[float(number) for number in row.split(",")] for row in raw.split(";")]
         except ValueError:
-            raise ValueError(f"{given!r}: expected numbers, separated by commas; rows by semicolons") from None
-        return rows if ";" in given else rows[0]
+            raise ValueError(f"{raw!r}: expected numbers, separated by commas; rows by semicolons") from None
+        return rows if ";" in raw else rows[0]
 
     def write(self, value: Any) -> Any:
         """The numbers as lists."""
@@ -399,9 +397,9 @@ class Custom(Reader):
     metavar: str = "TEXT"
     scene_type: Any = str
 
-    def read(self, given: Any) -> Any:
+    def read(self, raw: Any) -> Any:
         """By the function."""
-        return self.reading(given)
+        return self.reading(raw)
 
     def write(self, value: Any) -> Any:
         """By the function."""
@@ -427,17 +425,17 @@ def whole_range(text: str) -> tuple[int, int]:
 class Each(Quantity):
     """Numbers with a unit, one for all or one for each of several things, between commas; a scene holds one for all."""
 
-    def read(self, given: Any) -> Any:
+    def read(self, raw: Any) -> Any:
         """The numbers in `unit`."""
-        if isinstance(given, list | tuple):
-            return tuple(super(Each, self).read(one) for one in given)
-        parts = given.split(",") if isinstance(given, str) else [given]
-        return tuple(super(Each, self).read(one) for one in parts)
+        if isinstance(raw, list | tuple):
+            return tuple(super(Each, self).read(part) for part in raw)
+        parts = raw.split(",") if isinstance(raw, str) else [raw]
+        return tuple(super(Each, self).read(part) for part in parts)
 
-    def check(self, value: Any, given: Any = None) -> None:
+    def check(self, value: Any, typed: Any = None) -> None:
         """ValueError for a number out of bounds."""
-        for one in value if isinstance(value, tuple) else (value,):
-            super().check(one, given)
+        for number in value if isinstance(value, tuple) else (value,):
+            super().check(number, typed)
 
     def write(self, value: Any) -> Any:
         """The first of them with its unit."""

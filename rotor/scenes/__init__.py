@@ -7,18 +7,18 @@ from typing import Any
 from rotor.scenes.verbs import VERBS
 
 
-def _run(*given: Any, **named: Any) -> Any:
+def _run(*arguments: Any, **named: Any) -> Any:
     """`rotor.scenes.run.run_scene`, loaded when a scene is run."""
     from rotor.scenes.run import run_scene
 
-    return run_scene(*given, **named)
+    return run_scene(*arguments, **named)
 
 
-def _plan(*given: Any) -> Any:
+def _plan(*arguments: Any) -> Any:
     """`rotor.scenes.plan.plan_of`, likewise."""
     from rotor.scenes.plan import plan_of
 
-    return plan_of(*given)
+    return plan_of(*arguments)
 
 
 VERBS.update(run=_run, plan=_plan)

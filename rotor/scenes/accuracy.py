@@ -42,27 +42,27 @@ def asked_of(scene: Scene) -> float | None:
     >>> asked_of(StarkScene(molecule="OCS", accuracy="1 kHz")), asked_of(ThermoScene(molecule="CO", accuracy="0.1 %"))
     (0.001, 0.001)
     """
-    given = accuracy_text(scene)
-    if given is None:
+    stated = accuracy_text(scene)
+    if stated is None:
         return None
-    goals, unit, text = numerics_of(scene.kind).goals, unit_of(scene), str(given).strip()
+    goals, unit, text = numerics_of(scene.kind).goals, unit_of(scene), str(stated).strip()
     if unit not in goals:
         units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
-        raise ValueError(f"accuracy: {given!r}: expected a unit: {units}")
+        raise ValueError(f"accuracy: {stated!r}: expected a unit: {units}")
     percent = text.endswith("%")
     if percent and unit not in ("", "%"):
-        raise ValueError(f"accuracy: {given!r}: expected {unit}, not a percentage")
+        raise ValueError(f"accuracy: {stated!r}: expected {unit}, not a percentage")
     reader = Quantity(unit if unit in CONVERTED else "")
     number: float = Field(reader, "", "accuracy").read(text.removesuffix("%").removesuffix("rad").strip(), "key")
     if not number > 0.0:
-        raise ValueError(f"accuracy: {given!r}: expected more than 0")
+        raise ValueError(f"accuracy: {stated!r}: expected more than 0")
     return 0.01 * number if percent and not unit else number
 
 
 def accuracy_text(scene: Any) -> str | float | None:
     """The accuracy as the scene gives it, of the total or of the numerical error."""
-    given: Accuracy = getattr(scene, "accuracy", None)
-    return given.total if isinstance(given, TotalAccuracy) else given
+    stated: Accuracy = getattr(scene, "accuracy", None)
+    return stated.total if isinstance(stated, TotalAccuracy) else stated
 
 
 def unit_of(scene: Scene) -> str:
@@ -85,34 +85,33 @@ def chosen(scene: Scene, request: Any) -> Choice:
 
     Raises ValueError for what double precision cannot give, and where a knob is given by hand as well.
     """
-    asked, unit = asked_of(scene), unit_of(scene)
-    assert asked is not None
+    goal, unit = asked_of(scene), unit_of(scene)
+    assert goal is not None
     if by_kind := numerics_of(scene.kind).goals[unit].choose:
-        return by_kind(scene, request, asked)
+        return by_kind(scene, request, goal)
     for field, knob in knobs_of_fields(request) if unit != "%" else ():
         if knob.least is not None or knob.tried:
-            return knob.choose(field, request, asked, answering(scene.kind))
+            return knob.choose(field, request, goal, answering(scene.kind))
     return Choice(request, NOTHING_CHEAPER)
 
 
 def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     """The error that an answer reached; ValueError where it is more than what was asked for, with the reason."""
-    asked = asked_of(scene)
-    assert asked is not None
+    goal = asked_of(scene)
+    assert goal is not None
     unit = unit_of(scene)
     error = max(numerics_of(scene.kind).goals[unit].error(answer), choice.error)
-    if error > asked:
-        raise out_of_reach(asked, error, unit, choice.how)
+    if error > goal:
+        raise out_of_reach(goal, error, unit, choice.how)
     if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):
-        refuse_total(_with_error(answer.errors, choice), asked, unit)
-    return Reached(asked, error, unit, choice.how)
+        refuse_total(_with_error(answer.errors, choice), goal, unit)
+    return Reached(goal, error, unit, choice.how)
 
 
-def out_of_reach(asked: float, error: float, unit: str, how: str) -> ValueError:
+def out_of_reach(goal: float, error: float, unit: str, how: str) -> ValueError:
     """The refusal of an accuracy that the settings, or double precision, do not reach."""
     return ValueError(
-        f"accuracy: {asked:g} {unit}".rstrip()
-        + f" cannot be given: the error here is {error:.2g} ({how}); ask for less"
+        f"accuracy: {goal:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({how}); ask for less"
     )
 
 

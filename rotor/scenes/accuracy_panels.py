@@ -16,7 +16,7 @@ TITLES = {
 }  # fmt: skip
 
 
-def panels_of(found: WorkPrecision) -> list[Panel]:
+def panels_of(table: WorkPrecision) -> list[Panel]:
     """One panel a knob and error, with a title in words; the orders of a splitting share one.
 
     >>> from rotor.scenes.accuracy_sweep import work_precision
@@ -25,7 +25,7 @@ def panels_of(found: WorkPrecision) -> list[Panel]:
     [('order of centrifugal distortion', 'energy of a level (MHz)')]
     """
     grouped: dict[tuple[str, str], dict[str, list[Point]]] = {}
-    for (knob, error_of, unit), rows in found.curves().items():
+    for (knob, error_of, unit), rows in table.curves().items():
         name, _, variant = knob.partition(", ")
         label = f"{error_of} ({unit})" if unit else error_of
         grouped.setdefault((name, label), {})[variant or name] = points_of(rows)

@@ -84,10 +84,10 @@ class WorkPrecision(Table):
 
     def curves(self) -> dict[tuple[str, str, str], list[Row]]:
         """The rows by knob, what the error is of, and unit."""
-        found: dict[tuple[str, str, str], list[Row]] = {}
+        by_knob: dict[tuple[str, str, str], list[Row]] = {}
         for row in self.rows:
-            found.setdefault((row.knob, row.error_of, row.unit), []).append(row)
-        return found
+            by_knob.setdefault((row.knob, row.error_of, row.unit), []).append(row)
+        return by_knob
 
 
 def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
@@ -145,10 +145,10 @@ def work_precision(
     >>> [row.setting for row in table.rows], table.rows[0].error > table.rows[-1].error == 0.0
     (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
     """
-    found, left = knobs_of(scene, folder), limit_seconds
-    table = WorkPrecision(scene.kind, (), {}, found.remarks)
-    for number, knob in enumerate(found.knobs):
-        rows, against, remarks, spent = sweep(knob, left / (len(found.knobs) - number), progress)
+    knobs, left = knobs_of(scene, folder), limit_seconds
+    table = WorkPrecision(scene.kind, (), {}, knobs.remarks)
+    for number, knob in enumerate(knobs.knobs):
+        rows, against, remarks, spent = sweep(knob, left / (len(knobs.knobs) - number), progress)
         left = max(left - spent, 0.0)
         references = {**table.references, f"{knob.name}: {knob.measures[0].of}": against}
         table = WorkPrecision(scene.kind, (*table.rows, *rows), references, (*table.remarks, *remarks))
@@ -163,19 +163,19 @@ def sweep(
 
     A setting that would go beyond the limit, judged by how much longer each setting took than the one before, is left out.
     """
-    every = [*knob.settings, *([] if knob.reference is None else [Setting("the reference", knob.reference)])]
+    settings = [*knob.settings, *([] if knob.reference is None else [Setting("the reference", knob.reference)])]
     done: list[tuple[Setting, Any, float]] = []
     remarks: list[str] = []
     refused: list[str] = []
     spent = 0.0
-    for setting in every:
+    for setting in settings:
         if spent + _next_seconds([seconds for _, _, seconds in done]) > limit_seconds:
             remarks.append(f"{knob.name}: {setting.label} and finer ones are beyond the time limit")
             break
         progress(knob.name, setting.label)
         try:
             usual = done[-1][2] if done else None
-            answer, seconds, both = timed(lambda asked=setting.request: knob.answer(asked), usual)  # type: ignore[misc]
+            answer, seconds, both = timed(lambda request=setting.request: knob.answer(request), usual)  # type: ignore[misc]
         except ValueError as error:
             refused.append(setting.label)
             why = str(error)
@@ -190,7 +190,7 @@ def sweep(
     reached = knob.reference is None or last.label == "the reference"
     against = knob.against if reached else f"the finest within the time limit, {last.label}"
     shown = done if knob.reference is None else done[:-1]
-    calls = [lambda asked=setting.request: knob.answer(asked) for setting, _, _ in shown]
+    calls = [lambda request=setting.request: knob.answer(request) for setting, _, _ in shown]
     times, more = in_rounds(calls, [seconds for _, _, seconds in shown], limit_seconds - spent)
     spent += more
     rows = [
@@ -232,7 +232,9 @@ def in_rounds(
     first: the time of each by one call. Rounds end where another one would go beyond the limit.
     """
     counts = {
-        n: max(1, math.ceil(LEAST_SECONDS / max(one, 1e-9))) for n, one in enumerate(first) if one < SHORT_SECONDS
+        n: max(1, math.ceil(LEAST_SECONDS / max(seconds, 1e-9)))
+        for n, seconds in enumerate(first)
+        if seconds < SHORT_SECONDS
     }
     a_round = sum(first[n] * count for n, count in counts.items())
     rounds = ROUNDS if a_round * ROUNDS <= limit_seconds else int(limit_seconds / a_round)
@@ -240,7 +242,7 @@ def in_rounds(
     for _ in range(rounds):
         for n, count in counts.items():
             taken[n].append(_once(partial(_repeat, calls[n], count))[1] / count)
-    samples = [taken.get(n) or [one] for n, one in enumerate(first)]
+    samples = [taken.get(n) or [seconds] for n, seconds in enumerate(first)]
     spent = math.fsum(counts[n] * math.fsum(times) for n, times in taken.items())
     return without_scatter(samples), spent
 
@@ -262,7 +264,7 @@ def without_scatter(samples: Sequence[Sequence[float]]) -> list[float]:
     """
     groups: list[tuple[float, float, int]] = []  # mean, scatter and number of settings
     for times in samples:
-        low, middle, high = (float(one) for one in np.quantile(times, [0.25, 0.5, 0.75]))
+        low, middle, high = (float(value) for value in np.quantile(times, [0.25, 0.5, 0.75]))
         groups.append((middle, max(high - low, LEAST_SCATTER * middle), 1))
         while len(groups) > 1 and 0.0 < groups[-2][0] - groups[-1][0] < max(groups[-2][1], groups[-1][1]):
             (mean, scatter, count), (other, other_scatter, others) = groups.pop(), groups.pop()

@@ -13,8 +13,8 @@ from rotor.verbs.verb import Work, verb_of
 
 def numerics_of(kind: str) -> Numerics:
     """The numerics of a kind; those of its declared knobs alone where its verb names none."""
-    found: Numerics = verb_of(kind).load_numerics()
-    return found
+    numerics: Numerics = verb_of(kind).load_numerics()
+    return numerics
 
 
 def answering(kind: str) -> Callable[[Any], Any]:

@@ -69,11 +69,11 @@ def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
     """The plan, and the settings for the accuracy of the scene; None where it asks for none, or where the run alone finds them."""
     from rotor.scenes.accuracy import asked_of, unit_of
 
-    asked, numerics = asked_of(scene), numerics_of(scene.kind)
-    if asked is None:
+    goal, numerics = asked_of(scene), numerics_of(scene.kind)
+    if goal is None:
         return plan_of_request(scene.kind, request), None
     if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
-        return numerics.planned(scene, request, asked)
+        return numerics.planned(scene, request, goal)
     choices: list[Choice | None] = []
     search = timed(lambda: choices.append(choice_of(scene, request)), LONG_SEARCH)
     choice = choices[-1]
@@ -82,7 +82,7 @@ def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
     if numerics.rounding is not None:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
         parts.append(
-            ("rounding", f"{_checked(numerics.rounding(choice.request), asked, choice):.1e} MHz of the highest energy")
+            ("rounding", f"{_checked(numerics.rounding(choice.request), goal, choice):.1e} MHz of the highest energy")
         )
     return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search), choice
 
@@ -92,16 +92,16 @@ def plan_of_request(kind: str, request: Any) -> Plan:
     if plan := numerics_of(kind).plan:
         return plan(request)
     answer, table = answering(kind), verb_of(kind).table
-    return plan_of_whole(kind, lambda: answer(request), lambda found: {"counts": {"rows": len(table(found))}})
+    return plan_of_whole(kind, lambda: answer(request), lambda result: {"counts": {"rows": len(table(result))}})
 
 
-def _checked(rounding: float, asked: float, choice: Choice) -> float:
+def _checked(rounding: float, goal: float, choice: Choice) -> float:
     """Rounding of the energies of the highest J in MHz; ValueError where it is clearly more than the accuracy asked for.
 
     A run leaves out levels beyond the reach of the distortion constants, so that its rounding may be a little less.
     """
     from rotor.scenes.accuracy import out_of_reach
 
-    if rounding > 2.0 * asked:
-        raise out_of_reach(asked, rounding, "MHz", choice.how)
+    if rounding > 2.0 * goal:
+        raise out_of_reach(goal, rounding, "MHz", choice.how)
     return rounding

@@ -54,13 +54,13 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         executor: Executor | None = None,
     ) -> SceneResult:
         """Run the scene, see `rotor.scenes.run.run_scene`."""
-        found: SceneResult = VERBS["run"](self, folder=folder, out=out, executor=executor)
-        return found
+        result: SceneResult = VERBS["run"](self, folder=folder, out=out, executor=executor)
+        return result
 
     def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
         """What the scene will do and leave out, see `rotor.scenes.plan.plan_of`."""
-        found: Plan = VERBS["plan"](self, folder)
-        return found
+        plan: Plan = VERBS["plan"](self, folder)
+        return plan
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,13 @@ class SceneResult:
 def _scene_class(kind: str) -> Any:
     """The structure of a kind of scene."""
     verb = verb_of(kind)
-    found = entries_before(verb)
+    entries = entries_before(verb)
     if verb.accuracy:
         meta = said(verb.accuracy, verb.accuracy_example)
-        found.append(("accuracy", Annotated[Accuracy, meta], None))
-    found += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
+        entries.append(("accuracy", Annotated[Accuracy, meta], None))
+    entries += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
     scene = msgspec.defstruct(
-        f"{kind.capitalize()}Scene", found, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",
+        f"{kind.capitalize()}Scene", entries, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",
         forbid_unknown_fields=True, omit_defaults=True, module=__name__,
     )  # fmt: skip
     scene.__doc__ = verb.about
@@ -106,8 +106,8 @@ class Kinds(Mapping[str, type[Scene]]):
     def __getitem__(self, kind: str) -> type[Scene]:
         if kind not in SCENE_VERBS:
             raise KeyError(kind)
-        found: type[Scene] = _scene_class(kind)
-        return found
+        structure: type[Scene] = _scene_class(kind)
+        return structure
 
     def __iter__(self) -> Iterator[str]:
         return iter(SCENE_VERBS)
@@ -133,8 +133,8 @@ def molecule_of(scene: Scene) -> MoleculeSection | None:
     >>> molecule_of(KINDS["thermo"](molecule="water")).source
     'water'
     """
-    given = getattr(scene, "molecule", None)
-    return MoleculeSection(source=given) if isinstance(given, str) else given
+    molecule = getattr(scene, "molecule", None)
+    return MoleculeSection(source=molecule) if isinstance(molecule, str) else molecule
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:

@@ -30,7 +30,7 @@ def __getattr__(name: str) -> Any:
     from rotor.verbs.scene_tables import tables_of
     from rotor.verbs.verb import SCENE_VERBS, verb_of
 
-    kind = next((one for one in SCENE_VERBS if name.startswith(one.capitalize())), "")
+    kind = next((verb for verb in SCENE_VERBS if name.startswith(verb.capitalize())), "")
     tables = tables_of(verb_of(kind)) if kind else {}
     if (table := name.removeprefix(kind.capitalize()).lower()) not in tables:
         raise AttributeError(f"module 'rotor.scenes.sections' has no attribute {name!r}")

@@ -22,15 +22,17 @@ def given_of(scene: Any, verb: Verb) -> Given:
     return Given(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
 
 
-def saved_scene(verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], given: Given) -> Any:
+def saved_scene(
+    verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], entries: Given
+) -> Any:
     """The scene of a request that was answered. outputs: files by name. given: settings of files among it."""
     flat = {
         **verb.saved(request, subject, folder),
         **{f"outputs.{name}": _plain(value) for name, value in outputs.items()},
     }
-    for key, one in keyed(verb).items():
-        if one.table == "outputs" and given.has(one):
-            flat[key] = one.write(one.read(given.of(one), given.style))
+    for key, field in keyed(verb).items():
+        if field.table == "outputs" and entries.has(field):
+            flat[key] = field.write(field.read(entries.of(field), entries.style))
     order = {name: place for place, name in enumerate(KINDS[verb.name].__struct_fields__)}
     tables = nested(flat)
     content = dict(sorted(tables.items(), key=lambda item: order.get(item[0], 0)))

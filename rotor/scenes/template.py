@@ -41,28 +41,32 @@ def template(kind: str) -> str:
 @cache
 def _start(kind: str) -> dict[str, Any]:
     """What a template has switched on, by dotted name."""
-    found = dict(verb_of(kind).start)
-    if isinstance(found.get("molecule"), str):
-        found["molecule.source"] = found.pop("molecule")
-    return found
+    start = dict(verb_of(kind).start)
+    if isinstance(start.get("molecule"), str):
+        start["molecule.source"] = start.pop("molecule")
+    return start
 
 
 def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
     """Lines of a table: its keys, then the tables in it."""
     hints = get_type_hints(structure, include_extras=True)
     inner: list[tuple[str, Any, bool]] = []
-    for one in msgspec.structs.fields(structure):
-        if one.name == "schema":
+    for field in msgspec.structs.fields(structure):
+        if field.name == "schema":
             continue
-        structures = structures_in(hints[one.name])
-        if structures and one.name != "accuracy":
+        structures = structures_in(hints[field.name])
+        if structures and field.name != "accuracy":
             inner.append(
-                (one.name, structures[0], one.name == "body" or (_is_list(hints[one.name]) and not one.required))
+                (
+                    field.name,
+                    structures[0],
+                    field.name == "body" or (_is_list(hints[field.name]) and not field.required),
+                )
             )
-        elif one.name == "sweep" and not place:
+        elif field.name == "sweep" and not place:
             yield f"# sweep = {_text(sweep_example(kind))}  # example: values by dotted name; every combination is run"
         else:
-            yield _key_line(one, hints[one.name], _start(kind).get(f"{place}{one.name}"))
+            yield _key_line(field, hints[field.name], _start(kind).get(f"{place}{field.name}"))
     for name, table, absent in inner:
         many = _is_list(hints[name])
         hash_ = "# " if absent else ""
@@ -97,19 +101,21 @@ def _in_comment(line: str) -> str:
     return text if text.startswith("#") else f"# {text}"
 
 
-def _key_line(one: Any, hint: Any, start: Any) -> str:
+def _key_line(field: Any, hint: Any, start: Any) -> str:
     """A key with its value and description: in force where it has a start, else a comment."""
     meta = next((item for item in get_args(hint) if isinstance(item, msgspec.Meta)), None)
     about = meta.description if meta is not None else ""
     example = (meta.examples or [None])[0] if meta is not None else None
     if start is not None:
-        return f"{one.name} = {_text(start)}  # {about}"
+        return f"{field.name} = {_text(start)}  # {about}"
     default = (
-        one.default_factory() if one.default is msgspec.NODEFAULT and callable(one.default_factory) else one.default
+        field.default_factory()
+        if field.default is msgspec.NODEFAULT and callable(field.default_factory)
+        else field.default
     )
     if default is msgspec.NODEFAULT or default is None or default == [] or default == {}:
-        return f"# {one.name} = {_text(example)}  # example: {about}"
-    return f"# {one.name} = {_text(default)}  # {about}"
+        return f"# {field.name} = {_text(example)}  # example: {about}"
+    return f"# {field.name} = {_text(default)}  # {about}"
 
 
 def _text(value: Any) -> str:

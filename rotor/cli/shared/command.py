@@ -43,20 +43,20 @@ class Parameter:
 
 def parameters_of(verb: Verb) -> list[Parameter]:
     """Every option of a verb; those of a tool are few, and --help shows all."""
-    found = [_input(one) for one in verb.parameters.values()]
-    found += [_extra(one) for one in verb.extras]
-    found += [_file(one) for one in verb.outputs]
+    parameters = [_input(field) for field in verb.parameters.values()]
+    parameters += [_extra(extra) for extra in verb.extras]
+    parameters += [_file(output) for output in verb.outputs]
     if verb.has_json:
-        found.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
+        parameters.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     if verb.has_scenes:
-        found.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
-    if any(one.name == "plot" for one in verb.outputs) and verb.drawn is not None:
-        found += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
+        parameters.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
+    if any(output.name == "plot" for output in verb.outputs) and verb.drawn is not None:
+        parameters += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
     if verb.workers:
-        found.append(
+        parameters.append(
             Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS)
         )
-    return found if verb.has_scenes else [replace(one, common=True) for one in found]
+    return parameters if verb.has_scenes else [replace(parameter, common=True) for parameter in parameters]
 
 
 def _left_out(verb: Verb) -> set[str]:
@@ -72,77 +72,92 @@ _PICTURE = (
 )
 
 
-def _input(one: Field) -> Parameter:
-    flag = isinstance(one.reader, Flag)
-    default = _default_text(one)
-    help_ = f"{one.help} [{default}]" if default else one.help
-    metavar = one.metavar or one.reader.metavar
-    off = isinstance(one.reader, Flag) and one.reader.off
+def _input(field: Field) -> Parameter:
+    flag = isinstance(field.reader, Flag)
+    default = _default_text(field)
+    help_ = f"{field.help} [{default}]" if default else field.help
+    metavar = field.metavar or field.reader.metavar
+    off = isinstance(field.reader, Flag) and field.reader.off
     return Parameter(
-        one.identity, one.flag, help_, metavar, one.heading, one.common, bool if flag else str, off, one.reader.many,
-        one.default is REQUIRED,
+        field.identity, field.flag, help_, metavar, field.heading, field.common, bool if flag else str, off, field.reader.many,
+        field.default is REQUIRED,
     )  # fmt: skip
 
 
-def _default_text(one: Field) -> str:
-    if one.typed is not None:
-        return str(one.typed)
-    if one.default in (None, REQUIRED) or isinstance(one.default, bool) or one.default in ((), "", {}):
+def _default_text(field: Field) -> str:
+    if field.typed is not None:
+        return str(field.typed)
+    if field.default in (None, REQUIRED) or isinstance(field.default, bool) or field.default in ((), "", {}):
         return ""
-    return one.reader.show(one.default)
+    return field.reader.show(field.default)
 
 
-def _extra(one: Extra) -> Parameter:
-    kind = str if one.metavar else bool
+def _extra(extra: Extra) -> Parameter:
+    kind = str if extra.metavar else bool
     return Parameter(
-        one.option, one.option, one.help, one.metavar, one.panel or OUTPUT, one.common, kind, many=one.many
+        extra.option,
+        extra.option,
+        extra.help,
+        extra.metavar,
+        extra.panel or OUTPUT,
+        extra.common,
+        kind,
+        many=extra.many,
     )
 
 
-def _file(one: Output) -> Parameter:
-    return Parameter(one.name, one.flag, one.help, "FILE", OUTPUT, True, many=one.many, required=one.required)
+def _file(output: Output) -> Parameter:
+    return Parameter(
+        output.name, output.flag, output.help, "FILE", OUTPUT, True, many=output.many, required=output.required
+    )
 
 
 def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]], None]) -> Callable[..., None]:
     """A function for typer with one parameter for each option of a verb; run: is given the texts by identity."""
-    every = parameters_of(verb)
-    by_name = {one.name: one for one in every}
+    options = parameters_of(verb)
+    by_name = {option.name: option for option in options}
 
     def call(context: typer.Context, **typed: Any) -> None:
         texts = {}
         for name, value in typed.items():
             if name != "help_all" and value is not None and value != [] and value != ():
-                one = by_name[name]
-                if any(isinstance(text, str) and not text.strip() for text in (value if one.many else [value])):
-                    raise ValueError(f"{one.flag}: the text given is empty; expected one that is not, or leave it out")
-                texts[one.identity] = tuple(value) if one.many else value
+                option = by_name[name]
+                if any(isinstance(text, str) and not text.strip() for text in (value if option.many else [value])):
+                    raise ValueError(
+                        f"{option.flag}: the text given is empty; expected one that is not, or leave it out"
+                    )
+                texts[option.identity] = tuple(value) if option.many else value
         run(verb, context, texts)
 
     parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
-    parameters += [_signature_of(one) for one in every]
-    if any(not one.common for one in every):
+    parameters += [_signature_of(option) for option in options]
+    if any(not option.common for option in options):
         everything = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
         parameters.append(
             inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=everything, annotation=bool)
         )
     call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    call.__annotations__ = {one.name: one.annotation for one in parameters}
+    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     call.__doc__ = verb.about
     return call
 
 
-def _signature_of(one: Parameter) -> inspect.Parameter:
-    kind: Any = bool if one.kind is bool else list[str] if one.many else str
-    if not one.flag.startswith("-"):
-        words = molecules_and_files if one.flag == "SOURCE" else None
-        first: Any = ... if one.required else None
-        default = typer.Argument(first, show_default=False, metavar=one.flag, help=f"{one.help}.", autocompletion=words)
+def _signature_of(option: Parameter) -> inspect.Parameter:
+    kind: Any = bool if option.kind is bool else list[str] if option.many else str
+    if not option.flag.startswith("-"):
+        words = molecules_and_files if option.flag == "SOURCE" else None
+        first: Any = ... if option.required else None
+        default = typer.Argument(
+            first, show_default=False, metavar=option.flag, help=f"{option.help}.", autocompletion=words
+        )
     else:
-        names = f"{one.flag}/--no-{one.flag[2:]}" if one.off else one.flag
-        settings: dict[str, Any] = {} if one.kind is bool else {"metavar": one.metavar}
-        panel = f"{'' if one.common else '+'}{one.panel}"
-        default = typer.Option(None, names, show_default=False, help=f"{one.help}.", rich_help_panel=panel, **settings)
-    return inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
+        names = f"{option.flag}/--no-{option.flag[2:]}" if option.off else option.flag
+        settings: dict[str, Any] = {} if option.kind is bool else {"metavar": option.metavar}
+        panel = f"{'' if option.common else '+'}{option.panel}"
+        default = typer.Option(
+            None, names, show_default=False, help=f"{option.help}.", rich_help_panel=panel, **settings
+        )
+    return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
 
 
 def molecules_and_files(incomplete: str) -> list[str]:
@@ -162,14 +177,14 @@ class PanelCommand(PlainCommand):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""
-        every = "--help-all" in (ctx.meta.get("rotor.help") or ())
+        show_all = "--help-all" in (ctx.meta.get("rotor.help") or ())
         panels: dict[str, list[tuple[str, str]]] = {}
-        for one in self.get_params(ctx):
-            record = one.get_help_record(ctx)
-            panel = getattr(one, "rich_help_panel", None) or (
-                "Arguments" if record and not one.opts[0].startswith("-") else "Help"
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            panel = getattr(parameter, "rich_help_panel", None) or (
+                "Arguments" if record and not parameter.opts[0].startswith("-") else "Help"
             )
-            if record is not None and (every or not panel.startswith("+")):
+            if record is not None and (show_all or not panel.startswith("+")):
                 panels.setdefault(panel.lstrip("+"), []).append(record)
         for panel in ("Arguments", *PANELS, *sorted(panels.keys() - {"Arguments", *PANELS, "Help"}), "Help"):
             if panel in panels:

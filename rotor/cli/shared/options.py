@@ -44,13 +44,18 @@ class PlainCommand(typer.core.TyperCommand):
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""
-        return [_unconverted(one) for one in super().get_params(ctx)]
+        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """The arguments, refused where an option that has one value is given twice: none is dropped silently."""
-        single = {text for one in self.params if not one.multiple for text in (*one.opts, *one.secondary_opts)}
-        given = [word.partition("=")[0] for word in args if word.startswith("--")]
-        twice = next((word for word in given if word in single and given.count(word) > 1), None)
+        single = {
+            text
+            for parameter in self.params
+            if not parameter.multiple
+            for text in (*parameter.opts, *parameter.secondary_opts)
+        }
+        names = [word.partition("=")[0] for word in args if word.startswith("--")]
+        twice = next((word for word in names if word in single and names.count(word) > 1), None)
         if twice is not None:
             raise ValueError(f"{twice}: given more than once; it has one value")
         return super().parse_args(ctx, args)
@@ -61,7 +66,7 @@ class PlainGroup(typer.core.TyperGroup):
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""
-        return [_unconverted(one) for one in super().get_params(ctx)]
+        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
 
 
 def _unconverted(parameter: Any) -> Any:

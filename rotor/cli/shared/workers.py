@@ -60,12 +60,12 @@ class Counted(Executor):
     ) -> Iterator[Any]:
         """`map` of all pieces in order."""
         pieces = list(zip(*iterables, strict=False))
-        found = (
+        results = (
             self._pool.map(fn, *zip(*pieces, strict=True), timeout=timeout, chunksize=chunksize)
             if self._pool is not None and pieces
             else (fn(*piece) for piece in pieces)
         )
-        for done, result in enumerate(found, 1):
+        for done, result in enumerate(results, 1):
             if self._advance is not None:
                 self._advance(done, len(pieces))
             yield result

@@ -235,7 +235,7 @@ def named(text: str, words: Mapping[str, str]) -> str:
             raise ValueError(f"outputs: {text!r}: {{{key}}} is no swept name; of the sweep there are {known}")
     if any(brace in _PLACE.sub("", text) for brace in "{}"):
         raise ValueError(f"outputs: {text!r}: a brace without its partner; a swept name stands as {{key}}")
-    return _PLACE.sub(lambda found: words[found[1]], text)
+    return _PLACE.sub(lambda match: words[match[1]], text)
 
 
 def put(content: dict[str, Any], name: str, value: Any) -> None:
@@ -251,11 +251,11 @@ def put(content: dict[str, Any], name: str, value: Any) -> None:
     table[last] = value
 
 
-def check_first(every: Points, out: str | os.PathLike[str]) -> None:
+def check_first(points: Points, out: str | os.PathLike[str]) -> None:
     """Check what all points share: the swept names, the folders and suffixes of the files that are written."""
-    first = next(iter(every))
+    first = next(iter(points))
     output_paths(first.scene, out)
-    for name, text in every.combined.items():
+    for name, text in points.combined.items():
         target = Path(out) / text
         if not target.name.lower().endswith(f".{name}"):
             raise ValueError(f"outputs.{name}: {text}: the name must end in .{name}")
