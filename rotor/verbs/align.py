@@ -38,9 +38,9 @@ Examples:
   rotor align OCS --thz "500 kV/cm, 1 ps, 0.3 THz" --observable costheta"""
 
 
-def prepare(top: Top, reading: Reading, given: Given) -> Top:
+def prepare(top: Top, reading: Reading, entries: Given) -> Top:
     """The top with what the pulses act on."""
-    pulses = FIELDS["pulses"].read(given.values.get("pulses"), given.style) or ()
+    pulses = FIELDS["pulses"].read(entries.values.get("pulses"), entries.style) or ()
     acts_on = {pulse.acts_on for pulse in pulses}
     if "dipole" in acts_on:
         top = with_some_dipole(top, reading)
@@ -54,12 +54,12 @@ def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
     """
     axis = _named("--polarization", lambda: read_axis(typed.get("--polarization", "z")))
     pulses = [
-        _named(option, lambda t=text, o=option: _of_text(t, o, axis))
+        _named(option, lambda t=text, o=option: _pulse_of_text(t, o, axis))
         for option in _TEXTS
         for text in typed.get(option, ())
     ]
     if "--pulse-table" in typed:
-        pulses.append(_named("--pulse-table", lambda: _of_table(typed["--pulse-table"], axis)))
+        pulses.append(_named("--pulse-table", lambda: _pulse_of_table(typed["--pulse-table"], axis)))
     if not pulses:
         raise ValueError('no pulse: give --pulse "1e13 W/cm2, 1 ps", --switched, --kick, --pulse-table or --thz')
     return {"pulses": tuple(pulses)}
@@ -72,10 +72,10 @@ def _named(option: str, make: Any) -> Any:
         raise ValueError(f"{option}: {error}") from None
 
 
-def _of_text(text: str, option: str, axis: Axis) -> Pulse:
+def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
     """A pulse of numbers between commas."""
     shape, keys = _TEXTS[option]
-    fields: dict[str, Any] = {one.key: one for one in all_fields(SHAPES[shape]).values()}
+    fields: dict[str, Any] = {field.key: field for field in all_fields(SHAPES[shape]).values()}
     parts = [part.strip() for part in text.split(",")]
     least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
     if not least <= len(parts) <= len(keys):
@@ -89,7 +89,7 @@ def _of_text(text: str, option: str, axis: Axis) -> Pulse:
     return pulse
 
 
-def _of_table(path: str, axis: Axis) -> Pulse:
+def _pulse_of_table(path: str, axis: Axis) -> Pulse:
     import numpy as np
 
     from rotor.alignment.pulse import TabulatedPulse
@@ -119,14 +119,14 @@ def _rows(path: str) -> tuple[list[str], list[list[float]]]:
     return names, rows
 
 
-def build(verb: Verb, given: Given, subject: Subject) -> AlignRequest:
+def build(verb: Verb, entries: Given, subject: Subject) -> AlignRequest:
     """The request of a top and its pulses."""
-    values = read_fields(AlignRequest, given, subject)
+    values = read_fields(AlignRequest, entries, subject)
     if not values.get("pulses"):
         raise ValueError('pulses: expected one or more, such as "gaussian peak=1e13W/cm2 fwhm=1ps"')
     if values.get("state") is not None and "temperature_k" in values and not values.get("classical_molecules"):
         temperature, state = (
-            verb.fields[f"conditions.{name}"].called(given.style) for name in ("temperature", "state")
+            verb.fields[f"conditions.{name}"].called(entries.style) for name in ("temperature", "state")
         )
         raise ValueError(f"{temperature} and {state}: give one of them; the molecules of one level have no temperature")
     if values.get("state") is not None and values.get("classical_molecules"):
@@ -159,10 +159,15 @@ def show(answer: AlignAnswer, report: Report) -> None:
     show_facts(_facts(trace, content))
     print()
     rows = []
-    for one in content["extremes"]:
-        mean = trace.permanent.get(one["name"])
-        numbers = f"{one['max']:.6f}", f"{one['max_at_ps']:.3f}", f"{one['min']:.6f}", f"{one['min_at_ps']:.3f}"
-        rows.append([one["name"], *numbers, "" if mean is None else f"{mean:.6f}"])
+    for extreme in content["extremes"]:
+        mean = trace.permanent.get(extreme["name"])
+        numbers = (
+            f"{extreme['max']:.6f}",
+            f"{extreme['max_at_ps']:.3f}",
+            f"{extreme['min']:.6f}",
+            f"{extreme['min_at_ps']:.3f}",
+        )
+        rows.append([extreme["name"], *numbers, "" if mean is None else f"{mean:.6f}"])
     columns = ("cosine", "max", "at (ps)", "min", "at (ps)", "mean after")
     show_table(Table("", columns, rows, frozenset({"cosine"})))
     sources = source_facts(trace.top, ("constants", "dipole", "polarizability"), report.sources)

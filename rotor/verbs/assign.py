@@ -26,13 +26,13 @@ Examples:
   rotor assign peaks.csv --isotopologues --molecule parent.xyz --json found.json"""
 
 
-def spectrum_source(given: Any) -> Any:
+def spectrum_source(raw: Any) -> Any:
     """A file by its name, or rows or columns of numbers."""
-    if isinstance(given, str | os.PathLike):
-        return os.fspath(given)
+    if isinstance(raw, str | os.PathLike):
+        return os.fspath(raw)
     import numpy as np
 
-    values = np.asarray(given, dtype=np.float64)
+    values = np.asarray(raw, dtype=np.float64)
     if values.ndim != 2 or not {2, 3} & set(values.shape):
         raise ValueError(f"an array of shape {values.shape}: expected columns of frequency, intensity[, error]")
     return values if values.shape[1] in (2, 3) else values.T
@@ -67,24 +67,24 @@ class SpectrumFile(SubjectKind):
 
     fields = {one.identity: one for one in all_fields(SpectrumInput).values()}  # noqa: RUF012
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The peaks and the geometry that were given."""
         from rotor.formats import read
         from rotor.formats.peak_files import peaks_of_columns, read_peaks
 
-        asked = read_instance(SpectrumInput, given)
-        if asked.source is None:
+        inputs = read_instance(SpectrumInput, entries)
+        if inputs.source is None:
             raise ValueError("no spectrum: expected a file with a list of peaks or a spectrum, such as peaks.csv")
-        is_file = isinstance(asked.source, str)
-        spectrum = Path(place.folder) / asked.source if is_file else asked.source
-        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_of_columns)(spectrum, asked.range_mhz)}
-        if asked.molecule is not None:
-            path = Path(place.folder) / asked.molecule
-            top = read(path if path.is_file() else asked.molecule)
+        is_file = isinstance(inputs.source, str)
+        spectrum = Path(place.folder) / inputs.source if is_file else inputs.source
+        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_of_columns)(spectrum, inputs.range_mhz)}
+        if inputs.molecule is not None:
+            path = Path(place.folder) / inputs.molecule
+            top = read(path if path.is_file() else inputs.molecule)
             if getattr(top, "molecule", None) is None:
-                raise ValueError(f"{asked.molecule}: holds no geometry; expected a file with the positions of nuclei")
+                raise ValueError(f"{inputs.molecule}: holds no geometry; expected a file with the positions of nuclei")
             values["molecule"] = top.molecule
-        return Subject(values, (asked,), asked.source if is_file else "numbers", place.note)
+        return Subject(values, (inputs,), inputs.source if is_file else "numbers", place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs, files counted from the folder of the scene."""
@@ -121,10 +121,10 @@ def show(answer: AssignAnswer, report: Report) -> None:
             ("left", f"{record['unexplained']} peaks belong to no species"),
         ]
     )
-    for number, one in enumerate(answer.species, 1):
+    for number, species in enumerate(answer.species, 1):
         print()
-        show_table(_table(number, one))
-        show_facts(_facts(one))
+        show_table(_table(number, species))
+        show_facts(_facts(species))
     print()
     show_facts(error_facts(record.get("errors")))
 
@@ -132,37 +132,37 @@ def show(answer: AssignAnswer, report: Report) -> None:
 def _verdict(answer: AssignAnswer) -> str:
     if not answer.species:
         return "not found: no species stands above chance"
-    words = ", ".join(f"{number}: {one.word}" for number, one in enumerate(answer.species, 1))
+    words = ", ".join(f"{number}: {species.word}" for number, species in enumerate(answer.species, 1))
     return words + ("; the search was ended by its seconds" if answer.ended else "")
 
 
-def _table(number: int, one: AssignedSpecies) -> Table:
-    constants = one.constants
-    open_ = one.refined.open_constants
+def _table(number: int, species: AssignedSpecies) -> Table:
+    constants = species.constants
+    open_ = species.refined.open_constants
     rows = [
         [name, value_text(constants[name], constants.uncertainties[name]), "open" if name in open_ else ""]
         for name in constants.values
     ]
-    title = f"species {number}, {one.word} (p = {one.probability:.4f})" + (
-        f", {one.isotopologue}" if one.isotopologue else ""
+    title = f"species {number}, {species.word} (p = {species.probability:.4f})" + (
+        f", {species.isotopologue}" if species.isotopologue else ""
     )
     return Table(title, ("constant", "MHz", ""), rows)
 
 
-def _facts(one: AssignedSpecies) -> list[tuple[str, str]]:
-    a, b, c = one.dipole_ratio
+def _facts(species: AssignedSpecies) -> list[tuple[str, str]]:
+    a, b, c = species.dipole_ratio
     facts = [
         (
             "lines",
-            f"{len(one.lines)} on {len({*one.peak.ravel().tolist()})} peaks, rms {1000 * one.refined.fit.rms_mhz():.1f} kHz",
+            f"{len(species.lines)} on {len({*species.peak.ravel().tolist()})} peaks, rms {1000 * species.refined.fit.rms_mhz():.1f} kHz",
         ),
-        ("types", f"{one.kind}; |μa| : |μb| : |μc| = {a:.2f} : {b:.2f} : {c:.2f}"),
-        ("temperature", f"about {one.grown.temperature_k:g} K"),
-        ("evidence", f"e^{one.grown.evidence:.0f} against chance"),
+        ("types", f"{species.kind}; |μa| : |μb| : |μc| = {a:.2f} : {b:.2f} : {c:.2f}"),
+        ("temperature", f"about {species.grown.temperature_k:g} K"),
+        ("evidence", f"e^{species.grown.evidence:.0f} against chance"),
     ]
-    if one.split:
+    if species.split:
         facts.append(("split", "its lines are doublets; their centres are fitted"))
-    for constants, _ in one.twins:
+    for constants, _ in species.twins:
         facts.append(
             (
                 "twin",

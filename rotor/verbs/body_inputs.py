@@ -25,38 +25,38 @@ def _body(name: Any) -> NamedBody:
     return named_body(name)
 
 
-def three(given: Any, unit: str = "") -> Three:
+def three(raw: Any, unit: str = "") -> Three:
     """Three finite numbers, in a unit of their own or in `unit`."""
-    if isinstance(given, str):
-        if given.count(",") != 2 or ":" in given:
-            raise ValueError(f"{given!r}: expected three numbers, such as 0.6,0.8,1.0")
-        given = parse_grid(given, unit)
-    values = [float(one) for one in given]
+    if isinstance(raw, str):
+        if raw.count(",") != 2 or ":" in raw:
+            raise ValueError(f"{raw!r}: expected three numbers, such as 0.6,0.8,1.0")
+        raw = parse_grid(raw, unit)
+    values = [float(number) for number in raw]
     if len(values) != 3:
         raise ValueError(f"{values}: expected three numbers")
     x, y, z = values
     return x, y, z
 
 
-def _four(given: Any) -> tuple[float, float, float, float]:
-    if isinstance(given, str) and (given.count(",") != 3 or ":" in given):
-        raise ValueError(f"{given!r}: expected four numbers, such as 1,0,0,0")
-    values = [float(one) for one in (parse_grid(given, "") if isinstance(given, str) else given)]
+def _four(raw: Any) -> tuple[float, float, float, float]:
+    if isinstance(raw, str) and (raw.count(",") != 3 or ":" in raw):
+        raise ValueError(f"{raw!r}: expected four numbers, such as 1,0,0,0")
+    values = [float(number) for number in (parse_grid(raw, "") if isinstance(raw, str) else raw)]
     if len(values) != 4:
         raise ValueError(f"{values}: expected four numbers, such as 1,0,0,0")
     w, x, y, z = values
     return w, x, y, z
 
 
-def _moments(given: Any) -> Three:
+def _moments(raw: Any) -> Three:
     from rotor.classical.euler import checked_moments
 
-    moments = three(given, "kg*m2" if in_si(given) else "")
+    moments = three(raw, "kg*m2" if in_si(raw) else "")
     try:
         checked_moments(moments)
     except ValueError as error:
         text = str(error)
-        raise ValueError(f"{given!r}: {text}" if isinstance(given, str) else text) from None
+        raise ValueError(f"{raw!r}: {text}" if isinstance(raw, str) else text) from None
     return moments
 
 
@@ -65,10 +65,10 @@ def in_si(moments: Any) -> bool:
     return isinstance(moments, str) and bool(_UNIT_AT_END.search(moments))
 
 
-def _units(given: Any) -> str:
-    if given not in ("", "SI"):
-        raise ValueError(f'{given!r}: expected "SI", or "" for any coherent set')
-    return str(given)
+def _units(raw: Any) -> str:
+    if raw not in ("", "SI"):
+        raise ValueError(f'{raw!r}: expected "SI", or "" for any coherent set')
+    return str(raw)
 
 
 class Vector(Reader):
@@ -81,15 +81,15 @@ class Vector(Reader):
 
     def write(self, value: Any) -> list[float]:
         """The numbers as a list."""
-        return [float(one) for one in value]
+        return [float(number) for number in value]
 
 
 class Times(Grid):
     """Times in the unit of the body; a text is read where the body is known."""
 
-    def read(self, given: Any) -> Any:
+    def read(self, raw: Any) -> Any:
         """What was given."""
-        return given
+        return raw
 
     def write(self, value: Any) -> Any:
         """A text as it is, numbers as a list."""
@@ -153,12 +153,12 @@ class MotionInput:
         typed=DEFAULT_TOLERANCE,
     )  # fmt: skip
     step: float | None = declared(
-        None, Custom(lambda given: given, scene_type=float | str, metavar="T"),
+        None, Custom(lambda raw: raw, scene_type=float | str, metavar="T"),
         "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
         example=0.01,
     )  # fmt: skip
     order: int = declared(4, Whole(), "Order of the splitting: 2, 4, 6 or 8", "numerics.order")
 
 
-BODY = {one.name: one for one in all_fields(BodyInput).values()}
-MOTION = {one.name: one for one in all_fields(MotionInput).values()}
+BODY = {field.name: field for field in all_fields(BodyInput).values()}
+MOTION = {field.name: field for field in all_fields(MotionInput).values()}

@@ -200,9 +200,9 @@ def show(answer: CatAnswer, report: Report) -> None:
         return
     print()
     show_facts(comparison_facts(content["compared"]))
-    found = answer.compared.comparison
-    _show_strongest("missing there: ", found.reference.take(found.missing), shown)
-    _show_strongest("only there: ", found.ours.take(found.extra), shown)
+    comparison = answer.compared.comparison
+    _show_strongest("missing there: ", comparison.reference.take(comparison.missing), shown)
+    _show_strongest("only there: ", comparison.ours.take(comparison.extra), shown)
 
 
 def _show_strongest(title: str, lines: Catalogue, shown: int) -> None:

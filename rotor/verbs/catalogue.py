@@ -72,13 +72,15 @@ class Added:
         """Sources and faults, by the keys of docs/verbs."""
         return {
             "catalogue": self.catalogue,
-            "added": [{"source": one.source, "species": one.species, "lines": one.lines} for one in self.added],
-            "faults": [{"source": one.source, "fault": one.fault} for one in self.faults],
+            "added": [
+                {"source": species.source, "species": species.species, "lines": species.lines} for species in self.added
+            ],
+            "faults": [{"source": entry.source, "fault": entry.fault} for entry in self.faults],
         }
 
     def show(self) -> None:
         """Print how much was added."""
-        total = f"{sum(one.lines for one in self.added)} lines from {len(self.added)} sources"
+        total = f"{sum(species.lines for species in self.added)} lines from {len(self.added)} sources"
         show_facts([("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))])
 
 
@@ -91,10 +93,10 @@ def add(request: CatalogueRequest, work: Work) -> Added:
     report = add_sources(request.catalogue, request.words, facts, catdir=request.catdir, progress=progress)
     if progress:
         print(file=sys.stderr)
-    faults = [one for one in report if one.fault]
-    for one in faults:
-        work.note(f"left out: {one.fault}")
-    return Added(request.catalogue, [one for one in report if not one.fault], faults)
+    faults = [entry for entry in report if entry.fault]
+    for entry in faults:
+        work.note(f"left out: {entry.fault}")
+    return Added(request.catalogue, [entry for entry in report if not entry.fault], faults)
 
 
 @dataclass(frozen=True)
@@ -188,12 +190,19 @@ def _line_rows(species: Sequence[Any]) -> list[tuple[Any, ...]]:
     import numpy as np
 
     rows: list[tuple[Any, ...]] = []
-    for one in species:
-        low, high = one.partition.range_k
-        intensity = np.log10(one.intensity_nm2_mhz(min(max(300.0, low), high)))
-        numbers = (one.frequency_mhz, one.error_mhz, intensity, one.energy_lower_k, one.g_upper, one.einstein_a_per_s)
-        texts = (one.upper.tolist(), one.lower.tolist())
-        rows += [(one.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
+    for each in species:
+        low, high = each.partition.range_k
+        intensity = np.log10(each.intensity_nm2_mhz(min(max(300.0, low), high)))
+        numbers = (
+            each.frequency_mhz,
+            each.error_mhz,
+            intensity,
+            each.energy_lower_k,
+            each.g_upper,
+            each.einstein_a_per_s,
+        )
+        texts = (each.upper.tolist(), each.lower.tolist())
+        rows += [(each.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
     return sorted(rows, key=lambda row: row[1])
 
 

@@ -59,10 +59,10 @@ def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
             note(text)
         return Compared(compare(lines, request.chosen(prediction.catalogue)))
     kelvin, source = temperature_of(request.file, request.temperature)
-    found = compare(lines, request.chosen(predicted(lines, request, kelvin, note)))
-    reference = found.reference
+    comparison = compare(lines, request.chosen(predicted(lines, request, kelvin, note)))
+    reference = comparison.reference
     range_mhz = (float(reference.frequency_mhz.min()), float(reference.frequency_mhz.max()))
-    return Compared(within(found, range_mhz, float(reference.lgint.min())), kelvin, source)
+    return Compared(within(comparison, range_mhz, float(reference.lgint.min())), kelvin, source)
 
 
 def read_catalogue(path: str) -> Catalogue:
@@ -74,10 +74,10 @@ def read_catalogue(path: str) -> Catalogue:
     return read_cat(path)
 
 
-def temperature_of(file: str, given: float | None) -> tuple[float, str]:
+def temperature_of(file: str, option: float | None) -> tuple[float, str]:
     """The temperature of a catalogue's intensities in K, and where it is from: an option, the file beside it, the format."""
-    if given is not None:
-        return given, "given (--temperature)"
+    if option is not None:
+        return option, "given (--temperature)"
     beside = Path(f"{file}.provenance.json")
     if beside.is_file():
         try:
@@ -117,23 +117,25 @@ def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, A
     """Matched, missing and extra lines and the differences, ours (OTHER) minus the catalogue."""
     from rotor.formats.spcat.compare import agreement
 
-    found = compared.comparison
-    met = agreement(found)
+    comparison = compared.comparison
+    met = agreement(comparison)
     return {
         "other": other,
         "temperature_k": compared.temperature_k,
         "temperature_source": compared.temperature_source,
         "likely_temperature_k": compared.likely_temperature_k,
-        "spins_collapsed": found.collapsed,
-        "matched": len(found.of_ours),
-        "missing": len(found.missing),
-        "extra": len(found.extra),
-        "other_states": found.other_states,
-        **{name: _spread(found.differences(name)) for name in DIFFERENCES},
-        "degeneracies_that_differ": None if found.collapsed else int((found.differences("g_upper") != 0).sum()),
+        "spins_collapsed": comparison.collapsed,
+        "matched": len(comparison.of_ours),
+        "missing": len(comparison.missing),
+        "extra": len(comparison.extra),
+        "other_states": comparison.other_states,
+        **{name: _spread(comparison.differences(name)) for name in DIFFERENCES},
+        "degeneracies_that_differ": None
+        if comparison.collapsed
+        else int((comparison.differences("g_upper") != 0).sum()),
         "measured": met._asdict() if met.lines else None,
-        "missing_lines": [line_record(found.reference, row) for row in found.missing[:shown].tolist()],
-        "extra_lines": [line_record(found.ours, row) for row in found.extra[:shown].tolist()],
+        "missing_lines": [line_record(comparison.reference, row) for row in comparison.missing[:shown].tolist()],
+        "extra_lines": [line_record(comparison.ours, row) for row in comparison.extra[:shown].tolist()],
     }
 
 

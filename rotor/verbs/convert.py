@@ -85,7 +85,7 @@ def refuse_overwriting(request: ConvertRequest, outputs: Mapping[str, Any], _: A
     """The .var, .par and .int beside an .int, which are read with it, are not written over."""
     source, target = Path(request.source), outputs["target"][0]
     beside = [source.with_suffix(suffix) for suffix in (".var", ".par")] if source.suffix.lower() == ".int" else []
-    if source.is_file() and target.resolve() in {one.resolve() for one in beside}:
+    if source.is_file() and target.resolve() in {path.resolve() for path in beside}:
         raise ValueError(f"TARGET {target}: is an input of this command; write the result under another name")
 
 
@@ -200,8 +200,8 @@ def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
     kmax = 0 if kind == "linear" else request.kmax
     written = {"DIAG": 3 if kind == "asymmetric" else 0, "KNMAX": kmax, "NLINE": 1}
     knmax = min(line.knmax for line in file.options)
-    given = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": file.header.nline}
-    lost = [f"{name} = {value}" for name, value in given.items() if value != written[name]]
+    stated = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": file.header.nline}
+    lost = [f"{name} = {value}" for name, value in stated.items() if value != written[name]]
     if not lost:
         return []
     others = ", ".join(f"{name} = {value}" for name, value in written.items())

@@ -76,45 +76,49 @@ class SeveralMolecules(SubjectKind):
     fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _OF_ONE}}  # noqa: RUF012
     tables_read = ("molecules",)
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The molecules that were given."""
-        tables = self._tables(given)
+        tables = self._tables(entries)
         molecules: list[Top | CatalogueLines] = []
-        inputs, own = [], []
+        inputs, own_values = [], []
         for number, (molecule, emitter) in enumerate(tables):
             try:
-                molecules.append(_molecule(Reading(molecule, given.style, place.folder, place.note), emitter.partition))
+                molecules.append(
+                    _molecule(Reading(molecule, entries.style, place.folder, place.note), emitter.partition)
+                )
             except ValueError as error:
-                raise ValueError(f"molecules[{number}]: {error}" if given.style == "key" else str(error)) from None
+                raise ValueError(f"molecules[{number}]: {error}" if entries.style == "key" else str(error)) from None
             inputs.append(molecule)
             values = {
                 name: getattr(emitter, name)
                 for name in ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
             }
-            mine = {name: value for name, value in values.items() if value is not None} if given.style == "key" else {}
-            own.append(mine if emitter.partition is None else {**mine, "partition": emitter.partition})
-        text = " ".join(str(one.source or one.constants) for one in inputs)
-        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(own))
+            mine = (
+                {name: value for name, value in values.items() if value is not None} if entries.style == "key" else {}
+            )
+            own_values.append(mine if emitter.partition is None else {**mine, "partition": emitter.partition})
+        text = " ".join(str(molecule_input.source or molecule_input.constants) for molecule_input in inputs)
+        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(own_values))
 
-    def _tables(self, given: Given) -> list[tuple[MoleculeInput, EmitterInput]]:
+    def _tables(self, entries: Given) -> list[tuple[MoleculeInput, EmitterInput]]:
         """The inputs of each molecule."""
-        if given.style == "key":
-            tables = given.values.get("molecules", ())
+        if entries.style == "key":
+            tables = entries.values.get("molecules", ())
             if not tables:
                 raise ValueError("molecules: expected one molecule or more")
             return [_of_table(table) for table in tables]
-        several: SeveralInput = read_instance(SeveralInput, given)
+        several: SeveralInput = read_instance(SeveralInput, entries)
         if not several.names:
             raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
-        for one in (FIELDS[name] for name in _OF_ONE):
-            if given.has(one) and (len(several.names) > 1 or is_catalogue(several.names[0])):
-                raise ValueError(f"{one.called(given.style)}: expected with a single molecule that is no catalogue")
+        for field in (FIELDS[name] for name in _OF_ONE):
+            if entries.has(field) and (len(several.names) > 1 or is_catalogue(several.names[0])):
+                raise ValueError(f"{field.called(entries.style)}: expected with a single molecule that is no catalogue")
         if several.partition is not None and not any(map(is_catalogue, several.names)):
             raise ValueError("--partition: is Q(T) of .cat files, and none is among the molecules")
-        values = {name: value for name, value in given.values.items() if name.startswith("molecule.")}
+        values = {name: value for name, value in entries.values.items() if name.startswith("molecule.")}
         return [
             (
-                read_molecule(Given({**values, "molecule.source": source}, given.style)),
+                read_molecule(Given({**values, "molecule.source": source}, entries.style)),
                 EmitterInput(partition=several.partition if is_catalogue(source) else None),
             )
             for source in several.names
@@ -122,14 +126,14 @@ class SeveralMolecules(SubjectKind):
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The list of molecules."""
-        one: Any = emitting_molecule()
-        return [("molecules", Annotated[list[one], said("one or more")], msgspec.NODEFAULT)]
+        structure: Any = emitting_molecule()
+        return [("molecules", Annotated[list[structure], said("one or more")], msgspec.NODEFAULT)]
 
     def saved(self, request: EmissionRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The tables of the molecules."""
         first = request.sources[0]
         tables = []
-        for molecule, source, own in zip(subject.molecules, request.sources, subject.own, strict=True):
+        for molecule, source, values_of_molecule in zip(subject.molecules, request.sources, subject.own, strict=True):
             flat = saved_molecule(molecule, folder)
             content = (
                 {"source": flat["molecule"]}
@@ -141,7 +145,7 @@ class SeveralMolecules(SubjectKind):
                 for name in ("excitation_k", "velocity_km_s", "fwhm_km_s")
                 if getattr(source, name) != getattr(first, name)
             }
-            partition = own.get("partition")
+            partition = values_of_molecule.get("partition")
             emitter = EmitterInput(
                 source.column_per_cm2, **departures, partition=None if partition is None else beside(partition, folder)
             )
@@ -166,7 +170,7 @@ _STRUCTURE: list[Any] = []
 
 
 def _of_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
-    names = {one.key for one in all_fields(EmitterInput).values()}
+    names = {field.key for field in all_fields(EmitterInput).values()}
     values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
     emitter: EmitterInput = read_instance(
         EmitterInput, Given({name: table[name] for name in names & table.keys()}, "key")

@@ -43,8 +43,8 @@ OF_FIT = ("free", "shared", "sample", "calibration", "reject")
 
 def of_layer(name: str) -> Any:
     """A field of the gas of a source, None where it is not typed: a fit estimates it."""
-    one = own_fields(LayerInput)[name]
-    return declared(None, one.reader, one.help, one.key, option=one.option, panel=one.panel)
+    field = own_fields(LayerInput)[name]
+    return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,11 @@ class ObservedRequest:
             raise ValueError(
                 "--over, --fit: both name a spectrum; expected one of them (a fit is laid over its spectrum)"
             )
-        own, file = own_fields(ObservedRequest), all_fields(SpectrumFile).values()
-        named = [own[name].flag for name in OF_FIT if getattr(self, name) != own[name].default]
+        declared_here, file = own_fields(ObservedRequest), all_fields(SpectrumFile).values()
+        named = [declared_here[name].flag for name in OF_FIT if getattr(self, name) != declared_here[name].default]
         if named and self.fit is None:
             raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
-        named = [one.flag for one in file if getattr(self.spectrum, one.name) != one.default]
+        named = [field.flag for field in file if getattr(self.spectrum, field.name) != field.default]
         if self.over is None and self.fit is None:
             raise ValueError(
                 f"{(named or ['--catalogue'])[0]}: belongs to an observed spectrum; expected with --over or --fit"
@@ -139,11 +139,13 @@ class Observed:
         content: dict[str, Any] = {"spectrum": json_of(self.spectrum)}
         if self.fit is None:
             modelled = model(self.components, self.spectrum.frequency_mhz, self.sight).brightness_k
-            content["components"] = [component_facts(one) for one in self.components]
+            content["components"] = [component_facts(component) for component in self.components]
             return content | {"rms_k": float(np.sqrt(np.mean((self.spectrum.intensity - modelled) ** 2)))}
         content |= self.fit.facts()
         names = ("species", "signal", "needed", "limit_per_cm2")
-        content["contributions"] = [{name: getattr(one, name) for name in names} for one in self.needed]
+        content["contributions"] = [
+            {name: getattr(contribution, name) for name in names} for contribution in self.needed
+        ]
         return content if self.chain is None else content | {"sample": self.chain.facts()}
 
 
@@ -157,9 +159,9 @@ def answer(request: ObservedRequest, work: Work) -> Observed:
     sight = request.spectrum.sight(spectrum, background, redshift)
     reach, partition = padded(spectrum, redshift), request.sources.partition
     species = species_of(request.names, request.catalogue, reach, partition, work.note)
-    for one in species:
-        if "note" in one.identity:
-            work.note(f"{one.name}: {one.identity['note']}")
+    for each in species:
+        if "note" in each.identity:
+            work.note(f"{each.name}: {each.identity['note']}")
     components = _components(spectrum, species, sight, request)
     if request.fit is None:
         return Observed(request, spectrum, sight, components)
@@ -189,19 +191,19 @@ def _components(
         defaults = {name: own_fields(LayerInput)[name].default * count for name in typed}
         values = {name: each or defaults[name] for name, each in typed.items()}
         rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
-        return [Component(one, **row, size_arcsec=size) for one, row in zip(species, rows, strict=True)]
+        return [Component(each, **row, size_arcsec=size) for each, row in zip(species, rows, strict=True)]
     first = {name: (values[0] if values else None) for name, values in typed.items()}
     del first["column_per_cm2"]
     start = start_components(spectrum, species, sight, **first, size_arcsec=size)
     changes = [{name: values[k] for name, values in typed.items() if values} for k in range(count)]
-    return [replace(one, **change) for one, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
+    return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
 
 
 def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
     """One number for each species, or one for all."""
     values: tuple[float, ...] | None = getattr(request, name)
     if values is not None and len(values) not in (1, count):
-        flag, text = own_fields(LayerInput)[name].flag, ",".join(f"{one:g}" for one in values)
+        flag, text = own_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
         raise ValueError(f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each")
     return values * count if values is not None and len(values) == 1 else values
 
@@ -244,14 +246,14 @@ def show(answer: Observed, _: Report) -> None:
     print()
     if answer.fit is None:
         columns = ("species", "N (1/cm²)", "T_ex (K)", "v (km/s)", "Δv (km/s)")
-        show_table(Table("model", columns, [_component_cells(one) for one in answer.components], LEFT))
+        show_table(Table("model", columns, [_component_cells(component) for component in answer.components], LEFT))
     else:
         _show_fit(answer.fit, answer.needed, answer.chain)
 
 
-def _component_cells(one: Component) -> tuple[str, ...]:
-    gas = f"{one.column_per_cm2:.4g}", f"{one.excitation_k:.4g}"
-    return one.species.name, *gas, f"{one.velocity_km_s:.3f}", f"{one.fwhm_km_s:.3f}"
+def _component_cells(component: Component) -> tuple[str, ...]:
+    gas = f"{component.column_per_cm2:.4g}", f"{component.excitation_k:.4g}"
+    return component.species.name, *gas, f"{component.velocity_km_s:.3f}", f"{component.fwhm_km_s:.3f}"
 
 
 def _show_fit(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> None:
@@ -260,18 +262,18 @@ def _show_fit(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Non
     print()
     show_table(_parameter_table(fit))
     print()
-    rows = [(one.species, f"{one.signal:.1f}", "yes" if one.needed else "no", _limit(one)) for one in needed]
+    rows = [(each.species, f"{each.signal:.1f}", "yes" if each.needed else "no", _limit(each)) for each in needed]
     columns = ("species", "Δχ²", "needed", "limit, 3σ (1/cm²)")
     show_table(Table("what each species contributes", columns, rows, LEFT))
-    facts = [("undetermined", one.text) for one in fit.statistics.undetermined]
+    facts = [("undetermined", combination.text) for combination in fit.statistics.undetermined]
     for part_ in (facts, [] if chain is None else [("sample", chain.text)]):
         if part_:
             print()
             show_facts(part_)
 
 
-def _limit(one: Contribution) -> str:
-    return "" if one.limit_per_cm2 is None else f"{one.limit_per_cm2:.3g}"
+def _limit(contribution: Contribution) -> str:
+    return "" if contribution.limit_per_cm2 is None else f"{contribution.limit_per_cm2:.3g}"
 
 
 def _parameter_table(fit: SourceFit) -> Table:

@@ -122,21 +122,24 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
             "choose: a scene holds no choice of constants; choose first, then save the fit of those constants"
         )
     if further.choose is not None:
-        found = chosen_fit(request, further.choose, not further.all_orders)
+        fit_answer = chosen_fit(request, further.choose, not further.all_orders)
     else:
-        found = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
-    found = with_further(found, further.try_constants, further.suggest, further.bootstrap, further.seed)
+        fit_answer = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
+    fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
     if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
         from rotor.formats.assigned_lin import note_of_lin
 
-        for text in note_of_lin(found.fit.marked_lines):
+        for text in note_of_lin(fit_answer.fit.marked_lines):
             work.note(text)
-    return found
+    return fit_answer
 
 
-def _show_iteration(one: Any) -> None:
-    taken = "" if one.taken else " refused"
-    print(f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr)
+def _show_iteration(iteration: Any) -> None:
+    taken = "" if iteration.taken else " refused"
+    print(
+        f"iteration {iteration.number}: weighted rms {iteration.rms_before:.6g} -> {iteration.rms_after:.6g}{taken}",
+        file=sys.stderr,
+    )
 
 
 def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Further) -> None:
@@ -214,9 +217,9 @@ def content(answer: FitAnswer, shown: Further) -> dict[str, Any]:
         **dict(zip(names, values, strict=True)),
         "bootstrap_errors": list(answer.spread) or None,
         "correlations": fit.statistics.correlations,
-        "chosen": [trial_record(one) for one in answer.steps],
-        "trials": [trial_record(one) for one in answer.trials],
-        "suggestions": [vars(one) for one in answer.suggestions],
+        "chosen": [trial_record(trial) for trial in answer.steps],
+        "trials": [trial_record(trial) for trial in answer.trials],
+        "suggestions": [vars(suggestion) for suggestion in answer.suggestions],
         "lines": _line_records(fit),
     }
 
@@ -301,11 +304,12 @@ def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
     columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
     rows = [
         [
-            one.name, "added" if one.added else "left out", _or_dash(one.f_ratio, ".3g"), f"{one.chance:.2g}", _or_dash(one.aicc, ".1f"),
-            _or_dash(one.aicc_before, ".1f"), _or_dash(one.cross_validated, ".4g"), f"{one.fit.weighted_rms:.4g}",
-            "yes" if one.better else "no",
+            trial.name, "added" if trial.added else "left out", _or_dash(trial.f_ratio, ".3g"), f"{trial.chance:.2g}",
+            _or_dash(trial.aicc, ".1f"),
+            _or_dash(trial.aicc_before, ".1f"), _or_dash(trial.cross_validated, ".4g"), f"{trial.fit.weighted_rms:.4g}",
+            "yes" if trial.better else "no",
         ]
-        for one in trials
+        for trial in trials
     ]  # fmt: skip
     return Table(title, columns, rows, frozenset({"constant", "step"}))
 
@@ -314,12 +318,12 @@ def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
     columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
     rows = [
         [
-            f"{fit.lines.label_text(one.upper)} - {fit.lines.label_text(one.lower)}",
-            f"{one.frequency_mhz:.4f}",
-            f"{one.error_mhz:.4f}",
-            f"{one.error_ratio:.4f}",
+            f"{fit.lines.label_text(suggestion.upper)} - {fit.lines.label_text(suggestion.lower)}",
+            f"{suggestion.frequency_mhz:.4f}",
+            f"{suggestion.error_mhz:.4f}",
+            f"{suggestion.error_ratio:.4f}",
         ]
-        for one in suggestions
+        for suggestion in suggestions
     ]
     return Table("lines that would help most", columns, rows, frozenset({"upper - lower"}))
 

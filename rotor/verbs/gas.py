@@ -32,7 +32,7 @@ Examples:
   rotor gas OCS --times 0:5:201 --csv ocs.csv --plot ocs.png"""
 
 
-def adapt(request: GasRequest, outputs: Mapping[str, Any], given: Given) -> GasRequest:
+def adapt(request: GasRequest, outputs: Mapping[str, Any], entries: Given) -> GasRequest:
     """Times until the correlation functions have settled, where files ask for them and none are given."""
     if request.times_ps is None and outputs.keys() & {"csv", "parquet", "json", "plot"}:
         return replace(request, times_ps=settling_times_ps(request.top, request.temperature_k))

@@ -108,10 +108,10 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
     sight = request.spectrum.sight(observed, request.background_k, request.redshift)
     candidates = _candidates(request.catalogue, padded(observed, request.redshift))
     progress = (lambda name: print(f"\r{name[:60]:60s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
-    found = identify(observed, candidates, sight, choices, progress=progress)
+    identification = identify(observed, candidates, sight, choices, progress=progress)
     if progress:
         print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
-    return Identified(observed, sight, found, request.model_error)
+    return Identified(observed, sight, identification, request.model_error)
 
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
@@ -126,14 +126,14 @@ def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[
         if not path.exists():
             raise ValueError(f"--catalogue {source}: no such file or folder")
         if path.is_dir() or path.name.lower().endswith(CAT):
-            every = (
-                [one for one in sorted(path.rglob("*.cat*")) if one.name.lower().endswith(CAT)]
+            files = (
+                [candidate for candidate in sorted(path.rglob("*.cat*")) if candidate.name.lower().endswith(CAT)]
                 if path.is_dir()
                 else [path]
             )
-            species = [read_cat_species(file) for file in every if not is_catdir(file)]
-            out += [one.between(*range_mhz) for one in species if len(one.between(*range_mhz))]
-            if path.is_dir() and not every:
+            species = [read_cat_species(file) for file in files if not is_catdir(file)]
+            out += [each.between(*range_mhz) for each in species if len(each.between(*range_mhz))]
+            if path.is_dir() and not files:
                 raise ValueError(f"--catalogue {source}: no .cat file in this folder")
         else:
             with LineCatalogue(path) as catalogue:
@@ -145,8 +145,8 @@ def draw(answer: Identified, path: Path, report: Report) -> None:
     """Pages with the fitted model."""
     from rotor.plots.overlay import plot_overlay
 
-    components = [one.component for one in answer.found.species]
-    marked = [one.frequency_mhz for one in answer.found.unidentified]
+    components = [evidence.component for evidence in answer.found.species]
+    marked = [line.frequency_mhz for line in answer.found.unidentified]
     plot_overlay(
         answer.observed, components, path, sight=answer.sight, unidentified_mhz=marked, provenance=report.command
     )
@@ -155,44 +155,52 @@ def draw(answer: Identified, path: Path, report: Report) -> None:
 def show(answer: Identified, report: Report) -> None:
     """Print the spectrum, the species by evidence and the unidentified lines."""
     show_facts(spectrum_facts(answer.observed))
-    found = answer.found
-    chi = "" if found.fit is None else f", χ²/ν = {found.fit.reduced_chi_squared:.3g}"
+    identification = answer.found
+    chi = "" if identification.fit is None else f", χ²/ν = {identification.fit.reduced_chi_squared:.3g}"
     show_facts(
         [
-            ("candidates", str(found.candidates)),
-            ("begun with", f"velocity {found.velocity_km_s:.2f} km/s, width {found.fwhm_km_s:.2f} km/s"),
-            ("species", f"{len(found.species)}{chi}"),
+            ("candidates", str(identification.candidates)),
+            (
+                "begun with",
+                f"velocity {identification.velocity_km_s:.2f} km/s, width {identification.fwhm_km_s:.2f} km/s",
+            ),
+            ("species", f"{len(identification.species)}{chi}"),
             *error_facts(report.content.get("errors")),
         ]
     )
-    if found.species:
+    if identification.species:
         print()
-        show_table(_species_table(found))
+        show_table(_species_table(identification))
     print()
-    if not found.unidentified:
+    if not identification.unidentified:
         print("no unidentified line above 5 standard deviations")
         return
     rows = [
-        (f"{one.frequency_mhz:.3f}", f"{one.peak_k:.3g}", f"{one.deviations:.1f}", ", ".join(one.candidates) or "none")
-        for one in sorted(found.unidentified, key=lambda one: one.frequency_mhz)
+        (
+            f"{line.frequency_mhz:.3f}",
+            f"{line.peak_k:.3g}",
+            f"{line.deviations:.1f}",
+            ", ".join(line.candidates) or "none",
+        )
+        for line in sorted(identification.unidentified, key=lambda line: line.frequency_mhz)
     ]
     heads = ("frequency (MHz)", "T_B (K)", "σ", "candidates with a line there")
     show_table(Table(f"{len(rows)} unidentified lines", heads, rows, frozenset({"candidates with a line there"})))
 
 
-def _species_table(found: Identification) -> Table:
+def _species_table(identification: Identification) -> Table:
     rows = [
         (
-            one.component.species.name,
-            f"{one.signal:.0f}",
-            f"{one.visible}/{one.expected}",
-            f"{one.component.column_per_cm2:.2e}",
-            f"{one.component.excitation_k:.0f}",
-            f"{one.component.velocity_km_s:.2f}",
-            f"{one.component.fwhm_km_s:.2f}",
-            ", ".join(one.rivals),
+            evidence.component.species.name,
+            f"{evidence.signal:.0f}",
+            f"{evidence.visible}/{evidence.expected}",
+            f"{evidence.component.column_per_cm2:.2e}",
+            f"{evidence.component.excitation_k:.0f}",
+            f"{evidence.component.velocity_km_s:.2f}",
+            f"{evidence.component.fwhm_km_s:.2f}",
+            ", ".join(evidence.rivals),
         )
-        for one in found.species
+        for evidence in identification.species
     ]
     heads = ("species", "Δχ²", "lines seen", "N (1/cm²)", "T (K)", "v (km/s)", "Δv (km/s)", "or")
     return Table("species by evidence", heads, rows, frozenset({"species", "or"}))

@@ -25,9 +25,9 @@ Examples:
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
 
 
-def build(verb: Verb, given: Given, subject: Subject) -> InfoRequest:
+def build(verb: Verb, entries: Given, subject: Subject) -> InfoRequest:
     """The request, with the text of a SMILES."""
-    return InfoRequest(**subject.values, **read_fields(InfoRequest, given, subject), smiles=subject.text)
+    return InfoRequest(**subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text)
 
 
 def answer(request: InfoRequest, work: Work) -> InfoAnswer:
@@ -134,19 +134,23 @@ def _axes_table(content: Mapping[str, Any]) -> Table:
 def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
     """Nuclei that split lines, by how much, and the constants that are known."""
     rows = []
-    for one in content["splitting_nuclei"]:
-        own = top.spin_constants.of(one["nucleus"]) if one["known"] and top.spin_constants else {}
-        constants = ", ".join(f"{name} {value:.6g}" for name, value in own.items())
+    for nucleus in content["splitting_nuclei"]:
+        constants_of_spin = top.spin_constants.of(nucleus["nucleus"]) if nucleus["known"] and top.spin_constants else {}
+        constants = ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())
         said = constants or "not known; the size is that of covalent bonds of this element"
-        about = "" if one["known"] else "about "
-        rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
+        about = "" if nucleus["known"] else "about "
+        rows.append([nucleus["nucleus"], f"{nucleus['spin']:g}", f"{about}{nucleus['splitting_mhz']:.3g}", said])
     listed = [row[0] for row in rows]
     known = top.spin_constants.values if top.spin_constants else {}
     for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(known))):  # electrons, spins of 1/2, pairs
         if spins not in listed:
-            own = {name.replace(f"({spins})", ""): value for name, value in known.items() if f"({spins})" in name}
+            constants_of_spin = {
+                name.replace(f"({spins})", ""): value for name, value in known.items() if f"({spins})" in name
+            }
             size = "" if "," in spins or not top.spin_constants else f"{top.spin_constants.twice[spins] / 2:g}"
-            rows.append([spins, size, "", ", ".join(f"{name} {value:.6g}" for name, value in own.items())])
+            rows.append(
+                [spins, size, "", ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())]
+            )
     if not rows:
         return None
     columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")
@@ -178,10 +182,10 @@ def _conformers_of(records: Sequence[Mapping[str, Any]]) -> Table | None:
         return None
     columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
     rows = []
-    for number, one in enumerate(records, start=1):
-        constants = [f"{x:.1f}" if x < float("inf") else "-" for x in one["rotational_constants_mhz"]]
-        dipole = [f"{mu + 0.0:.2f}" for mu in one["dipole_abc_debye"] or ()] or ["-"] * 3
-        rows.append([str(number), f"{one['energy_kj_per_mol']:.2f}", *constants, *dipole])
+    for number, conformer in enumerate(records, start=1):
+        constants = [f"{x:.1f}" if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]]
+        dipole = [f"{mu + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
+        rows.append([str(number), f"{conformer['energy_kj_per_mol']:.2f}", *constants, *dipole])
     return Table("", columns, rows)
 
 

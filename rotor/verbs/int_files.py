@@ -60,13 +60,13 @@ def is_int_file(source: Any) -> bool:
     return isinstance(source, str) and source.lower().endswith(".int")
 
 
-def predicted(source: str, given: Given, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
+def predicted(source: str, entries: Given, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
     """The prediction of an .int file; its notes are remarks. Inputs that the files answer themselves are refused.
 
     called: the name of an input, by its identity. basis: as_spcat and full_basis.
     """
     for identity, field in ANSWERED.items():
-        if given.values.get(identity) is not None:
+        if entries.values.get(identity) is not None:
             raise ValueError(
                 f"{called(identity)}: {source} says that itself ({field}); change it there{_or_its_var(source)}"
             )
@@ -109,12 +109,12 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
 
 def request_of(prediction: Prediction, source: str, shape: dict[str, Any], **basis: bool) -> PredictedRequest:
     """The request that the files of a prediction make; shape: profile, width and layer."""
-    asked, lines = prediction.request, prediction.lines
+    settings, lines = prediction.request, prediction.lines
     return PredictedRequest(
         lines.top,
-        temperature_k=asked.temperature_k,
-        jmax=asked.fend,
-        min_lgint=asked.str0,
+        temperature_k=settings.temperature_k,
+        jmax=settings.fend,
+        min_lgint=settings.str0,
         range_mhz=lines.range_mhz,
         q=prediction.q,
         prediction=prediction,
@@ -159,8 +159,8 @@ def _levels_of(answer: SpectrumAnswer) -> LevelList:
 
     listed = request.prediction.levels
     if listed is not None:
-        found: LevelList = listed
-        return found
+        levels: LevelList = listed
+        return levels
     try:
         return levels_of_file(request.source, **dict(request.basis))
     except ValueError as error:
@@ -169,5 +169,5 @@ def _levels_of(answer: SpectrumAnswer) -> LevelList:
 
 def _prediction(answer: SpectrumAnswer) -> Prediction:
     assert isinstance(answer.request, PredictedRequest)
-    found: Prediction = answer.request.prediction
-    return found
+    prediction: Prediction = answer.request.prediction
+    return prediction

@@ -23,7 +23,11 @@ Examples:
 def show(answer: IsotopologuesAnswer, report: Report) -> None:
     """Print the isotopologues, and constants of spins where they are known."""
     show_table(_table(answer.request.top, answer.family))
-    rows = [[one.label, _constants_text(one.top)] for one in answer.family if one.top.spin_constants]
+    rows = [
+        [isotopologue.label, _constants_text(isotopologue.top)]
+        for isotopologue in answer.family
+        if isotopologue.top.spin_constants
+    ]
     if rows:
         columns = ("isotopologue", "constants of spins (MHz)")
         print()
@@ -42,7 +46,12 @@ def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
     columns = ("isotopologue", "abundance", "ways", "mass (u)", "kind", "group", "A (MHz)", "B (MHz)", "C (MHz)", "± %",
                "axes", "turned (°)", "μa (D)", "μb (D)", "μc (D)", "spin weights")  # fmt: skip
     left = frozenset({"isotopologue", "kind", "group", "axes", "spin weights"})
-    return Table(f"isotopologues of {parent.name or 'the molecule'}", columns, [_row(one) for one in family], left)
+    return Table(
+        f"isotopologues of {parent.name or 'the molecule'}",
+        columns,
+        [_row(isotopologue) for isotopologue in family],
+        left,
+    )
 
 
 def _rigid_texts(top: Top) -> list[str]:
@@ -56,20 +65,20 @@ def _rigid_texts(top: Top) -> list[str]:
     return [*texts, f"{100 * relative:.2g}"]
 
 
-def _row(one: Isotopologue) -> list[str]:
-    top = one.top
+def _row(isotopologue: Isotopologue) -> list[str]:
+    top = isotopologue.top
     weights = ", ".join(f"{name} {weight}" for name, weight in top.spin_weights.to_mapping().items())
     dipole = top.dipole_abc_debye
     return [
-        one.label,
-        f"{one.abundance:.3e}",
-        str(one.arrangements),
+        isotopologue.label,
+        f"{isotopologue.abundance:.3e}",
+        str(isotopologue.arrangements),
         f"{top.mass_u:.5f}",
         top.kind,
         top.symmetry.point_group if top.symmetry else "",
         *_rigid_texts(top),
-        one.axes,
-        f"{one.turned_degrees:.2f}",
+        isotopologue.axes,
+        f"{isotopologue.turned_degrees:.2f}",
         *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),
         weights or "all alike",
     ]

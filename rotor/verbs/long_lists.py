@@ -110,8 +110,8 @@ def answer_long(
         raise ValueError(
             f"{_no_json(str(whole.count))}; the lines are in {whole.plan.folder}, from where the same command without --json writes them"
         )
-    every = None, whole.plan.jmax
-    cut, jmax = every if "json" in files else whole.strongest_cut(max(strongest, STRONGEST))
+    complete = None, whole.plan.jmax
+    cut, jmax = complete if "json" in files else whole.strongest_cut(max(strongest, STRONGEST))
     least = request.min_lgint if cut is None else cut
     lines = answer_spectrum(replace(request, jmax=jmax, min_lgint=least)).lines
     return LongAnswer(request, lines, whole, whole.span_mhz, paths)

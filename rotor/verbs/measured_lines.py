@@ -28,19 +28,19 @@ class Priors(Reader):
     scene_type: Any = dict[str, float | str]
     many = True
 
-    def read(self, given: Any) -> dict[str, float]:
+    def read(self, raw: Any) -> dict[str, float]:
         """The errors by name, each named once."""
-        if isinstance(given, Mapping):
-            return {name: self._number(value, f".{name}: ") for name, value in given.items()}
-        found: dict[str, float] = {}
-        for text in (given,) if isinstance(given, str) else given:
+        if isinstance(raw, Mapping):
+            return {name: self._number(value, f".{name}: ") for name, value in raw.items()}
+        numbers: dict[str, float] = {}
+        for text in (raw,) if isinstance(raw, str) else raw:
             name, equals, value = (part.strip() for part in text.partition("="))
             if not (name and equals and value):
                 raise InsideError(f" {text!r}: name=error is needed, such as DeltaK=0.02")
-            if name in found:
+            if name in numbers:
                 raise InsideError(f" {text!r}: {name} has an a-priori error already; give one")
-            found[name] = self._number(value, ": ")
-        return found
+            numbers[name] = self._number(value, ": ")
+        return numbers
 
     def _number(self, value: float | str, place: str) -> float:
         try:
@@ -53,9 +53,9 @@ class Priors(Reader):
         return {name: f"{number!r} MHz" for name, number in value.items()}
 
 
-def _lines(given: Any) -> Any:
+def _lines(raw: Any) -> Any:
     """A file by its name, or lines or rows of numbers as they are."""
-    return os.fspath(given) if isinstance(given, os.PathLike) else given
+    return os.fspath(raw) if isinstance(raw, os.PathLike) else raw
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class FitInput:
     )
 
 
-LINES = {one.name: one for one in all_fields(LinesInput).values()}
+LINES = {field.name: field for field in all_fields(LinesInput).values()}
 START = replace(
     FIELDS["source"],
     option="--start",
@@ -131,7 +131,7 @@ class MeasuredLines(SubjectKind):
     """Measured lines, and the molecule whose constants the fit starts from."""
 
     fields = {  # noqa: RUF012
-        **all_fields(LinesInput), **{one.identity: one for one in FIELDS.values()}, START.identity: START,
+        **all_fields(LinesInput), **{field.identity: field for field in FIELDS.values()}, START.identity: START,
     }  # fmt: skip
 
     @property
@@ -148,10 +148,10 @@ class MeasuredLines(SubjectKind):
         """The tables, a name alone being the source."""
         return with_molecule_table(content)
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the top to start from."""
-        lines: LinesInput = read_instance(LinesInput, given)
-        called = {name: one.called(given.style) for name, one in LINES.items()}
+        lines: LinesInput = read_instance(LinesInput, entries)
+        called = {name: field.called(entries.style) for name, field in LINES.items()}
         if lines.source is None:
             raise ValueError(f"{called['source']} is missing; expected measured lines: .lin, .csv, .cat or case.par")
         is_file = isinstance(lines.source, str)
@@ -159,13 +159,13 @@ class MeasuredLines(SubjectKind):
         if lines.lin is not None and not of_spfit:
             raise ValueError(f"{called['lin']}: goes with a .par file; give the lines as the source otherwise")
         paths = {name: _path(getattr(lines, name), called[name], place) for name in LINES}
-        values: dict[str, Any] = {"paths": paths, "asked": read_instance(FitInput, given), "top": None, "start": None}
+        values: dict[str, Any] = {"paths": paths, "asked": read_instance(FitInput, entries), "top": None, "start": None}
         text = lines.source if is_file else f"{len(lines.source)} lines"
         if of_spfit:
-            _refuse_start(given, verb)
+            _refuse_start(entries, verb)
             return Subject(values, (lines, None), text, place.note)
-        molecule = _start_of(given)
-        values["top"] = top_of(Reading(molecule, given.style, place.folder, place.note))
+        molecule = _start_of(entries)
+        values["top"] = top_of(Reading(molecule, entries.style, place.folder, place.note))
         if molecule.source is not None:
             file = Path(place.folder) / str(molecule.source)
             values["start"] = str(file) if file.is_file() else str(molecule.source)
@@ -191,53 +191,56 @@ def _path(name: Any, called: str, place: Place) -> Any:
     return str(path)
 
 
-def _refuse_start(given: Given, verb: Verb) -> None:
+def _refuse_start(entries: Given, verb: Verb) -> None:
     """ValueError for constants and parameters beside a .par file."""
-    others = [one for one in verb.fields.values() if one.table in ("molecule", "parameters") and given.has(one)]
+    others = [
+        field for field in verb.fields.values() if field.table in ("molecule", "parameters") and entries.has(field)
+    ]
     if others:
-        names = ", ".join(one.called(given.style) for one in others)
+        names = ", ".join(field.called(entries.style) for field in others)
         raise ValueError(f"{names}: a .par file says itself what is free and where the fit starts")
 
 
-def _start_of(given: Given) -> MoleculeInput:
+def _start_of(entries: Given) -> MoleculeInput:
     """The molecule to start from."""
-    molecule = read_molecule(given) if any(given.has(one) for one in FIELDS.values()) else MoleculeInput()
+    molecule = read_molecule(entries) if any(entries.has(field) for field in FIELDS.values()) else MoleculeInput()
     if (molecule.source is None) == (molecule.constants is None):
-        if given.style == "key" and molecule.source is None:
+        if entries.style == "key" and molecule.source is None:
             raise ValueError("molecule: expected constants from which the fit starts, as source or constants")
-        names = [one.called(given.style) for one in (START, FIELDS["constants"])]
+        names = [field.called(entries.style) for field in (START, FIELDS["constants"])]
         raise ValueError(f"either {names[0]} or {names[1]} says where the fit starts; give one of them")
     if molecule.source is not None and str(molecule.source).lower().endswith((".csv", ".lin")):
         raise ValueError(
-            f"{START.called(given.style)} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
+            f"{START.called(entries.style)} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a "
+            "molecule"
         )
     return molecule
 
 
-def build(verb: Verb, given: Given, subject: Subject) -> FitRequest:
+def build(verb: Verb, entries: Given, subject: Subject) -> FitRequest:
     """The fit of the lines."""
     from rotor.formats.fit_request import fit_of_lines, fit_of_spfit, with_more_lines
 
-    asked, paths = subject.values["asked"], subject.values["paths"]
+    inputs, paths = subject.values["asked"], subject.values["paths"]
     if subject.top is None:
         request = fit_of_spfit(paths["source"], paths["lin"])
     else:
-        names = {"tie": verb.fields["parameters.ties"].called(given.style)}
-        names["priors_mhz"] = verb.fields["parameters.priors"].called(given.style)
+        names = {"tie": verb.fields["parameters.ties"].called(entries.style)}
+        names["priors_mhz"] = verb.fields["parameters.priors"].called(entries.style)
         with renaming(names):
             request = fit_of_lines(
                 paths["source"],
                 subject.top,
-                asked.free,
-                ties=asked.ties,
-                priors_mhz=asked.priors,
+                inputs.free,
+                ties=inputs.ties,
+                priors_mhz=inputs.priors,
                 start=subject.values["start"],
             )
     if paths["merge"] is not None:
         try:
             request = with_more_lines(request, paths["merge"])
         except ValueError as error:
-            raise ValueError(f"{LINES['merge'].called(given.style)}: {error}") from None
-    settings = {one.name for one in fields(request.options)}
-    changes = {name: value for name, value in vars(asked).items() if name in settings and value is not None}
+            raise ValueError(f"{LINES['merge'].called(entries.style)}: {error}") from None
+    settings = {item.name for item in fields(request.options)}
+    changes = {name: value for name, value in vars(inputs).items() if name in settings and value is not None}
     return replace(request, options=replace(request.options, **changes))

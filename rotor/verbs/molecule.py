@@ -123,7 +123,7 @@ class MoleculeInput:
     )  # fmt: skip
 
 
-FIELDS = {one.name: one for one in all_fields(MoleculeInput).values()}
+FIELDS = {field.name: field for field in all_fields(MoleculeInput).values()}
 
 
 @dataclass(frozen=True)
@@ -164,10 +164,10 @@ def is_file(name: str) -> bool:
         return False
 
 
-def read_molecule(given: Given) -> MoleculeInput:
+def read_molecule(entries: Given) -> MoleculeInput:
     """The inputs that were given."""
-    found: MoleculeInput = read_instance(MoleculeInput, given)
-    return found
+    inputs: MoleculeInput = read_instance(MoleculeInput, entries)
+    return inputs
 
 
 def top_of(reading: Reading) -> Top:
@@ -178,20 +178,20 @@ def top_of(reading: Reading) -> Top:
     >>> top_of(Reading(MoleculeInput(constants="B=57.6 GHz", dipole_abc=(0.1, 0.0, 0.0)))).kind
     'linear'
     """
-    given = reading.given
+    inputs = reading.given
     _refuse_contradictions(reading)
-    top = _from_source(reading) if given.constants is None else _from_constants(reading)
-    if given.dipole_abc is not None:
-        abc = given.dipole_abc
+    top = _from_source(reading) if inputs.constants is None else _from_constants(reading)
+    if inputs.dipole_abc is not None:
+        abc = inputs.dipole_abc
         top = reading.within(
             "dipole_abc", lambda: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes"))
         )
-    if given.dipole is not None:
+    if inputs.dipole is not None:
         top = reading.within("dipole", lambda: _with_dipole_of_input(top, reading))
-    if given.polarizability is not None or given.anisotropy is not None:
+    if inputs.polarizability is not None or inputs.anisotropy is not None:
         top = _with_polarizability(top, reading)
-    if given.spin_weights is not None:
-        weights = given.spin_weights
+    if inputs.spin_weights is not None:
+        weights = inputs.spin_weights
         top = reading.within("spin_weights", lambda: top.with_weights(dict(weights), reading.source("spin_weights")))
     top = _with_states(_with_spins(_with_internal_rotation(top, reading), reading), reading)
     from rotor.tops.plausible import implausible
@@ -203,23 +203,23 @@ def top_of(reading: Reading) -> Top:
 
 
 def _refuse_contradictions(reading: Reading) -> None:
-    given, named = reading.given, reading.named
-    if (given.source is None) == (given.constants is None):
-        both = "both were given" if given.source is not None else "neither was given"
+    inputs, named = reading.given, reading.named
+    if (inputs.source is None) == (inputs.constants is None):
+        both = "both were given" if inputs.source is not None else "neither was given"
         if reading.style == "key":
             raise ValueError("molecule: give either source or constants")
         source = "a source" if reading.style == "option" else named("source")
         raise ValueError(
             f"expected either {source} or {named('constants')}, and {both}; give one of them, such as the name water"
         )
-    for one, other, more in (
+    for first, other, more in (
         ("dipole", "dipole_abc", ", in the frame of the input or in principal axes"),
         ("polarizability", "anisotropy", ""),
     ):
-        if getattr(given, one) is not None and getattr(given, other) is not None:
-            raise ValueError(f"{named(one)} and {named(other)}: give one of them{more}")
-    for name, text in _GEOMETRY.items() if given.constants is not None else ():
-        if getattr(given, name):
+        if getattr(inputs, first) is not None and getattr(inputs, other) is not None:
+            raise ValueError(f"{named(first)} and {named(other)}: give one of them{more}")
+    for name, text in _GEOMETRY.items() if inputs.constants is not None else ():
+        if getattr(inputs, name):
             raise ValueError(f"{named(name)}: {text}")
 
 
@@ -244,10 +244,10 @@ def has_unit(text: str) -> bool:
     return bool(re.search(r"[\d).]\s*(?:[kMGT]?Hz|cm(?:-1|\^-1|⁻¹)|1/cm|K)(?!\w)", text))
 
 
-def range_without_unit(given: Given) -> str:
+def range_without_unit(entries: Given) -> str:
     """The end of a sentence on why there are no lines: what a range that was typed without a unit was read as."""
-    text = given.values.get("conditions.range")
-    if given.style != "option" or text is None or has_unit(text):
+    text = entries.values.get("conditions.range")
+    if entries.style != "option" or text is None or has_unit(text):
         return ""
     return f"; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
 
@@ -256,22 +256,22 @@ def _from_source(reading: Reading) -> Top:
     from rotor.formats import read
     from rotor.tops.top import Top
 
-    given = reading.given
-    if isinstance(given.source, Top):
-        return given.source
-    source = reading.path(given.source) if isinstance(given.source, str) else given.source
+    inputs = reading.given
+    if isinstance(inputs.source, Top):
+        return inputs.source
+    source = reading.path(inputs.source) if isinstance(inputs.source, str) else inputs.source
     if source == "-" and reading.style == "key":
         raise ValueError(f"{reading.named('source')}: '-': a scene reads no standard input; give a file")
-    top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(given.isotopes) or None))
+    top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(inputs.isotopes) or None))
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
-    if given.calculator is not None:
-        calculator, geometry = given.calculator, top
+    if inputs.calculator is not None:
+        calculator, geometry = inputs.calculator, top
         top = reading.within("calculator", lambda: _refined(geometry, calculator))
-    if given.symmetry_tolerance is not None:
-        reach, loose = given.symmetry_tolerance, top
+    if inputs.symmetry_tolerance is not None:
+        reach, loose = inputs.symmetry_tolerance, top
         top = reading.within("symmetry_tolerance", lambda: loose.with_symmetry_within(reach))
-    if given.hessian is None:
+    if inputs.hessian is None:
         return top
     rigid = top
     return reading.within("hessian", lambda: _semirigid(rigid, reading))
@@ -300,12 +300,12 @@ def _semirigid(top: Top, reading: Reading) -> Top:
     from rotor.molecules.optimise import calculator_by_name
     from rotor.tops.distortion import semirigid_top
 
-    given = reading.given
-    if given.hessian != "calculator":
-        return semirigid_top(read_hessian(reading.path(str(given.hessian)), _geometry(top)))
-    if given.calculator is None:
+    inputs = reading.given
+    if inputs.hessian != "calculator":
+        return semirigid_top(read_hessian(reading.path(str(inputs.hessian)), _geometry(top)))
+    if inputs.calculator is None:
         raise ValueError(f"the word 'calculator' needs {reading.named('calculator')}; else give a file")
-    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(given.calculator)))
+    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(inputs.calculator)))
 
 
 def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
@@ -320,11 +320,11 @@ def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
 
 
 def _with_polarizability(top: Top, reading: Reading) -> Top:
-    given = reading.given
-    if given.anisotropy is not None:
-        anisotropy = given.anisotropy
+    inputs = reading.given
+    if inputs.anisotropy is not None:
+        anisotropy = inputs.anisotropy
         return reading.within("anisotropy", lambda: _with_anisotropy(top, anisotropy, reading))
-    numbers = tuple(given.polarizability or ())
+    numbers = tuple(inputs.polarizability or ())
     source = reading.source("polarizability", " in principal axes")
     return reading.within("polarizability", lambda: with_tensor(top, numbers, source))
 
@@ -358,9 +358,9 @@ def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
 
 
 def _with_spins(top: Top, reading: Reading) -> Top:
-    given = reading.given
-    if given.spin_constants is None:
-        if given.spins is not None:
+    inputs = reading.given
+    if inputs.spin_constants is None:
+        if inputs.spins is not None:
             named = reading.named
             raise ValueError(
                 f"{named('spins')}: says how large the spins of {named('spin_constants')} are; give those too"
@@ -368,7 +368,7 @@ def _with_spins(top: Top, reading: Reading) -> Top:
         return top
     from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
 
-    text, spins = given.spin_constants, given.spins
+    text, spins = inputs.spin_constants, inputs.spins
     if spins is not None:
         reading.within("spins", lambda: parse_coupled(spins))
 
@@ -423,13 +423,13 @@ def with_some_dipole(top: Top, reading: Reading) -> Top:
     from rotor.tops.estimated_dipole import with_dipole_estimate
 
     try:
-        found = with_dipole_estimate(top)
+        estimated = with_dipole_estimate(top)
     except ValueError as error:
         of_input = f"{reading.named('dipole')} x,y,z (frame of the input) or " if top.frame is not None else ""
         raise ValueError(f"{error}: give {of_input}{reading.named('dipole_abc')} a,b,c (principal axes)") from None
-    for text in found.notes[len(top.notes) :]:
+    for text in estimated.notes[len(top.notes) :]:
         reading.note(text)
-    return found
+    return estimated
 
 
 def with_known_polarizability(top: Top, reading: Reading) -> Top:

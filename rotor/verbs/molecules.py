@@ -55,7 +55,7 @@ def answer(request: MoleculesRequest, work: Work) -> Molecules:
 
 def json_of(answer: Molecules, _: Any) -> str:
     """A list with a record a line."""
-    lines = (dumps(one, ensure_ascii=False, allow_nan=False) for one in answer.records)
+    lines = (dumps(record, ensure_ascii=False, allow_nan=False) for record in answer.records)
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
@@ -65,7 +65,7 @@ def show(answer: Molecules, _: Any) -> None:
         show_facts(_facts(answer.records[0]))
         return
     left = frozenset({"name", "also", "kind", "unverified", "from"})
-    show_table(Table("", _COLUMNS, [_row(one) for one in answer.records], left))
+    show_table(Table("", _COLUMNS, [_row(record) for record in answer.records], left))
 
 
 def _paths(name: str | None) -> list[Path]:
@@ -133,21 +133,21 @@ def _is_own(folder: Path) -> bool:
 _COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "J ≤", "K ≤", "within/MHz", "unverified", "from")
 
 
-def _row(one: dict[str, Any]) -> list[str]:
+def _row(record: dict[str, Any]) -> list[str]:
     """One molecule: which lines it serves and how well, what is unverified, and where its constants are from."""
-    dipole = one["dipole_abc_debye"] or [None] * 3
-    serves = one["serves"] or {"j_max": None, "k_max": None, "error_mhz": None}
-    source = ("own: " if one["own"] else "") + one["sources"].get(
-        "constants", one["sources"].get("geometry", "not said")
+    dipole = record["dipole_abc_debye"] or [None] * 3
+    serves = record["serves"] or {"j_max": None, "k_max": None, "error_mhz": None}
+    source = ("own: " if record["own"] else "") + record["sources"].get(
+        "constants", record["sources"].get("geometry", "not said")
     )
-    stem = Path(one["file"]).stem
+    stem = Path(record["file"]).stem
     return [
         stem,
-        _cut(one["name"], WIDEST_NAME) if one["name"] != stem else "",
-        one["kind"],
-        *(_number(one["kappa"], ".3f"), *(_number(x or None, ".4g") for x in dipole)),
+        _cut(record["name"], WIDEST_NAME) if record["name"] != stem else "",
+        record["kind"],
+        *(_number(record["kappa"], ".3f"), *(_number(x or None, ".4g") for x in dipole)),
         *(_number(serves["j_max"], "d"), _number(serves["k_max"], "d"), _number(serves["error_mhz"], "g")),
-        ", ".join(name.replace("_", " ") for name in _tables_first(one["unverified"])),
+        ", ".join(name.replace("_", " ") for name in _tables_first(record["unverified"])),
         _cut(source, 60),
     ]
 
@@ -165,24 +165,24 @@ def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
-def _facts(one: dict[str, Any]) -> list[tuple[str, str]]:
+def _facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [
-        ("name", ", ".join([one["name"], *one["names"]])),
-        ("kind", one["kind"] + (f", κ = {one['kappa']:.4f}" if one["kappa"] is not None else "")),
+        ("name", ", ".join([record["name"], *record["names"]])),
+        ("kind", record["kind"] + (f", κ = {record['kappa']:.4f}" if record["kappa"] is not None else "")),
         (
             "point group",
-            f"{one['point_group'] or 'not known'}, symmetry number {one['symmetry_number'] or 'not known'}",
+            f"{record['point_group'] or 'not known'}, symmetry number {record['symmetry_number'] or 'not known'}",
         ),
-        ("file", one["file"]),
+        ("file", record["file"]),
     ]
-    if (serves := one["serves"]) is not None:
+    if (serves := record["serves"]) is not None:
         facts.append(("serves", _serves_text(serves)))
-    if one["levels"]:
-        facts.append(("level table", f"{one['levels']} energies, which count instead of those of the constants"))
-    if one["unverified"]:
-        facts.append(("unverified", ", ".join(one["unverified"])))
-    marks = dict.fromkeys(one["unverified"], "unverified: ")
-    rows = one["sources"].items()
+    if record["levels"]:
+        facts.append(("level table", f"{record['levels']} energies, which count instead of those of the constants"))
+    if record["unverified"]:
+        facts.append(("unverified", ", ".join(record["unverified"])))
+    marks = dict.fromkeys(record["unverified"], "unverified: ")
+    rows = record["sources"].items()
     return facts + [(f"{table.replace('_', ' ')} from", marks.get(table, "") + source) for table, source in rows]
 
 

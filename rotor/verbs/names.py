@@ -16,7 +16,7 @@ _ORDER = (
 def declared_verbs() -> tuple[str, ...]:
     """The verbs that a file of this folder declares."""
     files = Path(__file__).parent.glob("*.py")
-    names = {one.stem for one in files if "\nVERB = Verb(" in one.read_text(encoding="utf-8")}
+    names = {file.stem for file in files if "\nVERB = Verb(" in file.read_text(encoding="utf-8")}
     return tuple(sorted(names, key=lambda name: (_ORDER.index(name) if name in _ORDER else len(_ORDER), name)))
 
 

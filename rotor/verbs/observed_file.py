@@ -129,8 +129,8 @@ def species_of(
             matches = opened.species_between(*range_mhz, [word])
             if len(matches) != 1:
                 listed = ", ".join(
-                    f"{one.identity.get('tag', '')} {one.name} ({one.identity.get('database', '')})"
-                    for one in matches[:6]
+                    f"{match.identity.get('tag', '')} {match.name} ({match.identity.get('database', '')})"
+                    for match in matches[:6]
                 )
                 raise ValueError(
                     f"{word}: {len(matches)} species of {catalogue} with lines in the range: {listed}; name one by its tag or full name"

@@ -113,7 +113,7 @@ VERB = Verb(
     ),
     subject=OneMolecule(
         ("dipole", "dipole_abc", "anisotropy", "state_dipoles", "calculator", "hessian"),
-        lambda top, reading, given: with_known_polarizability(top, reading),
+        lambda top, reading, entries: with_known_polarizability(top, reading),
     ),
     shown=RamanShown,
     content=content,

@@ -25,28 +25,32 @@ ORDER = (
 
 def keyed(verb: Verb) -> dict[str, Field]:
     """The inputs of a verb that stand in a scene, by dotted key."""
-    return {one.key: one for one in verb.fields.values() if one.key}
+    return {field.key: field for field in verb.fields.values() if field.key}
 
 
 def entries_before(verb: Verb) -> list[Any]:
     """Name, type and default of the keys of a scene that stand in no table: what is computed of, and lists of tables."""
-    found: list[Any] = []
+    entries: list[Any] = []
     for name, type_, default in verb.subject.scene_fields():
-        found.append((name, type_) if default is NODEFAULT else (name, type_, default))
-    taken = {entry[0] for entry in found}
-    return found + entries_of(tuple(one for one in keyed(verb).values() if not one.table and one.key not in taken))
+        entries.append((name, type_) if default is NODEFAULT else (name, type_, default))
+    taken = {entry[0] for entry in entries}
+    return entries + entries_of(
+        tuple(field for field in keyed(verb).values() if not field.table and field.key not in taken)
+    )
 
 
 def tables_of(verb: Verb) -> dict[str, Any]:
     """The tables of a verb's scene, outputs last."""
     grouped: dict[str, list[Field]] = {}
     taken = {"molecule", *(name for name, _, _ in verb.subject.scene_fields())}
-    for one in keyed(verb).values():
-        if one.table.partition(".")[0] not in taken and one.table:
-            grouped.setdefault(one.table, []).append(one)
+    for field in keyed(verb).values():
+        if field.table.partition(".")[0] not in taken and field.table:
+            grouped.setdefault(field.table, []).append(field)
     outputs = tuple(grouped.pop("outputs", ()))
     tables = {table: section_class(table, tuple(grouped[table]), verb.name) for table in sorted(grouped, key=_place)}
-    return tables | {"outputs": outputs_class(verb.name, tuple(one for one in verb.outputs if one.scene), outputs)}
+    return tables | {
+        "outputs": outputs_class(verb.name, tuple(output for output in verb.outputs if output.scene), outputs)
+    }
 
 
 def _place(table: str) -> int:

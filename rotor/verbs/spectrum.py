@@ -38,10 +38,10 @@ Examples:
   rotor spectrum --constants "A=2237 B=1368.5 C=884.2" --dipole-abc 1,1,1 --temperature 2 --over peaks.csv --plot over.png"""
 
 
-def _hitran_numbers(given: Any) -> tuple[int, int]:
-    words = str(given).split(":")
+def _hitran_numbers(raw: Any) -> tuple[int, int]:
+    words = str(raw).split(":")
     if len(words) > 2 or not all(word.isdecimal() and 0 < int(word) < 100 for word in words):
-        raise ValueError(f"{given!r}: expected HITRAN's number of the molecule, such as 5 or 5:1")
+        raise ValueError(f"{raw!r}: expected HITRAN's number of the molecule, such as 5 or 5:1")
     return int(words[0]), int(words[1]) if len(words) == 2 else 1
 
 
@@ -79,22 +79,22 @@ class SpectrumShown(Shown):
 class MoleculeOrFile(OneMolecule):
     """A molecule with its dipole, or an .int file, which makes the request itself."""
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The top of the molecule, or the prediction of the file."""
-        shown, source = read_instance(SpectrumShown, given), given.values.get("molecule.source")
+        shown, source = read_instance(SpectrumShown, entries), entries.values.get("molecule.source")
         basis = {name: getattr(shown, name) for name in _FILE_ALONE}
         if not int_files.is_int_file(source):
             for name in (name for name, on in basis.items() if on):
                 raise ValueError(
                     f"{_FILE_ALONE[name]}: expected with an .int file, which SPCAT reads with the .var beside it"
                 )
-            return super().read(given, place, verb)
+            return super().read(entries, place, verb)
 
         def called(identity: str) -> str:
-            return verb.fields[identity].called(given.style)
+            return verb.fields[identity].called(entries.style)
 
-        path = str(Path(place.folder) / str(source)) if given.style == "key" else str(source)
-        prediction = int_files.predicted(path, given, called, place.note, **basis)
+        path = str(Path(place.folder) / str(source)) if entries.style == "key" else str(source)
+        prediction = int_files.predicted(path, entries, called, place.note, **basis)
         return Subject({"prediction": prediction, "source": path, **basis}, (), str(source), place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
@@ -106,9 +106,9 @@ class MoleculeOrFile(OneMolecule):
         return super().saved(request, subject, folder)
 
 
-def build(verb: Verb, given: Given, subject: Subject) -> SpectrumRequest:
+def build(verb: Verb, entries: Given, subject: Subject) -> SpectrumRequest:
     """The request: of the inputs, or of the files of SPCAT with a shape of the lines."""
-    values = read_fields(SpectrumRequest, given, subject)
+    values = read_fields(SpectrumRequest, entries, subject)
     if subject.molecules:
         return SpectrumRequest(**subject.values, **values)
     shape = {name: values.get(name) for name in ("profile", "fwhm_mhz", "layer")}
@@ -116,9 +116,9 @@ def build(verb: Verb, given: Given, subject: Subject) -> SpectrumRequest:
     return int_files.request_of(subject.values["prediction"], subject.values["source"], shape, **basis)
 
 
-def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], given: Given) -> SpectrumRequest:
+def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Given) -> SpectrumRequest:
     """HITRAN's temperature where its records are asked for and none is given."""
-    if "hitran" in outputs and given.values.get("conditions.temperature") is None:
+    if "hitran" in outputs and entries.values.get("conditions.temperature") is None:
         return replace(request, temperature_k=HITRAN_K)
     return request
 
@@ -219,9 +219,9 @@ def show(answer: SpectrumAnswer, report: Report) -> None:
     show_facts([*sources, *top_facts.model_facts(record)])
 
 
-def _why_none(answer: SpectrumAnswer, given: Given) -> str:
+def _why_none(answer: SpectrumAnswer, entries: Given) -> str:
     reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
-    return reason + range_without_unit(given)
+    return reason + range_without_unit(entries)
 
 
 def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -324,7 +324,7 @@ VERB = Verb(
         ),
     ),
     subject=MoleculeOrFile(
-        ("polarizability", "anisotropy"), lambda top, reading, given: with_some_dipole(top, reading)
+        ("polarizability", "anisotropy"), lambda top, reading, entries: with_some_dipole(top, reading)
     ),
     shown=SpectrumShown,
     content=content,

@@ -53,10 +53,10 @@ class StarkShown(FieldSample, Shown):
     """What lines, spectra and mixtures are of."""
 
 
-def prepare(top: Top, reading: Reading, given: Given) -> Top:
+def prepare(top: Top, reading: Reading, entries: Given) -> Top:
     """The top with its dipole and, where light acts, its polarizability."""
     top = with_some_dipole(top, reading)
-    return with_known_polarizability(top, reading) if given.values.get("conditions.intensity") else top
+    return with_known_polarizability(top, reading) if entries.values.get("conditions.intensity") else top
 
 
 def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
@@ -66,7 +66,7 @@ def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) 
     for name, field in own_fields(FieldSample).items():
         files = OUTPUTS_OF_SAMPLE[name]
         if getattr(shown, name) != field.default and not files & set(outputs):
-            names = " or ".join(f"--{one}" for one in sorted(files))
+            names = " or ".join(f"--{file}" for file in sorted(files))
             raise ValueError(f"{field.option}: changes nothing of the map itself; give {names} beside it")
 
 
@@ -85,7 +85,7 @@ def _further(name: str) -> Writer:
 def _made(name: str, answer: StarkAnswer, report: Report) -> Any:
     """A further table, made once for all files that need it."""
     if name not in report.made:
-        sample = {one.name: getattr(report.shown, one.name) for one in fields(FieldSample)}
+        sample = {field.name: getattr(report.shown, field.name) for field in fields(FieldSample)}
         report.made[name] = MAKERS[name](FieldRequest(answer.request, **sample), answer.states, report.executor)
     return report.made[name]
 

@@ -51,7 +51,7 @@ class FamilyInput:
 
     source: Any = declared(
         None,
-        Custom(lambda given: given),
+        Custom(lambda raw: raw),
         "Family of isotopologues (.toml)",
         "family.file",
         option="FAMILY",
@@ -65,19 +65,19 @@ class Isotopologues(SubjectKind):
 
     fields = all_fields(FamilyInput)
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The family that the file has."""
-        asked: FamilyInput = read_instance(FamilyInput, given)
-        if asked.source is None:
+        inputs: FamilyInput = read_instance(FamilyInput, entries)
+        if inputs.source is None:
             raise ValueError("FAMILY is missing; expected a family of isotopologues (.toml)")
-        if isinstance(asked.source, Family):
-            return Subject({"file": FamilyFile(asked.source, (), (), {})}, (asked,), asked.source.name, place.note)
-        if not os.fspath(asked.source).lower().endswith(".toml"):
+        if isinstance(inputs.source, Family):
+            return Subject({"file": FamilyFile(inputs.source, (), (), {})}, (inputs,), inputs.source.name, place.note)
+        if not os.fspath(inputs.source).lower().endswith(".toml"):
             raise ValueError(
-                f"{asked.source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
+                f"{inputs.source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
             )
         return Subject(
-            {"file": read_family(str(Path(place.folder) / asked.source))}, (asked,), str(asked.source), place.note
+            {"file": read_family(str(Path(place.folder) / inputs.source))}, (inputs,), str(inputs.source), place.note
         )
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
 
 def failure(answer: StructureAnswer) -> str:
     """Which method has not converged."""
-    bad = [one for one in answer.fitted if not one.minimum.converged]
+    bad = [fit for fit in answer.fitted if not fit.minimum.converged]
     return f"{bad[0].method} has not converged: {bad[0].minimum.reason}" if bad else ""
 
 
@@ -129,52 +129,52 @@ def show(answer: StructureAnswer, report: Report) -> None:
         show_table(_coordinates_table(answer.substitution))
         if answer.substitution.values:
             show_table(_values_table("rs", answer.substitution.values))
-    for one in answer.fitted:
-        show_table(_values_table(one.method, (*one.values, *one.vibrational)))
-        worst = max(one.moments, key=lambda moment: abs(moment.difference))
+    for fit in answer.fitted:
+        show_table(_values_table(fit.method, (*fit.values, *fit.vibrational)))
+        worst = max(fit.moments, key=lambda moment: abs(moment.difference))
         show_facts(
             [
                 (
                     "moments",
-                    f"{len(one.moments)}, {counted(one.degrees_of_freedom, 'degree')} of freedom, rms {one.rms_u_angstrom2:.3g} u Å²",
+                    f"{len(fit.moments)}, {counted(fit.degrees_of_freedom, 'degree')} of freedom, rms {fit.rms_u_angstrom2:.3g} u Å²",
                 ),
                 ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
-                ("search", one.minimum.reason),
+                ("search", fit.minimum.reason),
             ]
         )
-        if answer.without.get(one.method):
-            show_table(_without_table(one.method, answer.without[one.method]))
+        if answer.without.get(fit.method):
+            show_table(_without_table(fit.method, answer.without[fit.method]))
     print()
     show_facts(error_facts(report.content.get("errors")))
 
 
-def _planar_table(found: Sequence[PlanarMoment]) -> Table:
+def _planar_table(moments: Sequence[PlanarMoment]) -> Table:
     rows = [
         [
-            one.species,
-            one.axis,
-            f"{one.value:.5f}",
-            f"{one.change:+.5f}",
-            f"{one.error:.5f}",
-            "doubtful" if one.doubtful else "",
+            moment.species,
+            moment.axis,
+            f"{moment.value:.5f}",
+            f"{moment.change:+.5f}",
+            f"{moment.error:.5f}",
+            "doubtful" if moment.doubtful else "",
         ]
-        for one in found
+        for moment in moments
     ]
     columns = ["isotopologue", "axis", "P (u Å²)", "from the parent", "error", ""]
     return Table("planar moments of substitutions in a plane", columns, rows, frozenset({"isotopologue", "axis", ""}))
 
 
-def _without_table(method: str, found: Sequence[Without]) -> Table:
-    rows = [[one.species, f"{one.rms_u_angstrom2:.3g}", f"{one.chance:.2g}"] for one in found]
+def _without_table(method: str, fits: Sequence[Without]) -> Table:
+    rows = [[fit.species, f"{fit.rms_u_angstrom2:.3g}", f"{fit.chance:.2g}"] for fit in fits]
     return Table(f"{method} without", ["isotopologue", "rms (u Å²)", "by chance"], rows, frozenset({"isotopologue"}))
 
 
-def _coordinates_table(found: SubstitutionStructure) -> Table:
+def _coordinates_table(structure: SubstitutionStructure) -> Table:
     rows = []
-    for one in found.atoms:
-        columns = (one.coordinates_angstrom, one.squares_angstrom2, one.errors_angstrom, one.zero_by_symmetry)
+    for atom in structure.atoms:
+        columns = (atom.coordinates_angstrom, atom.squares_angstrom2, atom.errors_angstrom, atom.zero_by_symmetry)
         cells = [_coordinate_text(*numbers) for numbers in zip(*(list(column) for column in columns), strict=True)]
-        rows.append([str(one.atom), one.species, *cells, one.kraitchman.shape])
+        rows.append([str(atom.atom), atom.species, *cells, atom.kraitchman.shape])
     return Table(
         "rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"})
     )
@@ -188,7 +188,7 @@ def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry
 
 
 def _values_table(method: str, values: Sequence[Value]) -> Table:
-    rows = [[one.name, _value_text(one.value, one.error), one.unit] for one in values]
+    rows = [[value.name, _value_text(value.value, value.error), value.unit] for value in values]
     return Table(method, ["coordinate", "value", "unit"], rows, frozenset({"coordinate", "unit"}))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FILES = ("source", "hessian")  # inputs of a molecule that may name a file
 
 
-def unprepared(top: Top, reading: Reading, given: Given) -> Top:
+def unprepared(top: Top, reading: Reading, entries: Given) -> Top:
     """The top as it was read."""
     return top
 
@@ -37,13 +37,13 @@ class OneMolecule(SubjectKind):
     @property
     def options(self) -> Mapping[str, Field]:
         """The inputs of a molecule that the verb has options for."""
-        return {one.identity: one for name, one in FIELDS.items() if name not in self.without}
+        return {field.identity: field for name, field in FIELDS.items() if name not in self.without}
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The top of the molecule that was given."""
-        molecule = read_molecule(given)
-        reading = Reading(molecule, given.style, place.folder, place.note)
-        top = self.prepare(top_of(reading), reading, given)
+        molecule = read_molecule(entries)
+        reading = Reading(molecule, entries.style, place.folder, place.note)
+        top = self.prepare(top_of(reading), reading, entries)
         return Subject({"top": top}, (molecule,), str(molecule.source or molecule.constants or ""), place.note)
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:

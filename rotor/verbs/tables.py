@@ -64,17 +64,17 @@ def structures_of(choices: Choices) -> dict[str, Any]:
     return made
 
 
-def _type_of(one: Field) -> Any:
+def _type_of(field: Field) -> Any:
     """The type of a key."""
-    if isinstance(one.reader, Choices):
-        tables: Any = Union[tuple(structures_of(one.reader).values())]  # noqa: UP007  # of types that are known when it runs
+    if isinstance(field.reader, Choices):
+        tables: Any = Union[tuple(structures_of(field.reader).values())]  # noqa: UP007  # of types that are known when it runs
         return list[tables]
-    return one.reader.scene_type
+    return field.reader.scene_type
 
 
 def entries_of(inputs: tuple[Field, ...]) -> list[Any]:
     """Name, type and default of every key of a table; keys that must be given have no default."""
-    return [_entry(one)[:2] if one.default is REQUIRED else _entry(one) for one in inputs]
+    return [_entry(field)[:2] if field.default is REQUIRED else _entry(field) for field in inputs]
 
 
 def _structure(table: str, entries: list[Any], owner: str) -> Any:
@@ -87,16 +87,16 @@ def _structure(table: str, entries: list[Any], owner: str) -> Any:
     return made
 
 
-def _entry(one: Field) -> tuple[str, Any, Any]:
-    help_ = one.help[:1].lower() + one.help[1:] if one.help[1:2].islower() else one.help
-    kind, default = _type_of(one), _default(one)
-    if one.none:
+def _entry(field: Field) -> tuple[str, Any, Any]:
+    help_ = field.help[:1].lower() + field.help[1:] if field.help[1:2].islower() else field.help
+    kind, default = _type_of(field), _default(field)
+    if field.none:
         kind |= str
-    if default is None and one.default is not REQUIRED:
+    if default is None and field.default is not REQUIRED:
         kind |= None
     if isinstance(default, list | dict):
-        return one.last, Annotated[kind, said(help_, one.example)], _made_anew(default)
-    return one.last, Annotated[kind, said(help_, one.example)], default
+        return field.last, Annotated[kind, said(help_, field.example)], _made_anew(default)
+    return field.last, Annotated[kind, said(help_, field.example)], default
 
 
 def _made_anew(default: Any) -> Any:
@@ -104,35 +104,41 @@ def _made_anew(default: Any) -> Any:
     return msgspec.field(default_factory=(lambda: default) if default else type(default))
 
 
-def _default(one: Field) -> Any:
+def _default(field: Field) -> Any:
     """What a template shows."""
-    if one.typed is not None:
-        return one.typed
-    if one.default is REQUIRED:
-        return one.example
-    if isinstance(one.default, tuple) and isinstance(one.reader, Names | NameList | Choices):
-        return list(one.default)
-    if one.default is None or isinstance(one.reader, Flag | Text):
-        return one.default
-    if isinstance(one.default, tuple) and not isinstance(one.reader, Each):  # a file that says nothing means the same
+    if field.typed is not None:
+        return field.typed
+    if field.default is REQUIRED:
+        return field.example
+    if isinstance(field.default, tuple) and isinstance(field.reader, Names | NameList | Choices):
+        return list(field.default)
+    if field.default is None or isinstance(field.reader, Flag | Text):
+        return field.default
+    if isinstance(field.default, tuple) and not isinstance(
+        field.reader, Each
+    ):  # a file that says nothing means the same
         return None
-    if isinstance(one.reader, Quantity) and one.reader.unit:
-        return one.reader.show(one.default)
-    return one.reader.write(one.default)
+    if isinstance(field.reader, Quantity) and field.reader.unit:
+        return field.reader.show(field.default)
+    return field.reader.write(field.default)
 
 
 @cache
 def outputs_class(kind: str, files: tuple[Output, ...], settings: tuple[Field, ...]) -> Any:
     """The structure of [outputs]: files, and settings of files."""
     entries: list[Any] = []
-    for one in files:
-        if one.many:
+    for output in files:
+        if output.many:
             entries.append(
-                (one.name, Annotated[list[str], said(one.help, [one.example])], msgspec.field(default_factory=list))
+                (
+                    output.name,
+                    Annotated[list[str], said(output.help, [output.example])],
+                    msgspec.field(default_factory=list),
+                )
             )
         else:
-            entries.append((one.name, Annotated[str | None, said(one.help, one.example)], None))
-    names = [one.name for one in files]
+            entries.append((output.name, Annotated[str | None, said(output.help, output.example)], None))
+    names = [output.name for output in files]
     if "parquet" in names:
         after = names.index("parquet") + 1
         entries.insert(after, ("json", Annotated[str | None, said("Write the table as JSON", "out.json")], None))

@@ -75,7 +75,7 @@ def _facts(functions: ThermoFunctions, content: Mapping[str, Any]) -> list[tuple
     return [
         ("constants", top_facts.constants_text(top)),
         *top_facts.weights_facts(top, content["spin_weights"]),
-        *(one for one in top_facts.states_facts(top) if not one[1].startswith("dipole")),
+        *(fact for fact in top_facts.states_facts(top) if not fact[1].startswith("dipole")),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),

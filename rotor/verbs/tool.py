@@ -42,9 +42,9 @@ class Tool(Verb):
         """Whether there is anything for programs."""
         return self.text is not None
 
-    def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
+    def read(self, entries: Given, place: Place) -> tuple[Any, Subject]:
         """The request; its own field is the subject."""
-        request = read_instance(self.request, given)
+        request = read_instance(self.request, entries)
         source = getattr(request, self.of, "")
         return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
 

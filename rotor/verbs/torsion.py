@@ -74,9 +74,9 @@ def show(answer: TorsionAnswer, report: Report) -> None:
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     low, high = record["reduced_moment_range_u_angstrom2"]
     spread = f", {low:.6g} to {high:.6g} over a turn" if high - low > 1e-6 * high else ""
-    wells = [f"{one['angle_degrees']:.4g}° ({round(one['energy_cm'], 6):.4g} cm⁻¹)" for one in record["wells"]]
-    quanta = sorted({round(one["harmonic_cm"], 1) for one in record["wells"]})
-    harmonic = ", ".join(f"{one:g}" for one in quanta)
+    wells = [f"{well['angle_degrees']:.4g}° ({round(well['energy_cm'], 6):.4g} cm⁻¹)" for well in record["wells"]]
+    quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
+    harmonic = ", ".join(f"{quantum:g}" for quantum in quanta)
     facts = [
         ("bond", f"{_bond_text(answer)}; {len(answer.rotation.top)} atoms turn"),
         ("potential", f"{record['potential_source']}: {_terms_text(record)}"),

@@ -61,18 +61,18 @@ class TurningBody(OneMolecule):
         """The key `molecule`, which a body replaces."""
         return [optional_molecule("a name, a file, SMILES:..., or a table")]
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
         """The top or the body that was given."""
-        molecule = read_molecule(given)
-        body = read_body(given)
+        molecule = read_molecule(entries)
+        body = read_body(entries)
         if body is None:
-            top = top_of(Reading(molecule, given.style, place.folder, place.note))
+            top = top_of(Reading(molecule, entries.style, place.folder, place.note))
             return Subject({"top": top}, (molecule,), str(molecule.source or molecule.constants), place.note)
         return Subject({"body": body}, (), body.text, place.note)
 
     def saved(self, request: TumbleRequest | DrivenRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The molecule or the body, and how it starts."""
-        times = None if request.times is None else [float(one) for one in request.times]
+        times = None if request.times is None else [float(time) for time in request.times]
         content = {} if times is None else {"conditions.times": times}
         if subject.molecules:
             kelvin = getattr(request, "temperature_k", None)
@@ -98,55 +98,55 @@ class TurningBody(OneMolecule):
         return content | written_fields(motion)
 
 
-def read_body(given: Given) -> Body | None:
+def read_body(entries: Given) -> Body | None:
     """The body that was given by moments or name, or by a source that is the name of one; None for a molecule."""
-    asked = read_instance(BodyInput, given)
+    inputs = read_instance(BodyInput, entries)
     called = {
-        name: one.called(given.style)
-        for name, one in (BODY | {k: MOTION[k] for k in ("temperature_k", "effects")}).items()
+        name: field.called(entries.style)
+        for name, field in (BODY | {k: MOTION[k] for k in ("temperature_k", "effects")}).items()
     }
-    momentum = MOTION["angular_momentum"].called(given.style)
-    if asked.angular_velocity is not None and _momentum(given, asked) is not None:
+    momentum = MOTION["angular_momentum"].called(entries.style)
+    if inputs.angular_velocity is not None and _momentum(entries, inputs) is not None:
         raise ValueError(f"{called['angular_velocity']} and {momentum}: each fixes the motion; give one of them")
-    if asked.body is not None and asked.moments is not None:
+    if inputs.body is not None and inputs.moments is not None:
         raise ValueError(f"{called['body']} and {called['moments']}: give one of them")
-    source, constants = given.values.get("molecule.source"), given.values.get("molecule.constants")
-    named = asked.body or _named_source(source)
-    if asked.moments is None and named is None:
+    source, constants = entries.values.get("molecule.source"), entries.values.get("molecule.constants")
+    named = inputs.body or _named_source(source)
+    if inputs.moments is None and named is None:
         if source is None and constants is None:
-            if given.style == "key":
+            if entries.style == "key":
                 raise ValueError("molecule, body: give one of them")
             words = (
                 "a molecule, --constants, --moments or --body"
-                if given.style == "option"
+                if entries.style == "option"
                 else "a molecule, moments or body"
             )
             raise ValueError(f"expected {words}; try 'rotor tumble water'")
         return None
-    if (source is not None and (named is None or asked.body is not None)) or constants is not None:
+    if (source is not None and (named is None or inputs.body is not None)) or constants is not None:
         raise ValueError(
             "molecule, body: give one of them"
-            if given.style == "key"
+            if entries.style == "key"
             else f"a molecule and {called['moments' if named is None else 'body']}: give one of them"
         )
-    if given.values.get("molecule.isotopes"):
+    if entries.values.get("molecule.isotopes"):
         raise ValueError(
             "--isotope: bare moments have no atoms; give the moments of the isotopologue itself".replace(
-                "--isotope", "--isotope" if given.style == "option" else "isotopes"
+                "--isotope", "--isotope" if entries.style == "option" else "isotopes"
             )
         )
-    if given.has(MOTION["temperature_k"]):
+    if entries.has(MOTION["temperature_k"]):
         raise ValueError(
             f"{called['temperature_k']}: bare moments have no units for a temperature; give {momentum} alone"
         )
-    if given.style == "key" and given.has(MOTION["angular_momentum"]):
+    if entries.style == "key" and entries.has(MOTION["angular_momentum"]):
         raise ValueError(f"{momentum}: is that of a molecule; of a body it stands in [body]")
-    return _of_moments(given, asked) if named is None else _ordinary_body(named)
+    return _body_of_moments(entries, inputs) if named is None else _ordinary_body(named)
 
 
-def _momentum(given: Given, asked: BodyInput) -> Any:
+def _momentum(entries: Given, inputs: BodyInput) -> Any:
     """The angular momentum as it was given, of a body or of a molecule."""
-    return asked.angular_momentum if asked.angular_momentum is not None else given.of(MOTION["angular_momentum"])
+    return inputs.angular_momentum if inputs.angular_momentum is not None else entries.of(MOTION["angular_momentum"])
 
 
 def _named_source(source: Any) -> NamedBody | None:
@@ -156,13 +156,13 @@ def _named_source(source: Any) -> NamedBody | None:
     return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
 
 
-def _of_moments(given: Given, asked: BodyInput) -> Body:
+def _body_of_moments(entries: Given, inputs: BodyInput) -> Body:
     from rotor.classical.tumble import COHERENT, SI
 
-    assert asked.moments is not None
-    typed = given.of(BODY["moments"])
-    text = typed if isinstance(typed, str) else ",".join(f"{one:g}" for one in asked.moments)
-    return Body(text, asked.moments, SI if asked.units == "SI" or in_si(typed) else COHERENT)
+    assert inputs.moments is not None
+    typed = entries.of(BODY["moments"])
+    text = typed if isinstance(typed, str) else ",".join(f"{moment:g}" for moment in inputs.moments)
+    return Body(text, inputs.moments, SI if inputs.units == "SI" or in_si(typed) else COHERENT)
 
 
 def _ordinary_body(body: NamedBody) -> Body:
@@ -181,92 +181,98 @@ def _ordinary_body(body: NamedBody) -> Body:
     return Body(body.name, three(moments), SI, body.axes, body, (momentum, source))
 
 
-def build(verb: Verb, given: Given, subject: Subject) -> TumbleRequest | DrivenRequest:
+def build(verb: Verb, entries: Given, subject: Subject) -> TumbleRequest | DrivenRequest:
     """The request of a molecule or a body: free, or under effects."""
-    motion = read_instance(MotionInput, given)
-    start = read_instance(BodyInput, given)
-    if given.style == "key" and start.angular_momentum is not None:
+    motion = read_instance(MotionInput, entries)
+    start = read_instance(BodyInput, entries)
+    if entries.style == "key" and start.angular_momentum is not None:
         motion = replace(motion, angular_momentum=start.angular_momentum)
-    momentum = (BODY if given.style == "key" and "body" in subject.values else MOTION)["angular_momentum"]
-    names = {name: BODY[name].called(given.style) for name in ("moments", "angular_velocity", "attitude")}
-    with renaming(names | {"angular_momentum": momentum.called(given.style)}):
+    momentum = (BODY if entries.style == "key" and "body" in subject.values else MOTION)["angular_momentum"]
+    names = {name: BODY[name].called(entries.style) for name in ("moments", "angular_velocity", "attitude")}
+    with renaming(names | {"angular_momentum": momentum.called(entries.style)}):
         if motion.effects:
-            return _driven(given, subject, start, motion)
-        _refuse_without_effect(given)
+            return _driven(entries, subject, start, motion)
+        _refuse_without_effect(entries)
         return (
-            _of_body(given, subject, start, motion)
+            _motion_of_body(entries, subject, start, motion)
             if "body" in subject.values
-            else _of_top(given, subject, start, motion)
+            else _motion_of_top(entries, subject, start, motion)
         )
 
 
-def _refuse_without_effect(given: Given) -> None:
+def _refuse_without_effect(entries: Given) -> None:
     """ValueError for inputs of a stepped motion that were given to a free one; scenes may have settings that are not used."""
-    for one in (BODY["attitude"], *(MOTION[name] for name in ("tolerance", "step", "order") if given.style != "key")):
-        if given.has(one):
+    for field in (
+        BODY["attitude"],
+        *(MOTION[name] for name in ("tolerance", "step", "order") if entries.style != "key"),
+    ):
+        if entries.has(field):
             raise ValueError(
-                f"{one.called(given.style)}: belongs to a motion under effects; give {MOTION['effects'].called(given.style)}, or leave "
-                "it out: a free one is exact"
+                f"{field.called(entries.style)}: belongs to a motion under effects; give {MOTION['effects'].called(entries.style)}, or "
+                "leave it out: a free one is exact"
             )
 
 
-def _times(given: Given, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
+def _times(entries: Given, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
     """The times in the unit of the body."""
-    return None if motion.times is None else replace(MOTION["times"], reader=Grid(unit)).read(motion.times, given.style)
+    return (
+        None if motion.times is None else replace(MOTION["times"], reader=Grid(unit)).read(motion.times, entries.style)
+    )
 
 
-def _of_body(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+def _motion_of_body(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
     import numpy as np
 
     from rotor.classical.tumble import TumbleRequest
 
     body: Body = subject.values["body"]
-    chosen = _chosen(given, start, motion, np.array(body.moments), body.rate_unit) or body.start
+    chosen = _chosen(entries, start, motion, np.array(body.moments), body.rate_unit) or body.start
     if chosen is None:
-        if given.style == "key":
+        if entries.style == "key":
             raise ValueError("body: give either angular_momentum or angular_velocity")
         names = [
-            one.called(given.style) for one in (MOTION["angular_momentum"], BODY["moments"], BODY["angular_velocity"])
+            field.called(entries.style)
+            for field in (MOTION["angular_momentum"], BODY["moments"], BODY["angular_velocity"])
         ]
         raise ValueError(
             f"{names[0]}: expected with {names[1]}: three components in the axes of the moments; or {names[2]}"
         )
-    times = _times(given, motion, body.units.time)
+    times = _times(entries, motion, body.units.time)
     request = TumbleRequest(body.moments, chosen[0], times, body.units, body.axes, chosen[1], body.named)
     for text in request.notes:
         subject.note(text)
     return request
 
 
-def _of_top(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+def _motion_of_top(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
     import numpy as np
 
     from rotor.thermodynamics.thermal_tumble import thermal_tumble
 
-    top, times = subject.top, _times(given, motion, "ps")
+    top, times = subject.top, _times(entries, motion, "ps")
     in_hbar = start.angular_velocity is not None
     scale = _UNITS_OF_MOLECULES if in_hbar else 1.0  # ħ for 1 rad/ps
-    chosen = _chosen(given, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps", "ħ")
+    chosen = _chosen(entries, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps", "ħ")
     if chosen is None:
         return thermal_tumble(top, temperature_k=motion.temperature_k, times_ps=times)
-    if given.has(MOTION["temperature_k"]):
-        fixed = (BODY["angular_velocity"] if in_hbar else MOTION["angular_momentum"]).called(given.style)
+    if entries.has(MOTION["temperature_k"]):
+        fixed = (BODY["angular_velocity"] if in_hbar else MOTION["angular_momentum"]).called(entries.style)
         raise ValueError(
-            f"{MOTION['temperature_k'].called(given.style)} and {fixed}: give one of them; the first chooses |L|, the second fixes it"
+            f"{MOTION['temperature_k'].called(entries.style)} and {fixed}: give one of them; the first chooses |L|, the second fixes it"
         )
     return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
 
 
 def _chosen(
-    given: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
+    entries: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
 ) -> tuple[Three, str] | None:
     """The angular momentum that was given, itself or by an angular velocity, and how; None where neither was."""
     if start.angular_velocity is not None:
-        name = BODY["angular_velocity"].called(given.style)
+        name = BODY["angular_velocity"].called(entries.style)
         return _momentum_of(start.angular_velocity, moments, unit, moments), f"given as an angular velocity ({name})"
     if motion.angular_momentum is None:
         return None
-    name = MOTION["angular_momentum"].called(given.style)
+    name = MOTION["angular_momentum"].called(entries.style)
     return _momentum_of(motion.angular_momentum, moments, momentum_unit, None), f"given ({name})"
 
 
@@ -289,44 +295,45 @@ def _momentum_of(value: Any, moments: Any, unit: str, factors: Any) -> Three:
     return three(momentum)
 
 
-def _driven(given: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
+def _driven(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
     from rotor.classical.driven import DrivenRequest
 
-    effects, times = MOTION["effects"].called(given.style), MOTION["times"].called(given.style)
+    effects, times = MOTION["effects"].called(entries.style), MOTION["times"].called(entries.style)
     if "body" not in subject.values:
-        names = [BODY[name].called(given.style) for name in ("moments", "body")]
+        names = [BODY[name].called(entries.style) for name in ("moments", "body")]
         raise ValueError(f"{effects}: acts on a body; give {names[0]} or {names[1]} instead of a molecule")
     body: Body = subject.values["body"]
     if motion.times is None:
         raise ValueError(f"{times}: expected with {effects}, the start first: such as 0:10:101")
     step = None
     if motion.step is not None:
-        step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, given.style)
-    if given.has(MOTION["order"]) and step is None and given.style != "key":
-        names = [MOTION[name].called(given.style) for name in ("order", "step")]
+        step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, entries.style)
+    if entries.has(MOTION["order"]) and step is None and entries.style != "key":
+        names = [MOTION[name].called(entries.style) for name in ("order", "step")]
         raise ValueError(f"{names[0]}: is that of a splitting; give {names[1]} too")
-    spin, momentum = _spin_or_momentum(given, body, start, motion)
+    spin, momentum = _spin_or_momentum(entries, body, start, motion)
     return DrivenRequest(
-        body.moments, _times(given, motion, body.units.time) or (), motion.effects, spin, momentum,
+        body.moments, _times(entries, motion, body.units.time) or (), motion.effects, spin, momentum,
         start.attitude or (1.0, 0.0, 0.0, 0.0), motion.tolerance, step, motion.order, body.units, body.axes, body.named,
     )  # fmt: skip
 
 
 def _spin_or_momentum(
-    given: Given, body: Body, start: BodyInput, motion: MotionInput
+    entries: Given, body: Body, start: BodyInput, motion: MotionInput
 ) -> tuple[Three | None, Three | None]:
     """ω or L at the first time; a named body turns as it does without effects."""
     if start.angular_velocity is not None:
-        return replace(BODY["angular_velocity"], reader=Custom(lambda one: three(one, body.rate_unit))).read(
-            start.angular_velocity, given.style
+        return replace(BODY["angular_velocity"], reader=Custom(lambda typed: three(typed, body.rate_unit))).read(
+            start.angular_velocity, entries.style
         ), None
     if motion.angular_momentum is not None:
         return None, replace(MOTION["angular_momentum"], reader=Custom(three)).read(
-            motion.angular_momentum, given.style
+            motion.angular_momentum, entries.style
         )
     if body.start is None:
         names = [
-            one.called(given.style) for one in (BODY["angular_velocity"], BODY["moments"], MOTION["angular_momentum"])
+            field.called(entries.style)
+            for field in (BODY["angular_velocity"], BODY["moments"], MOTION["angular_momentum"])
         ]
         raise ValueError(f"{names[0]}: expected with {names[1]}, the angular velocity at the first time; or {names[2]}")
     return None, body.start[0]

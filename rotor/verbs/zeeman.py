@@ -47,7 +47,7 @@ class MagneticInput:
     )  # fmt: skip
 
 
-_MAGNETIC = {one.identity: one for one in all_fields(MagneticInput).values()}
+_MAGNETIC = {field.identity: field for field in all_fields(MagneticInput).values()}
 
 
 class MagneticMolecule(OneMolecule):
@@ -63,9 +63,9 @@ class MagneticMolecule(OneMolecule):
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The molecule and the tensors that were given."""
         magnetic = subject.values["top"].magnetic
-        given = {"magnetic.g": _numbers(magnetic.g), "magnetic.magnetisability": _numbers(magnetic.magnetisability)}
+        stated = {"magnetic.g": _numbers(magnetic.g), "magnetic.magnetisability": _numbers(magnetic.magnetisability)}
         typed = magnetic.source.startswith("given")
-        tensors = {name: value for name, value in given.items() if value is not None and typed}
+        tensors = {name: value for name, value in stated.items() if value is not None and typed}
         return {**super().saved(request, subject, folder), **tensors}
 
 
@@ -78,13 +78,13 @@ def _numbers(tensor: Tensor | None) -> list[float] | None:
     return [aa, bb, cc, *(mixed if any(mixed) else [])]
 
 
-def with_tensors(top: Top, reading: Reading, given: Given) -> Top:
+def with_tensors(top: Top, reading: Reading, entries: Given) -> Top:
     """The top with the tensors that are given, else those of its file."""
     from rotor.tops.magnetic import MagneticTensors, tensor_for
 
     magnetic, called = (
-        read_instance(MagneticInput, given),
-        {one.name: one.called(given.style) for one in _MAGNETIC.values()},
+        read_instance(MagneticInput, entries),
+        {field.name: field.called(entries.style) for field in _MAGNETIC.values()},
     )
 
     def tensor(name: str) -> Tensor | None:
