@@ -16,8 +16,8 @@ import pytest
 from documented_options import undocumented
 
 import rotor
-from rotor.cli.shared import output
 from rotor.reports import top_facts as report
+from rotor.reports.screen import Table, json_text, show_table, table_text
 from rotor.requests.readers import Numbers
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -501,24 +501,22 @@ def test_tables_on_a_terminal_are_drawn(monkeypatch):
             return True
 
     monkeypatch.setenv("COLUMNS", "80")
-    table = output.Table("a title", ("name", "number [MHz]"), [("a", "1.5"), ("bc", "22.75")], frozenset({"name"}))
+    table = Table("a title", ("name", "number [MHz]"), [("a", "1.5"), ("bc", "22.75")], frozenset({"name"}))
     screen = Terminal()
     monkeypatch.setattr(sys, "stdout", screen)
-    output.show_table(table)
+    show_table(table)
     drawn = screen.getvalue()
     assert all(text in drawn for text in ("a title", "number [MHz]", "22.75", "─"))
 
-    wide = output.Table("", ("x" * 60, "y" * 60), [("1", "2")])
+    wide = Table("", ("x" * 60, "y" * 60), [("1", "2")])
     screen.truncate(0)
-    output.show_table(wide)
+    show_table(wide)
     assert "x" * 60 + "  " + "y" * 60 in screen.getvalue()  # whole, not cut to the terminal
-    assert output.table_text(table) == "a title\nname  number [MHz]\na              1.5\nbc           22.75"
+    assert table_text(table) == "a title\nname  number [MHz]\na              1.5\nbc           22.75"
 
 
 def test_numbers_that_are_not_finite_are_null():
-    text = output.json_text(
-        {"a": math.nan, "b": [math.inf, 1.5], "c": np.float64(-math.inf), "rows": [{"x": math.nan}]}
-    )
+    text = json_text({"a": math.nan, "b": [math.inf, 1.5], "c": np.float64(-math.inf), "rows": [{"x": math.nan}]})
     assert json.loads(text) == {"a": None, "b": [None, 1.5], "c": None, "rows": [{"x": None}]}
 
 
