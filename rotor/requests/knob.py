@@ -183,7 +183,7 @@ def ladder(
     ----------
     values : iterable of float
         Coarse ones first.
-    own : float or None
+    of_scene : float or None
         The value of the scene; None where it has none.
     make : callable
         The request of a value.
