@@ -159,7 +159,7 @@ class BondTorsion:
         v = np.maximum(self.potential.values(angles) - self.foot_mhz, 0.0)
         curvature = np.maximum(self.potential.derivative(angles, 2), 0.0)
         quanta = np.sqrt(2 * self.kinetic.values(angles) * curvature)
-        return [Well(*one) for one in zip(angles.tolist(), v.tolist(), quanta.tolist(), strict=True)]
+        return [Well(*well) for well in zip(angles.tolist(), v.tolist(), quanta.tolist(), strict=True)]
 
     def waves_for(self, energy_mhz: float) -> int:
         """|m| that holds every state up to an energy above the foot: the classical momentum, and a margin.

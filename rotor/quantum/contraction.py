@@ -231,8 +231,8 @@ def coupled(
     for name, (left, right) in scalars.items():
         terms[name] = _scalar(first, second, first.tensors[left], second.tensors[right], rows)
     tensors = {}
-    for name, (one, other, rank) in carried.items():
-        left_tensor = first.tensors[one] if one else first.unit
+    for name, (first_name, other, rank) in carried.items():
+        left_tensor = first.tensors[first_name] if first_name else first.unit
         right_tensor = second.tensors[other] if other else second.unit
         tensors[name] = rank, _product(first, second, left_tensor, right_tensor, rank, rows)
     return CoupledSpace(tuple(sectors), terms, tensors)

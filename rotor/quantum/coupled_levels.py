@@ -64,7 +64,7 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
     states, couplings = {0: operators}, []
     for effect in effects:
         values = effect.parameters(top)
-        couplings += [(values[one.name], one) for one in couplings_of(top, [effect], representation)]
+        couplings += [(values[coupling.name], coupling) for coupling in couplings_of(top, [effect], representation)]
         states |= {state.v: state.operators(values) for state in effect.states(top)}
     extra_states(top, effects)
     for _, coupling in couplings:
@@ -76,11 +76,11 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
 
 def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
     """The states that effects bring; ValueError where two have one number."""
-    found = [state for effect in effects for state in effect.states(top)]
-    numbers = [0, *(state.v for state in found)]
+    states = [state for effect in effects for state in effect.states(top)]
+    numbers = [0, *(state.v for state in states)]
     if len(set(numbers)) < len(numbers):
         raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
-    return found
+    return states
 
 
 def coupled_levels(
@@ -149,11 +149,11 @@ def _refuse_mixed_weights(levels: Levels) -> None:
     for block in levels.blocks:
         if len(block.parts) == 1 and levels.kind in ("prolate", "oblate"):
             continue
-        found = levels.weight[block.start : block.start + len(block.energies_mhz)]
-        if len(found) and (found != found[0]).any():
-            row = block.start + int(np.argmax(found != found[0]))
+        weights = levels.weight[block.start : block.start + len(block.energies_mhz)]
+        if len(weights) and (weights != weights[0]).any():
+            row = block.start + int(np.argmax(weights != weights[0]))
             raise ValueError(
-                f"an effect mixes levels of nuclear-spin weights {found[0]} and {levels.weight[row]} "
+                f"an effect mixes levels of nuclear-spin weights {weights[0]} and {levels.weight[row]} "
                 f"({', '.join(levels.quanta)} = {levels.labels(np.array([block.start]))[0].strip()} and "
                 f"{levels.labels(np.array([row]))[0].strip()}): symmetry forbids that; check the effect or the spin weights"
             )
@@ -171,14 +171,14 @@ def solve_coupled(model: Model, every_j: Sequence[int]) -> list[CoupledBlock]:
     vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in every_j}
     terms = StateTerms.of_values(model.states, _links(model), model.representation)
     elements = StateElements(terms, 1, model.representation, vertices)
-    found: dict[int, list[CoupledBlock]] = {}
+    by_j: dict[int, list[CoupledBlock]] = {}
     for j in sorted(every_j, reverse=True):
         here = elements.of_j(j)
         zero = float(
             here.mix[terms.first[0], 0]
         )  # the part that is one number for J: taken out of the matrices for the sake of digits
         here.mix[list(terms.first.values())] -= zero
-        found[j] = []
+        by_j[j] = []
         for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
             block = here.block(members)
             matrix = np.zeros((block.size, block.size))
@@ -188,8 +188,8 @@ def solve_coupled(model: Model, every_j: Sequence[int]) -> list[CoupledBlock]:
             energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
             parts = parts_of([vertices[j][i] for i in members])
             labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
-            found[j].append(CoupledBlock(j, parts, energies + zero, vectors, labels, mixing))
-    return [block for j in every_j for block in found[j]]
+            by_j[j].append(CoupledBlock(j, parts, energies + zero, vectors, labels, mixing))
+    return [block for j in every_j for block in by_j[j]]
 
 
 def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, OperatorOfJ]]]]:
@@ -205,7 +205,9 @@ def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, Op
         return operator
 
     by_states = _by_states(model.couplings).items()
-    return [(*v, summed(own), [(one.name, one.operator) for _, one in own]) for v, own in by_states]
+    return [
+        (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs]) for v, pairs in by_states
+    ]
 
 
 def blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
@@ -215,7 +217,7 @@ def blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
 
 def _by_states(couplings: Iterable[tuple[float, Coupling]]) -> dict[tuple[int, int], list[tuple[float, Coupling]]]:
     """Couplings by the states that they connect."""
-    found: dict[tuple[int, int], list[tuple[float, Coupling]]] = {}
+    by_states: dict[tuple[int, int], list[tuple[float, Coupling]]] = {}
     for value, coupling in couplings:
-        found.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
-    return found
+        by_states.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
+    return by_states

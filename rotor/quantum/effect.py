@@ -126,10 +126,10 @@ def dipoles_by_state(
     top: Top, dipole_abc: tuple[float, float, float], effects: Sequence[QuantumEffect]
 ) -> dict[tuple[int, int], tuple[float, float, float]]:
     """The dipole of every state, the top's own where its effect gives none, and those between states."""
-    found = {(0, 0): dipole_abc}
+    dipoles = {(0, 0): dipole_abc}
     for effect in effects:
-        found |= {(state.v, state.v): dipole_abc for state in effect.states(top)} | effect.dipoles(top)
-    return found
+        dipoles |= {(state.v, state.v): dipole_abc for state in effect.states(top)} | effect.dipoles(top)
+    return dipoles
 
 
 class EffectSize(NamedTuple):

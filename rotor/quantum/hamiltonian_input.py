@@ -47,56 +47,56 @@ def effects_field() -> Any:
 
 def takes_spins(hyperfine: bool | None, subject: Any) -> bool:
     """Whether spins take part: as asked for, by default where their constants were given with the molecule."""
-    given = any(one.spin_constants is not None for one in subject.molecules)
-    return given if hyperfine is None else hyperfine
+    has_spins = any(molecule.spin_constants is not None for molecule in subject.molecules)
+    return has_spins if hyperfine is None else hyperfine
 
 
-def effects_from(given: HamiltonianInput, subject: Any) -> Any:
+def effects_from(inputs: HamiltonianInput, subject: Any) -> Any:
     """The Hamiltonian that is asked for, of the top of a subject."""
-    _refuse_method_alone(given, subject)
+    _refuse_method_alone(inputs, subject)
     if "top" not in subject.values:  # files that name their effects themselves
         return SEMI_RIGID
-    return effects_of_top(given, subject.top, takes_spins(given.hyperfine, subject))
+    return effects_of_top(inputs, subject.top, takes_spins(inputs.hyperfine, subject))
 
 
-def effects_of_top(given: HamiltonianInput, top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
+def effects_of_top(inputs: HamiltonianInput, top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
     """The Hamiltonian of one top, with or without spins."""
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.effects.watson import Centrifugal
 
-    found = effects_of(top, hyperfine, given.hyperfine_method, given.hyperfine_tolerance)
-    return found if given.distortion else tuple(one for one in found if not isinstance(one, Centrifugal))
+    effects = effects_of(top, hyperfine, inputs.hyperfine_method, inputs.hyperfine_tolerance)
+    return effects if inputs.distortion else tuple(effect for effect in effects if not isinstance(effect, Centrifugal))
 
 
-def _refuse_method_alone(given: HamiltonianInput, subject: Any) -> None:
-    if given.hyperfine_method != "exact" and not takes_spins(given.hyperfine, subject):
+def _refuse_method_alone(inputs: HamiltonianInput, subject: Any) -> None:
+    if inputs.hyperfine_method != "exact" and not takes_spins(inputs.hyperfine, subject):
         raise ValueError(
-            f"hyperfine_method {given.hyperfine_method}: without hyperfine or constants of spins nothing is split; add one of them"
+            f"hyperfine_method {inputs.hyperfine_method}: without hyperfine or constants of spins nothing is split; add one of them"
         )
 
 
-def effects_of_each(given: HamiltonianInput, subject: Any) -> Any:
+def effects_of_each(inputs: HamiltonianInput, subject: Any) -> Any:
     """The Hamiltonian of each of several molecules: tops with constants of spins are split, and a note names the others.
 
     What is no top, such as the lines of a catalogue, has none.
     """
     from rotor.tops.top import Top
 
-    _refuse_method_alone(given, subject)
+    _refuse_method_alone(inputs, subject)
     molecules: Sequence[Any] = subject.values["molecules"]
-    tops = [one for one in molecules if isinstance(one, Top)]
-    known, requested = [one for one in tops if one.spin_constants is not None], takes_spins(given.hyperfine, subject)
+    tops = [molecule for molecule in molecules if isinstance(molecule, Top)]
+    known, requested = [top for top in tops if top.spin_constants is not None], takes_spins(inputs.hyperfine, subject)
     mixed = requested and 0 < len(known) < len(tops)
     if mixed:
-        unsplit = ", ".join(one.name or "a molecule" for one in tops if one.spin_constants is None)
+        unsplit = ", ".join(top.name or "a molecule" for top in tops if top.spin_constants is None)
         subject.note(f"--hyperfine: no constants of spins are known of {unsplit}, whose lines are not split")
-    plain = HamiltonianInput(distortion=given.distortion)
+    plain = HamiltonianInput(distortion=inputs.distortion)
 
-    def effects(one: Any) -> tuple[QuantumEffect, ...]:
-        if not isinstance(one, Top):
+    def effects(molecule: Any) -> tuple[QuantumEffect, ...]:
+        if not isinstance(molecule, Top):
             return ()
-        split = requested and not (mixed and one.spin_constants is None)
-        return effects_of_top(given if split else plain, one, split)
+        split = requested and not (mixed and molecule.spin_constants is None)
+        return effects_of_top(inputs if split else plain, molecule, split)
 
     return tuple(map(effects, molecules))
 
@@ -113,9 +113,13 @@ def saved_of_each(effects: Sequence[Iterable[QuantumEffect]], request: Any) -> H
     """What asks for the effects of several molecules again."""
     from rotor.tops.top import Top
 
-    pairs = [(each, one) for each, one in zip(effects, request.molecules, strict=False) if isinstance(one, Top)]
-    saved = [saved_of_top(each, one) for each, one in pairs]
-    return next((one for one in saved if one.hyperfine is not None), HamiltonianInput())
+    pairs = [
+        (each, molecule)
+        for each, molecule in zip(effects, request.molecules, strict=False)
+        if isinstance(molecule, Top)
+    ]
+    saved = [saved_of_top(each, top) for each, top in pairs]
+    return next((saved_input for saved_input in saved if saved_input.hyperfine is not None), HamiltonianInput())
 
 
 def effects_of_each_field() -> Any:
@@ -125,11 +129,11 @@ def effects_of_each_field() -> Any:
 
 def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput:
     """The same of a top."""
-    every = {effect.name: effect for effect in effects}
-    if unknown := every.keys() - _SPINS - _KNOWN:
+    by_name = {effect.name: effect for effect in effects}
+    if unknown := by_name.keys() - _SPINS - _KNOWN:
         raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")
-    hyperfine = None if top.spin_constants is None else bool(every.keys() & _SPINS)
-    distortion, method = "centrifugal distortion" in every, every.get("hyperfine method")
+    hyperfine = None if top.spin_constants is None else bool(by_name.keys() & _SPINS)
+    distortion, method = "centrifugal distortion" in by_name, by_name.get("hyperfine method")
     if method is None:
         return HamiltonianInput(distortion=distortion, hyperfine=hyperfine)
     from rotor.quantum.hyperfine_method import HyperfineMethod
@@ -154,4 +158,4 @@ def spins_field() -> Any:
     def split(hyperfine: bool, request: Any) -> SpinsInput:
         return SpinsInput(hyperfine if hyperfine or request.top.spin_constants is not None else None)
 
-    return part(SpinsInput, lambda given, subject: takes_spins(given.hyperfine, subject), split, False)
+    return part(SpinsInput, lambda inputs, subject: takes_spins(inputs.hyperfine, subject), split, False)

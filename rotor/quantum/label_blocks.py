@@ -52,7 +52,7 @@ class Occurring(NamedTuple):
 
 def occurring_blocks(labels: Ints, representation: str, kmax: int | None) -> list[Occurring]:
     """The blocks in order of size; ValueError for a label that the cut at `kmax` leaves without a state."""
-    found: dict[tuple[int, str], Occurring] = {}
+    occurring: dict[tuple[int, str], Occurring] = {}
     by_j: dict[int, dict[str, WangBlock]] = {}
     for row, (j, ka, kc) in enumerate(labels.tolist()):
         species = "eo"[ka % 2] + "eo"[kc % 2]
@@ -60,14 +60,14 @@ def occurring_blocks(labels: Ints, representation: str, kmax: int | None) -> lis
             by_j[j] = {block.species: block for block in wang_blocks(j, representation)}
         basis = by_j[j][species]
         rank = (ka - int(ka_kc(j, species, 1)[0][0])) // 2
-        if (j, species) not in found:
-            found[j, species] = Occurring(basis, _cut(basis, kmax), [], [])
-        one = found[j, species]
-        if rank >= one.size:
+        if (j, species) not in occurring:
+            occurring[j, species] = Occurring(basis, _cut(basis, kmax), [], [])
+        current = occurring[j, species]
+        if rank >= current.size:
             raise ValueError(f"level {j} {ka} {kc} is not among the states with K up to {kmax}; raise KNMAX")
-        one.rows.append(row)
-        one.ranks.append(rank)
-    return sorted(found.values(), key=lambda one: one.size)
+        current.rows.append(row)
+        current.ranks.append(rank)
+    return sorted(occurring.values(), key=lambda block: block.size)
 
 
 def _cut(basis: WangBlock, kmax: int | None) -> int:
@@ -92,13 +92,17 @@ def chunks_of(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], pow
 
 
 def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> Chunk:
-    diagonals = unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units)
-    sizes, size = np.array([one.size for one in blocks]), blocks[-1].size
-    block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
-    x = np.stack([np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks]) ** p for p in powers], axis=1)
-    states = np.zeros((len(blocks), max(len(one.rows) for one in blocks)), dtype=np.int64)
-    for b, one in enumerate(blocks):
-        states[b, : len(one.rows)] = one.ranks
+    diagonals = unit_diagonals(
+        [occurring.basis for occurring in blocks], [occurring.size for occurring in blocks], units
+    )
+    sizes, size = np.array([occurring.size for occurring in blocks]), blocks[-1].size
+    block = np.array([b for b, occurring in enumerate(blocks) for _ in occurring.rows])
+    x = np.stack(
+        [np.array([occurring.basis.j * (occurring.basis.j + 1.0) for occurring in blocks]) ** p for p in powers], axis=1
+    )
+    states = np.zeros((len(blocks), max(len(occurring.rows) for occurring in blocks)), dtype=np.int64)
+    for b, occurring in enumerate(blocks):
+        states[b, : len(occurring.rows)] = occurring.ranks
     bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), len(blocks)]
     offsets = np.cumsum([0, *(sizes**2).tolist()])
     return Chunk(
@@ -108,10 +112,10 @@ def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers
         bands=tuple(_of_band(d, sizes, offsets) for d in range(min(len(diagonals), size))),
         offsets=offsets,
         x=x,
-        rows=np.array([row for one in blocks for row in one.rows]),
+        rows=np.array([row for occurring in blocks for row in occurring.rows]),
         block=block,
-        rank=np.array([rank for one in blocks for rank in one.ranks]),
-        slot=np.array([slot for one in blocks for slot in range(len(one.rows))]),
+        rank=np.array([rank for occurring in blocks for rank in occurring.ranks]),
+        slot=np.array([slot for occurring in blocks for slot in range(len(occurring.rows))]),
         states=states if states.shape[1] < _MOST_STATES * size else None,
         powers=x[block],
     )
@@ -133,9 +137,9 @@ def unit_diagonals(
     block on diagonal n - K. taken: how many of the states of each block.
     """
     order = max((n for _, n in units), default=0)
-    j = np.array([one.j for one in blocks], dtype=float)[:, None]
-    first = np.array([one.first_k for one in blocks])[:, None]
-    sign = np.array([one.sign for one in blocks], dtype=float)[:, None]
+    j = np.array([basis.j for basis in blocks], dtype=float)[:, None]
+    first = np.array([basis.first_k for basis in blocks])[:, None]
+    sign = np.array([basis.sign for basis in blocks], dtype=float)[:, None]
     size, sizes = max(taken), np.array(taken)[:, None]
     index = np.arange(size)[None, :]
     k = (first + 2 * index).astype(float)

@@ -81,12 +81,12 @@ class NamedStack(NamedTuple):
     @classmethod
     def of(cls, blocks: Sequence[NamedBlock]) -> NamedStack:
         """From blocks in the order of size."""
-        stack = LinearStack.of([one.block for one in blocks])
-        sub_blocks = [one.named.sub_blocks for one in blocks]
-        members = np.zeros((len(blocks), 1 + max(int(own.max(initial=0)) for own in sub_blocks), stack.size))
-        for place, own in enumerate(sub_blocks):
-            members[place, own, np.arange(len(own))] = 1.0
-        return cls(stack, members, tuple(one.named.namer for one in blocks))
+        stack = LinearStack.of([each.block for each in blocks])
+        sub_blocks = [each.named.sub_blocks for each in blocks]
+        members = np.zeros((len(blocks), 1 + max(int(numbers.max(initial=0)) for numbers in sub_blocks), stack.size))
+        for place, numbers in enumerate(sub_blocks):
+            members[place, numbers, np.arange(len(numbers))] = 1.0
+        return cls(stack, members, tuple(each.named.namer for each in blocks))
 
     def names(self, solved: SolvedStack, place: int) -> Ints:
         """The names of the states of one block."""
@@ -100,13 +100,16 @@ class NamedStack(NamedTuple):
         if self.members.shape[1] == 1 or self.stack.size == 1:
             return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
         shares = self.members @ solved.vectors**2
-        found, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
+        largest_state, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
         whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
-        turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (found[:, :-1] > found[:, 1:])
+        turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (largest_state[:, :-1] > largest_state[:, 1:])
         turned[:, 1:] &= ~turned[:, :-1]
         block, place = np.nonzero(turned)
-        found[block, place], found[block, place + 1] = found[block, place + 1], found[block, place]
-        return found, largest
+        largest_state[block, place], largest_state[block, place + 1] = (
+            largest_state[block, place + 1],
+            largest_state[block, place],
+        )
+        return largest_state, largest
 
 
 class Tracked(NamedTuple):
@@ -140,20 +143,20 @@ def tracked_blocks(
         Blocks in which labels lie.
     """
     tracked, space = list[Tracked](), Workspace()
-    for numbers in stack_numbers([one.block for one in blocks]):
+    for numbers in stack_numbers([block.block for block in blocks]):
         of_names = NamedStack.of([blocks[i] for i in numbers.tolist()])
         stack = of_names.stack
         solved = stack.solved(values_mhz, space)
         named = [of_names.names(solved, place) for place in range(len(numbers))]
-        found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
-        slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0), space)
+        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
+        slopes = stack.slopes(solved.vectors, _padded([states for _, states in tracked_rows], 0), space)
         leading, shares = of_names.leading(solved)
-        for place, (rows, states) in enumerate(found):
+        for place, (rows, states) in enumerate(tracked_rows):
             if len(rows):
                 block, of_block = blocks[numbers[place]]
-                own = slopes[place, : len(rows), : len(block.parameters)]
+                block_rows = slopes[place, : len(rows), : len(block.parameters)]
                 of_states = leading[place, : block.size], shares[place, : block.size]
-                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, *of_states)
+                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], block_rows, *of_states)
                 tracked.append(Tracked(block, of_block, rows, named[place][states], states, start))
     return LabelledBlocks(count, tuple(tracked))
 
@@ -183,10 +186,14 @@ class _Labelled:
 
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
-        rows, states = _padded([one.rows for one in tracked], -1), _padded([one.states for one in tracked], 0)
-        leading = _padded([one.start.leading for one in tracked], 0)
+        rows, states = _padded([each.rows for each in tracked], -1), _padded([each.states for each in tracked], 0)
+        leading = _padded([each.start.leading for each in tracked], 0)
         return cls(
-            NamedStack.of([NamedBlock(one.block, one.named) for one in tracked]), tuple(tracked), rows, states, leading
+            NamedStack.of([NamedBlock(each.block, each.named) for each in tracked]),
+            tuple(tracked),
+            rows,
+            states,
+            leading,
         )
 
     @property
@@ -215,32 +222,32 @@ class _Labelled:
             return self.states
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
-            one = self.tracked[b]
+            block = self.tracked[b]
             made = self.named.names(solved, b)
-            states[b, : len(one.rows)] = _states_of(made, one.names)
+            states[b, : len(block.rows)] = _states_of(made, block.names)
         return states
 
     @cached_property
     def _unclear_at_start(self) -> NDArray[np.bool_]:
         return self._unclear(
-            self.leading, np.stack([_filled(one.start.shares, self.stack.size) for one in self.tracked])
+            self.leading, np.stack([_filled(block.start.shares, self.stack.size) for block in self.tracked])
         )
 
     def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) with a labelled state whose sub-block and rank among those that lead do not make its name."""
         mostly, groups = self._follow(Follows.MOSTLY), self._follow(Follows.GROUPS)
-        found = self._follow(Follows.NOTHING)
+        unclear = self._follow(Follows.NOTHING)
         if mostly.any():
-            own = np.take_along_axis(shares, self.states, axis=1)
-            found = found | (mostly & ((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
-        return found | (groups & self._shared(leading, shares)) if groups.any() else found
+            share = np.take_along_axis(shares, self.states, axis=1)
+            unclear = unclear | (mostly & ((share < _CLEAR) & (self.rows >= 0)).any(axis=1))
+        return unclear | (groups & self._shared(leading, shares)) if groups.any() else unclear
 
     def _follow(self, what: Follows) -> NDArray[np.bool_]:
         return np.asarray(self._follows == what.value)
 
     @cached_property
     def _follows(self) -> Ints:
-        return np.array([one.named.follows.value for one in self.tracked])
+        return np.array([block.named.follows.value for block in self.tracked])
 
     def _shared(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) in which sub-blocks lead other numbers of states than they have functions, so that some states up to the
@@ -270,9 +277,12 @@ class _Labelled:
         """
         if self.named.members.shape[1] == 1:
             return np.zeros_like(self.states)
-        own = np.take_along_axis(leading, self.states, axis=1)
+        leading_function = np.take_along_axis(leading, self.states, axis=1)
         below = np.arange(self.stack.size) < self.states[:, :, None]
-        return np.asarray(own * self.stack.size + ((leading[:, None, :] == own[:, :, None]) & below).sum(axis=2))
+        return np.asarray(
+            leading_function * self.stack.size
+            + ((leading[:, None, :] == leading_function[:, :, None]) & below).sum(axis=2)
+        )
 
 
 def _counts(leading: Ints, chosen: NDArray[np.bool_], parts: int) -> Ints:
@@ -285,10 +295,10 @@ def _counts(leading: Ints, chosen: NDArray[np.bool_], parts: int) -> Ints:
 def _states_of(made: Ints, names: Ints) -> Ints:
     """Which states have the names, of the names of all."""
     of_name = {tuple(name): state for state, name in enumerate(made.tolist())}
-    found = [of_name.get(tuple(name), -1) for name in names.tolist()]
-    if min(found) < 0:
+    states = [of_name.get(tuple(name), -1) for name in names.tolist()]
+    if min(states) < 0:
         raise ValueError("a labelled level has no state of its name with these constants")
-    return np.array(found)
+    return np.array(states)
 
 
 @dataclass(frozen=True)
@@ -301,7 +311,7 @@ class LabelledBlocks:
     @property
     def found(self) -> Ints:
         """Places of the labels that were found."""
-        return np.concatenate([one.rows for one in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
+        return np.concatenate([block.rows for block in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
 
     @cached_property
     def _space(self) -> Workspace:
@@ -309,26 +319,26 @@ class LabelledBlocks:
 
     @cached_property
     def _labelled(self) -> list[_Labelled]:
-        numbers = stack_numbers([one.block for one in self.tracked])
-        return [_Labelled.of([self.tracked[i] for i in some.tolist()]) for some in numbers]
+        numbers = stack_numbers([block.block for block in self.tracked])
+        return [_Labelled.of([self.tracked[i] for i in numbers_of_stack.tolist()]) for numbers_of_stack in numbers]
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""
-        if all(np.array_equal(one.start.values_mhz, values_mhz[one.block.parameters]) for one in self.tracked):
+        if all(np.array_equal(block.start.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
             return self._levels_at_start(len(values_mhz))
         energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
         slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
-        for one in self._labelled:
-            found, derived = one.levels(values_mhz, self._space)
-            energies[one.rows] = found
-            slopes[one.rows[:, :, None], one.stack.parameters[:, None, :]] = derived
+        for labelled in self._labelled:
+            solved, derived = labelled.levels(values_mhz, self._space)
+            energies[labelled.rows] = solved
+            slopes[labelled.rows[:, :, None], labelled.stack.parameters[:, None, :]] = derived
         return energies[:-1], slopes[:-1, :-1]
 
     def _levels_at_start(self, parameters: int) -> tuple[Floats, Floats]:
         energies, slopes = np.full(self.count, np.nan), np.zeros((self.count, parameters))
-        for one in self.tracked:
-            energies[one.rows] = one.start.energies
-            slopes[one.rows[:, None], one.block.parameters] = one.start.slopes
+        for block in self.tracked:
+            energies[block.rows] = block.start.energies
+            slopes[block.rows[:, None], block.block.parameters] = block.start.slopes
         return energies, slopes
 
 
@@ -336,7 +346,7 @@ def joined(parts: Sequence[tuple[LabelledBlocks, Ints, Ints]], count: int) -> La
     """Several sets of blocks as one of so many labels: each with the places of its labels and of its parameters among all."""
     tracked = list[Tracked]()
     for blocks, rows, columns in parts:
-        for one in blocks.tracked:
-            block = one.block._replace(parameters=columns[one.block.parameters])
-            tracked.append(one._replace(block=block, rows=rows[one.rows]))
+        for block_tracked in blocks.tracked:
+            block = block_tracked.block._replace(parameters=columns[block_tracked.block.parameters])
+            tracked.append(block_tracked._replace(block=block, rows=rows[block_tracked.rows]))
     return LabelledBlocks(count, tuple(tracked))

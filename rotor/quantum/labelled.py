@@ -201,8 +201,8 @@ class WangBlocks(LevelModel):
 
     def _turned(self, chunk: Chunk, bands: Sequence[Floats]) -> tuple[Ints, Ints] | None:
         """Which blocks turn and where, see `turn`; None where there are none."""
-        found = turned(self.rise * bands[0], chunk.sizes) if self.rise else None
-        return found if found is not None and len(found[0]) else None
+        turned_order = turned(self.rise * bands[0], chunk.sizes) if self.rise else None
+        return turned_order if turned_order is not None and len(turned_order[0]) else None
 
     def _in_order(self, chunk: Chunk, bands: Sequence[Floats], turn: tuple[Ints, Ints] | None) -> tuple[Floats, Floats]:
         energies, vectors = _diagonalised(bands, chunk, self._space)
@@ -218,11 +218,11 @@ class WangBlocks(LevelModel):
             return self._in_order(chunk, bands, turn)
         if len(bands) == 2 and _dense() and turn is None:
             energies = _banded(bands, chunk, self._space)
-            found = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
-            if found is not None:
-                chosen = self._space.array("chosen", len(states), len(found), states.shape[1])
+            by_recursion = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
+            if by_recursion is not None:
+                chosen = self._space.array("chosen", len(states), len(by_recursion), states.shape[1])
                 chosen.fill(0.0)
-                chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = found
+                chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = by_recursion
                 return energies, chosen
         energies, vectors = self._in_order(chunk, bands, turn)
         count, size, most = len(vectors), vectors.shape[1], states.shape[1]
@@ -278,10 +278,10 @@ def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats
         if n == 1:
             energies[b, 0], vectors[b, 0, 0] = diagonal[b, 0], 1.0
             continue
-        found, states, info = dstevd(diagonal[b, :n], beside[b, : n - 1])
+        eigenvalues, states, info = dstevd(diagonal[b, :n], beside[b, : n - 1])
         if info:
             raise ValueError(f"LAPACK dstevd did not converge on a block of size {n} (info = {info})")
-        energies[b, :n] = found
+        energies[b, :n] = eigenvalues
         vectors[b, :n, :n] = states
 
 

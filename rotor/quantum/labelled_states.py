@@ -71,11 +71,11 @@ def labelled_states(
     blocks, inside = list[NamedBlock](), list[Ints]()
     for j, rows in sorted(of_j.items(), reverse=True):
         here = elements.of_j(j)
-        asked = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
+        classes = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
         for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
-            own = [vertices[j][i] for i in members]
-            if {(v, block.species) for v, block in own} & asked:
-                blocks.append(NamedBlock(here.block(members), named(own, representation)))
+            members_here = [vertices[j][i] for i in members]
+            if {(v, block.species) for v, block in members_here} & classes:
+                blocks.append(NamedBlock(here.block(members), named(members_here, representation)))
                 inside.append(rows)
 
     def find(number: int, made: Ints) -> tuple[Ints, Ints]:

@@ -240,8 +240,8 @@ class Levels(Table):
             inside &= values[place] == np.asarray(quanta[name])
             expected += place * scale
         place = np.minimum(np.searchsorted(codes, expected), max(len(codes) - 1, 0))
-        found = inside & (codes[place] == expected) if len(codes) else np.zeros(expected.shape, dtype=bool)
-        return np.where(found, rows[place] if len(codes) else -1, -1)
+        known = inside & (codes[place] == expected) if len(codes) else np.zeros(expected.shape, dtype=bool)
+        return np.where(known, rows[place] if len(codes) else -1, -1)
 
     @cached_property
     def _index(self) -> tuple[Ints, Ints, list[tuple[NDArray[Any], int]]]:
@@ -296,7 +296,7 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
     """
     quanta = levels.quanta
     if "i_tot" in quanta and "i_sym" not in quanta and weights.rule != "none":
-        of_even, of_odd = (_of_rotation(levels, own) for own in (weights, weights.exchanged()))
+        of_even, of_odd = (_of_rotation(levels, kind) for kind in (weights, weights.exchanged()))
         return np.where(quanta["i_tot"] % 2 == 0, of_even, of_odd)
     return _of_rotation(levels, weights)
 
@@ -315,8 +315,8 @@ def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:
     if "species" in quanta and weights.rule == "none":
         return levels.weight
     if "irrep" in quanta:
-        of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
-        return np.array([of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
+        weight_of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
+        return np.array([weight_of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
     if "kc" in quanta:
         return _of_asymmetric(levels, weights)
     if "k" in quanta:

@@ -44,12 +44,12 @@ class LinearBlock(NamedTuple):
 
     def turned(self, functions: Floats) -> LinearBlock:
         """The block over other functions, given in rows over those of this one."""
-        found = list[WeightedElements]()
+        elements = list[WeightedElements]()
         for parameter, whole in zip(self.parameters.tolist(), self.matrices(), strict=True):
             matrix = np.tril(functions @ whole @ functions.T)
             places = np.flatnonzero(matrix)
-            found.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
-        return linear_block(len(functions), found)
+            elements.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
+        return linear_block(len(functions), elements)
 
 
 class SolvedStack(NamedTuple):
@@ -130,8 +130,8 @@ class LinearStack(NamedTuple):
         vectors = space.array("vectors", count, size, size)
         vectors[:, self.runs[0][2] :, :] = vectors[:, :, self.runs[0][2] :] = 0.0
         for first, stop, n in self.runs:
-            some = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
-            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(some)
+            matrices = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
+            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
         energies += zero[:, None]
         return SolvedStack(whole, energies, vectors)
 
@@ -149,16 +149,16 @@ class LinearStack(NamedTuple):
 def stack_numbers(blocks: Sequence[LinearBlock]) -> list[Ints]:
     """Positions of the blocks that are worked on together: of like size, of like numbers of elements, of bounded memory."""
     order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
-    out, some, least, most = list[Ints](), list[int](), 0, 0
+    out, numbers, least, most = list[Ints](), list[int](), 0, 0
     for i in order:
         block = blocks[i]
         most = max(most, len(block.rows) * max(block.factors.shape[1], block.size))
-        if some and (block.size > _LIKE * least or (len(some) + 1) * most > _AT_ONCE):
-            out.append(np.array(some))
-            some, most = [], len(block.rows) * max(block.factors.shape[1], block.size)
-        least = block.size if not some else least
-        some.append(i)
-    return [*out, np.array(some)] if some else out
+        if numbers and (block.size > _LIKE * least or (len(numbers) + 1) * most > _AT_ONCE):
+            out.append(np.array(numbers))
+            numbers, most = [], len(block.rows) * max(block.factors.shape[1], block.size)
+        least = block.size if not numbers else least
+        numbers.append(i)
+    return [*out, np.array(numbers)] if numbers else out
 
 
 class WeightedElements(NamedTuple):
@@ -179,12 +179,12 @@ def linear_block(size: int, elements: Sequence[WeightedElements]) -> LinearBlock
     ([0, 1, 1], [0, 0, 1], [1.0, 0.5, 0.0], [3])
     """
     diagonal = np.arange(size) * (size + 1)
-    places, of_place = numbered(np.concatenate([diagonal, *(one.places for one in elements)]), size * size)
-    parameters = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(one.parameters for one in elements)]))
+    places, of_place = numbered(np.concatenate([diagonal, *(element.places for element in elements)]), size * size)
+    parameters = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(element.parameters for element in elements)]))
     factors, start = np.zeros((len(places), len(parameters))), size
-    for one in elements:
-        stop = start + len(one.places)
-        factors[of_place[start:stop, None], np.searchsorted(parameters, one.parameters)] += one.factors
+    for element in elements:
+        stop = start + len(element.places)
+        factors[of_place[start:stop, None], np.searchsorted(parameters, element.parameters)] += element.factors
         start = stop
     acting = np.flatnonzero(factors.any(axis=0))
     return LinearBlock(
@@ -200,7 +200,7 @@ def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:
     """
     there = np.zeros(count, dtype=bool)
     there[values] = True
-    found = np.flatnonzero(there)
+    occurring = np.flatnonzero(there)
     place = np.empty(count, dtype=np.int64)
-    place[found] = np.arange(len(found))
-    return found, place[values]
+    place[occurring] = np.arange(len(occurring))
+    return occurring, place[values]

@@ -51,12 +51,12 @@ def _augmented(state: int, loss: Floats, potential: Floats, lifted: Floats, of_f
             break
         here = int(of_function[function])
         seen.append(here)
-    reached = [int(of_state[one]) for one in seen[1:]]
+    reached = [int(of_state[function_seen]) for function_seen in seen[1:]]
     potential[reached] += distance[reached] - least
     lifted[seen] += least - np.array([0.0, *distance[reached]])
     while True:
-        one = int(before[function])
-        of_function[function] = one
-        function, of_state[one] = int(of_state[one]), function
-        if one == state:
+        previous = int(before[function])
+        of_function[function] = previous
+        function, of_state[previous] = int(of_state[previous]), function
+        if previous == state:
             return

@@ -78,8 +78,8 @@ def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
         from rotor.quantum.spins import lines
 
         return lines.connected(up, low, tensors)
-    found = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
-    return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in found)
+    tensors_of_parts = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
+    return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in tensors_of_parts)
 
 
 def wang_amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:

@@ -176,13 +176,13 @@ def answer_levels(request: LevelsRequest, executor: Executor | None = None) -> L
     """
     # from J = 0 and for some J more, so that the lowest level that exists is among them whatever the spin weights are
     levels = solve_levels(request.top, max(request.jmax, 3), effects=request.effects, executor=executor)
-    asked = (levels.rotational >= request.jmin) & (levels.rotational <= request.jmax)
+    selected = (levels.rotational >= request.jmin) & (levels.rotational <= request.jmax)
     if request.kmin is not None or request.kmax is not None:
         k = _projection(levels, request.top)
-        asked &= (k >= (request.kmin or 0)) & (k <= (request.jmax if request.kmax is None else request.kmax))
+        selected &= (k >= (request.kmin or 0)) & (k <= (request.jmax if request.kmax is None else request.kmax))
     if request.max_energy_mhz is not None:
-        asked &= levels.energy_mhz - levels.ground_mhz <= request.max_energy_mhz
-    return LevelsAnswer(request, SelectedLevels(levels, np.flatnonzero(asked)))
+        selected &= levels.energy_mhz - levels.ground_mhz <= request.max_energy_mhz
+    return LevelsAnswer(request, SelectedLevels(levels, np.flatnonzero(selected)))
 
 
 def _projection(levels: Levels, top: Top) -> Ints:

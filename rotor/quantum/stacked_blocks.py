@@ -68,7 +68,7 @@ def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, 
 
 def _stacked(blocks: list[SolvedBlock]) -> dict[int, Stack]:
     chosen = ((parity, [b for b in blocks if b.basis.first_k % 2 == parity]) for parity in (0, 1))
-    return {parity: _stack(some, some[0].basis.j, parity) for parity, some in chosen if some}
+    return {parity: _stack(members, members[0].basis.j, parity) for parity, members in chosen if members}
 
 
 def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> Stack:

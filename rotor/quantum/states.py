@@ -51,19 +51,19 @@ class Coupling:
 
 def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str) -> list[Coupling]:
     """Couplings of effects, and what acts in the top's own state by other operators of J than powers."""
-    found: list[Coupling] = []
+    couplings: list[Coupling] = []
     for effect in effects:
-        found += effect.couplings(top)
+        couplings += effect.couplings(top)
         for name in effect.parameters(top):
             if effect.j_operator(top, name, 1, representation) is not None:
-                found.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
-    return found
+                couplings.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
+    return couplings
 
 
 def _own_operator(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
     def operator(j: int, representation: str) -> JOperator:
-        found = effect.j_operator(top, name, j, representation)
-        assert found is not None
-        return found
+        matrix = effect.j_operator(top, name, j, representation)
+        assert matrix is not None
+        return matrix
 
     return operator

@@ -68,8 +68,8 @@ class InteractingStates(QuantumEffect):
         """Every state that has a constant of its own."""
         terms: dict[int, dict[str, Operators]] = {}
         for name in self.values:
-            if own := state_of_constant(name):
-                constant, v = own
+            if state := state_of_constant(name):
+                constant, v = state
                 terms.setdefault(v, {})[name] = (
                     {(0, 0, 0): 1.0} if constant == "E" else operators_of_name(top.constants, constant)
                 )
@@ -134,8 +134,8 @@ def _coupling(name: str, parts: ParameterName) -> Coupling:
 def _plain(kind: str, letters: str, j: int, representation: str) -> JOperator:
     if kind == "W":
         return identity(j) if not letters else raising(j) ** _ORDERS[letters] + lowering(j) ** _ORDERS[letters]
-    of = components(j, representation)
-    return 1j * of[letters] if kind == "G" else anticommutator(of[letters[0]], of[letters[1]])
+    component = components(j, representation)
+    return 1j * component[letters] if kind == "G" else anticommutator(component[letters[0]], component[letters[1]])
 
 
 def with_powers(operator: JOperator, parts: ParameterName) -> JOperator:

@@ -53,7 +53,7 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     )
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
-        known = [one for kind in kinds for one in kind.symbols]
+        known = [symbol for kind in kinds for symbol in kind.symbols]
         symbol = parse_name(name).symbol if name.startswith(tuple(known)) else ""
         kind = next((kind for kind in kinds if symbol in kind.symbols), None)
         if kind is None:
@@ -100,8 +100,8 @@ def _refuse_across_a_line(top: Top) -> None:
 
 def _weights_of_states(top: Top) -> list[SpinWeights]:
     """The spin weights of a top and of its states, without those that are alike for all levels."""
-    every = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
-    return [weights for weights in every if weights.rule != "none"]
+    all_weights = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
+    return [weights for weights in all_weights if weights.rule != "none"]
 
 
 def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
@@ -128,14 +128,14 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
 def _refuse_like_nuclei(top: Top) -> None:
     """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
-    every = _weights_of_states(top)
+    all_weights = _weights_of_states(top)
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
     if len(top.spin_constants.totals) == 2:
-        for weights in every:
+        for weights in all_weights:
             _refuse_weights_of_the_pair(top, weights)
         labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
-    if like and every:
+    if like and all_weights:
         raise ValueError(
             f"spins of several {like[0]}: the spin weights of {top.name or 'this top'} count their exchange already; give the "
             "weights without them, or an .int and .var file with equivalent nuclei"
@@ -148,8 +148,8 @@ def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
         return ()
     from rotor.quantum.effects.interactions import InteractingStates
 
-    found = top.states
-    return (InteractingStates(found.values, found.weights, found.dipoles),)
+    states = top.states
+    return (InteractingStates(states.values, states.weights, states.dipoles),)
 
 
 def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
@@ -202,8 +202,8 @@ def effects_of(
     """
     if not hyperfine:
         return (*SEMI_RIGID, *state_effects(top), *internal_rotation_effects(top))
-    found = spin_effects(top)
-    if not found:
+    effects_of_spins = spin_effects(top)
+    if not effects_of_spins:
         raise ValueError(
             f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them as spin_constants "
             "(--spin-constants), such as chi_aa(14N)=-4.2 MHz"
@@ -212,13 +212,13 @@ def effects_of(
         *SEMI_RIGID,
         *state_effects(top),
         *internal_rotation_effects(top),
-        *found,
-        *_method(top, found, method, tolerance_mhz),
+        *effects_of_spins,
+        *_method(top, effects_of_spins, method, tolerance_mhz),
     )
 
 
-def _method(top: Top, found: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:
+def _method(top: Top, effects: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:
     """The choice of a method where it is not the usual one."""
-    spins = {spin.name: spin for effect in found for spin in effect.spins(top)}
-    asked = HyperfineMethod(method, tolerance_mhz, tuple(spins.values()))
-    return () if method == EXACT else (asked,)
+    spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
+    requested = HyperfineMethod(method, tolerance_mhz, tuple(spins.values()))
+    return () if method == EXACT else (requested,)

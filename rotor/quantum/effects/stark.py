@@ -174,7 +174,7 @@ def map_request(
     names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
     if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
         del names["cos2theta"]  # tensors of rank 2 are not carried along there
-    contractions = tuple(one for one in (dipole, light) if one is not None)
+    contractions = tuple(contraction for contraction in (dipole, light) if contraction is not None)
     return MapRequest(
         space=KnownSpaces(partial(field_space, top, operators=contractions, effects=tuple(effects))),
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
@@ -289,9 +289,9 @@ def acting(
         if top.polarizability_abc_angstrom3 is None:
             raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
         light = Contraction(top.polarizability_abc_angstrom3, np.outer(Z, Z))
-    own = dipole or (0.0, 0.0, 0.0)
-    states = dipoles_by_state(top, own, effects or effects_of(top, False))
-    return Contraction(own, direction, states if len(states) > 1 else {}), light
+    own_dipole = dipole or (0.0, 0.0, 0.0)
+    states = dipoles_by_state(top, own_dipole, effects or effects_of(top, False))
+    return Contraction(own_dipole, direction, states if len(states) > 1 else {}), light
 
 
 def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> Contraction:
@@ -299,7 +299,7 @@ def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> 
     x, y, z = np.eye(3)[axis].tolist()
     with_unit = dipoles_by_state(top, (x, y, z), effects)
     none = dipoles_by_state(top, (0.0, 0.0, 0.0), effects)
-    states = {pair: tuple(np.subtract(one, none[pair]).tolist()) for pair, one in with_unit.items()}
+    states = {pair: tuple(np.subtract(moment, none[pair]).tolist()) for pair, moment in with_unit.items()}
     return Contraction(np.eye(3)[axis], Z, states if len(states) > 1 else {})
 
 
@@ -326,4 +326,4 @@ def _problem(
     if light is not None:
         fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
     slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)
-    return BlockProblem(fixed, slope, {name: partial(block.dense, one) for name, one in names.items()})
+    return BlockProblem(fixed, slope, {name: partial(block.dense, operator) for name, operator in names.items()})

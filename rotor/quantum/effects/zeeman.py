@@ -133,9 +133,9 @@ def checked_g(top: Top, g: ArrayLike) -> Floats:
     return _axial_tensor(top, g, "g")
 
 
-def _axial_tensor(top: Top, given: ArrayLike, name: str) -> Floats:
+def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
     """A tensor (3, 3) from one number, three or all of it; ValueError where it does not have the symmetry of the top."""
-    array = np.asarray(given, dtype=np.float64)
+    array = np.asarray(values, dtype=np.float64)
     tensor = np.diag(np.broadcast_to(array, 3)) if array.ndim < 2 and array.size in (1, 3) else array
     if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
         raise ValueError(f"a {name} tensor is one number, three, or (3, 3), finite; got {array.tolist()}")

@@ -28,7 +28,7 @@ EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an ac
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
 
 
-def choose_spins(scene: Any, request: Any, asked: float) -> Choice:
+def choose_spins(scene: Any, request: Any, allowed: float) -> Choice:
     """Spins whose constants are known are taken where they are larger than what was asked for, several by the cheapest method.
 
     All orders of distortion that the constants have are taken: of J ≤ 40 of water, 13 ms, the orders above J⁴ are 3 ms, and those
@@ -39,10 +39,10 @@ def choose_spins(scene: Any, request: Any, asked: float) -> Choice:
     if top.spin_constants is None or not (has_spins or scene.effects.hyperfine is None):
         return Choice(request, NOTHING_CHEAPER)
     size = _spin_size(top)
-    if size <= asked and not has_spins:
+    if size <= allowed and not has_spins:
         return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
     if len(top.spin_constants.twice) > 1 and scene.effects.hyperfine_method == EXACT:
-        return _cheapest_method(request, size, asked)
+        return _cheapest_method(request, size, allowed)
     if has_spins:
         return Choice(request, "with spins of nuclei: exact, nothing cheaper")
     from rotor.quantum.effects.of_top import effects_of
@@ -52,7 +52,7 @@ def choose_spins(scene: Any, request: Any, asked: float) -> Choice:
     )
 
 
-def _cheapest_method(request: Any, size: float, asked: float) -> Choice:
+def _cheapest_method(request: Any, size: float, allowed: float) -> Choice:
     """Spins by the cheapest method that is estimated to be within what was asked for; the estimate is in the error stated.
 
     One nucleus is exact at no more cost (docs/accuracy.md).
@@ -60,10 +60,10 @@ def _cheapest_method(request: Any, size: float, asked: float) -> Choice:
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.effects.watson import Centrifugal
 
-    tolerance = FOR_METHOD * asked
+    tolerance = FOR_METHOD * allowed
     taken = effects_of(request.top, True, "auto", tolerance)
-    if not any(isinstance(one, Centrifugal) for one in request.effects):
-        taken = tuple(one for one in taken if not isinstance(one, Centrifugal))
+    if not any(isinstance(effect, Centrifugal) for effect in request.effects):
+        taken = tuple(effect for effect in taken if not isinstance(effect, Centrifugal))
     how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
     return Choice(replace(request, effects=taken), how)
 
@@ -98,15 +98,15 @@ def energies_like(reference: Levels, levels: Levels) -> Floats:
     for both in pairs:
         _, code = np.unique(np.concatenate(both), return_inverse=True)
         _, key = np.unique(key * (int(code.max(initial=0)) + 1) + code, return_inverse=True)
-    sought, own = key[: len(reference)], key[len(reference) :]
-    order = np.argsort(own, kind="stable")
-    rows = order[np.minimum(np.searchsorted(own[order], sought), len(own) - 1)]
-    return np.where(own[rows] == sought, levels.energy_mhz[rows], np.nan)
+    sought, of_levels = key[: len(reference)], key[len(reference) :]
+    order = np.argsort(of_levels, kind="stable")
+    rows = order[np.minimum(np.searchsorted(of_levels[order], sought), len(of_levels) - 1)]
+    return np.where(of_levels[rows] == sought, levels.energy_mhz[rows], np.nan)
 
 
-def level_error(found: Levels, reference: Levels) -> float:
+def level_error(levels: Levels, reference: Levels) -> float:
     """The largest difference of an energy in MHz; infinite where no level is in both."""
-    return largest(energies_like(reference, found) - reference.energy_mhz)
+    return largest(energies_like(reference, levels) - reference.energy_mhz)
 
 
 def largest(differences: Floats) -> float:
@@ -133,12 +133,16 @@ def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer
     error: of an answer beside the reference in MHz. of: what it is the error of. answer: of a request.
     """
     top, names = request.top, [name for name in request.top.constants.values if name not in "ABC"]
-    if not names or top.states is not None or not any(one.name == "centrifugal distortion" for one in request.effects):
+    if (
+        not names
+        or top.states is not None
+        or not any(effect.name == "centrifugal distortion" for effect in request.effects)
+    ):
         return []
     orders = [2, *sorted({order_of(name, top) for name in names})]
     plain = replace(request, top=top.with_constants(top.constants))  # without a table of levels
     settings = [
-        Setting(f"order J^{one}", replace(request, top=to_order(top, one)), one == orders[-1]) for one in orders
+        Setting(f"order J^{order}", replace(request, top=to_order(top, order)), order == orders[-1]) for order in orders
     ]
     against = "all constants; the orders that they do not have are in the plan"
     return [Sweep("effects.distortion", (Measure(of, "MHz", error),), tuple(settings), plain, against, answer)]
@@ -152,9 +156,9 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.hyperfine_method import HyperfineMethod
 
-    if not any(one.name in SPINS for one in request.effects):
+    if not any(effect.name in SPINS for effect in request.effects):
         return []
-    used = next((one.method for one in request.effects if isinstance(one, HyperfineMethod)), "exact")
+    used = next((effect.method for effect in request.effects if isinstance(effect, HyperfineMethod)), "exact")
     settings = [Setting("left out", replace(request, effects=effects_of(request.top, False)))]
     for method in METHODS:
         settings.append(
@@ -189,13 +193,13 @@ def sweeps_of_levels(request: Any) -> Sweeps:
     """Orders of distortion and methods of hyperfine structure."""
     from rotor.quantum.request import answer_levels
 
-    def error(found: Any, reference: Any) -> float:
-        return level_error(found.table.levels, reference.table.levels)
+    def error(answer: Any, reference: Any) -> float:
+        return level_error(answer.table.levels, reference.table.levels)
 
     of = "energy of a level"
-    found = (*distortion(request, error, of, answer_levels), *hyperfine(request, error, of, answer_levels))
+    sweeps = (*distortion(request, error, of, answer_levels), *hyperfine(request, error, of, answer_levels))
     exact = f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well"
-    return Sweeps(found, (exact, *of_states(request.top)))
+    return Sweeps(sweeps, (exact, *of_states(request.top)))
 
 
 LEVELS = Numerics(

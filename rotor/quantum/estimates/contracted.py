@@ -85,11 +85,11 @@ class ContractedLevels:
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(values_mhz)))
         names: dict[int, dict[tuple[int, ...], int]] = {}
         for block in self.blocks:
-            for number in {block.parts[one.part].number for one in block.targets} - set(names):
+            for number in {block.parts[target.part].number for target in block.targets} - set(names):
                 names[number] = _states_by_name(self.rotors[number], solved.vectors[number])
-            rows = np.array([one.row for one in block.targets])
-            found, vectors = _levels_of(block, _functions_of(block, names), solved, self.window_mhz)
-            energies[rows] = found
+            rows = np.array([target.row for target in block.targets])
+            found_energies, vectors = _levels_of(block, _functions_of(block, names), solved, self.window_mhz)
+            energies[rows] = found_energies
             slopes[rows] = self._slopes(block, vectors, solved, len(values_mhz))
         return energies, slopes
 
@@ -108,8 +108,8 @@ class ContractedLevels:
         out = np.zeros((vectors.shape[1], count))
         turned = []
         for part in block.parts:
-            own = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
-            turned.append(np.matmul(solved.vectors[part.number], own))
+            part_vectors = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
+            turned.append(np.matmul(solved.vectors[part.number], part_vectors))
             unit = self.rotations[part.number]
             pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
             out[:, unit.parameters] += pairs @ unit.factors
@@ -136,12 +136,12 @@ def _states_by_name(rotor: RotorBlock, vectors: Floats) -> dict[tuple[int, ...],
 
 def _functions_of(block: _Block, names: dict[int, dict[tuple[int, ...], int]]) -> Ints:
     """Where the functions that name the labels stand."""
-    found = []
-    for one in block.targets:
-        part = block.parts[one.part]
-        state = names[part.number][one.name]
-        found.append(part.place.start + one.pattern * len(part.rotor.energies_mhz) + state)
-    return np.array(found, dtype=np.int64)
+    functions = []
+    for target in block.targets:
+        part = block.parts[target.part]
+        state = names[part.number][target.name]
+        functions.append(part.place.start + target.pattern * len(part.rotor.energies_mhz) + state)
+    return np.array(functions, dtype=np.int64)
 
 
 def _levels_of(block: _Block, functions: Ints, solved: _Solved, window_mhz: float) -> tuple[Floats, Floats]:
@@ -154,12 +154,12 @@ def _levels_of(block: _Block, functions: Ints, solved: _Solved, window_mhz: floa
     chosen = np.unique(np.concatenate(near))
     columns = coupling_columns(block, chosen, solved)
     for group, centre, inside in zip(groups, centres, near, strict=True):
-        own = columns[:, np.searchsorted(chosen, inside)]
-        found, states = _eliminated(rotation, diagonal, own, inside, centre)
+        inside_columns = columns[:, np.searchsorted(chosen, inside)]
+        eliminated, states = _eliminated(rotation, diagonal, inside_columns, inside, centre)
         of_state = assigned(states[inside] ** 2, np.ones(len(inside), dtype=np.int64))
         state_of = np.argsort(of_state)
         states_here = state_of[np.searchsorted(inside, functions[group])]
-        energies[group], vectors[:, group] = found[states_here], states[:, states_here]
+        energies[group], vectors[:, group] = eliminated[states_here], states[:, states_here]
     return energies, vectors
 
 
@@ -171,8 +171,8 @@ def _diagonal(block: _Block, solved: _Solved) -> tuple[Floats, Floats]:
         rotation.append(energies)
         coupled.append(energies.copy())
         for channel, operator in solved.operators.get((part.number, part.number), {}).items():
-            own = np.diag(block.known[channel][part.patterns, part.patterns])
-            coupled[-1] += np.outer(own, np.diag(operator)).ravel()
+            pattern = np.diag(block.known[channel][part.patterns, part.patterns])
+            coupled[-1] += np.outer(pattern, np.diag(operator)).ravel()
     return np.concatenate(rotation), np.concatenate(coupled)
 
 
@@ -259,20 +259,20 @@ def contracted_levels(
     used = {number for block, _ in blocks for number in (part.number for part in block.parts)}
     rotors = {i: plan.blocks[i] for i in sorted(used)}
     rotations, couplings = unit_matrices(top, effects, names, plan.shared, rotors)
-    own = tuple(_Block(block.parts, _known(plan, block), targets) for block, targets in blocks)
-    found = ContractedLevels(len(rows), rotors, rotations, couplings, own, 0.0)
-    window = _window(found, values_mhz)
+    known_blocks = tuple(_Block(block.parts, _known(plan, block), targets) for block, targets in blocks)
+    contracted = ContractedLevels(len(rows), rotors, rotations, couplings, known_blocks, 0.0)
+    window = _window(contracted, values_mhz)
     spread = min(float(np.ptp(block.energies_mhz)) for block, _ in blocks)
     if window > _WIDE * spread:
         return None
-    return replace(found, window_mhz=window)
+    return replace(contracted, window_mhz=window)
 
 
 def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
     """The blocks in which the rows lie, with what names these."""
     starts = np.array([block.start for block in levels.blocks])
     of_row = np.searchsorted(starts, rows, side="right") - 1
-    found = []
+    with_targets = []
     for number in np.unique(of_row).tolist():
         block = levels.blocks[number]
         stops = np.array([part.place.stop for part in block.parts])
@@ -280,11 +280,11 @@ def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock
         for place in np.flatnonzero(of_row == number).tolist():
             function = int(rows[place]) - block.start
             part = int(np.searchsorted(stops, function, side="right"))
-            own = block.parts[part]
-            pattern = (function - own.place.start) // len(own.rotor.energies_mhz)
+            chosen_part = block.parts[part]
+            pattern = (function - chosen_part.place.start) // len(chosen_part.rotor.energies_mhz)
             targets.append(_Target(place, part, pattern, tuple(block.labels[function, :3].tolist())))
-        found.append((block, tuple(targets)))
-    return found
+        with_targets.append((block, tuple(targets)))
+    return with_targets
 
 
 def _known(plan: Plan, block: SpinBlock) -> dict[Channel, Floats]:
@@ -298,7 +298,7 @@ def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
     longest = 0.0
     for block in levels.blocks:
         states = {number: _states_by_name(levels.rotors[number], solved.vectors[number])
-                  for number in {block.parts[one.part].number for one in block.targets}}  # fmt: skip
+                  for number in {block.parts[target.part].number for target in block.targets}}  # fmt: skip
         columns = coupling_columns(block, np.unique(_functions_of(block, states)), solved)
         longest = max(longest, float(np.sqrt(np.einsum("ij,ij->j", columns, columns)).max()))
     return max(_LEAST_RATIO * longest, float(np.sqrt(longest**3 / TOLERANCE_MHZ)))

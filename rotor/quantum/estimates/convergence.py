@@ -191,12 +191,12 @@ def _first(top: Top, jmax: int, kmax: int | None, effects: Sequence[QuantumEffec
 
 
 def _disorder(top: Top, levels: Levels) -> str:
-    found = disordered_blocks(top, levels)
-    if not found:
+    disordered = disordered_blocks(top, levels)
+    if not disordered:
         return ""
-    first = min(j for j, _ in found)
+    first = min(j for j, _ in disordered)
     return (
-        f"in {counted(len(found), 'block')} from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
+        f"in {counted(len(disordered), 'block')} from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
         "states there and say nothing about the motion"
     )
 

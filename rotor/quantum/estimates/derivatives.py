@@ -96,11 +96,11 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
 
 def _of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
     """Σ factor ⟨term⟩ of each of several sums of terms, (rows, sums)."""
-    terms = sorted({powers for one in operators for powers in one})
+    terms = sorted({powers for operator in operators for powers in operator})
     if not terms:
         return np.zeros((len(rows), len(operators)))
     expectations = term_expectations(levels, terms, rows)
-    factors = np.array([[one.get(powers, 0.0) for one in operators] for powers in terms])
+    factors = np.array([[operator.get(powers, 0.0) for operator in operators] for powers in terms])
     return np.asarray(expectations @ factors)
 
 
@@ -120,14 +120,14 @@ def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str,
 
     The operators of a name that two effects share are added.
     """
-    found: dict[str, Operators] = {}
+    by_name: dict[str, Operators] = {}
     for effect in effects:
         operators = effect.operators(top)
         for name in effect.parameters(top):
-            total = found.setdefault(name, {})
+            total = by_name.setdefault(name, {})
             for powers, factor in operators.get(name, {}).items():
                 total[powers] = total.get(powers, 0.0) + factor
-    return found
+    return by_name
 
 
 def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
@@ -142,13 +142,13 @@ def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> F
     for numbers in stack_numbers(linear):
         stack = LinearStack.of([linear[i] for i in numbers.tolist()])
         vectors = np.zeros((len(numbers), stack.size, stack.size))
-        own = np.full((len(numbers), stack.size), len(levels))
+        rows_of_states = np.full((len(numbers), stack.size), len(levels))
         for place, block in enumerate(blocks[i] for i in numbers.tolist()):
             size = len(block.energies_mhz)
             vectors[place, :size, :size] = block.vectors
-            own[place, :size] = block.start + np.arange(size)
+            rows_of_states[place, :size] = block.start + np.arange(size)
         states = np.tile(np.arange(stack.size), (len(numbers), 1))
-        out[own[:, :, None], stack.parameters[:, None, :]] = stack.slopes(vectors, states, space)
+        out[rows_of_states[:, :, None], stack.parameters[:, None, :]] = stack.slopes(vectors, states, space)
     return out[rows, :-1]
 
 

@@ -87,15 +87,19 @@ def unit_levels(
     units = [makers.unit(number, block) for number, block in enumerate(blocks)]
     inside = [np.flatnonzero(of_row == number) for number in numbers]
 
-    def find(place: int, found: Ints) -> tuple[Ints, Ints]:
+    def find(place: int, names: Ints) -> tuple[Ints, Ints]:
         """Labels of the block by their names, which are those that the levels have."""
-        block, own = blocks[place], inside[place]
-        state_of = {tuple(name): state for state, name in enumerate(found.tolist())}
+        block, rows_of_block = blocks[place], inside[place]
+        state_of = {tuple(name): state for state, name in enumerate(names.tolist())}
         if functions and isinstance(block, SpinBlock):
-            asked = _names_by(block, *functions(block))[rows[own] - block.start]
+            asked = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
         else:
-            asked = _quanta(levels)[rows[own]] if functions or naming else _names(block)[rows[own] - block.start]
-        return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
+            asked = (
+                _quanta(levels)[rows[rows_of_block]]
+                if functions or naming
+                else _names(block)[rows[rows_of_block] - block.start]
+            )
+        return rows_of_block, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
     return tracked_blocks(units, len(rows), find, values_mhz)
 
@@ -115,8 +119,8 @@ def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
     rows = [block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.parts]
     over_basis = np.concatenate(
         [
-            np.matmul(part.rotor.vectors, own).reshape(-1, block.vectors.shape[1])
-            for part, own in zip(block.parts, rows, strict=True)
+            np.matmul(part.rotor.vectors, part_rows).reshape(-1, block.vectors.shape[1])
+            for part, part_rows in zip(block.parts, rows, strict=True)
         ]
     )
     return np.asarray(names[assigned((functions @ over_basis) ** 2, np.ones(len(names), dtype=np.int64))])
@@ -189,19 +193,19 @@ def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
     out, number = np.empty(size, dtype=np.int64), 0
     for part in parts:
         states = len(part.rotor.energies_mhz)
-        for own in part.rotor.parts:
+        for sub_part in part.rotor.parts:
             for pattern in range(part.repeats):
                 start = part.place.start + pattern * states
-                out[start + own.place.start : start + own.place.stop] = number
+                out[start + sub_part.place.start : start + sub_part.place.stop] = number
                 number += 1
     return out
 
 
-def _namer(solved: tuple[SpinPart, ...], every: Ints) -> Namer:
+def _namer(solved: tuple[SpinPart, ...], all_names: Ints) -> Namer:
     parts = tuple(
         part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in solved
     )
-    names = names_of_parts(parts, every)
+    names = names_of_parts(parts, all_names)
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return labels_of(parts, names, vectors)[0]

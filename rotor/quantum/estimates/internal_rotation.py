@@ -43,12 +43,12 @@ class InternalRotor:
         return 4 * self.barrier_mhz / (9 * self.f_mhz)
 
 
-def rotor_of_moments(own: float, cosines: Floats, moments: Floats, barrier_mhz: float) -> InternalRotor:
+def rotor_of_moments(top_moment: float, cosines: Floats, moments: Floats, barrier_mhz: float) -> InternalRotor:
     """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group.
 
     Parameters
     ----------
-    own : float
+    top_moment : float
         I_α, its moment about its axis, u Å².
     cosines : (3,) array
         λ_g of its axis to the principal axes.
@@ -66,8 +66,8 @@ def rotor_of_moments(own: float, cosines: Floats, moments: Floats, barrier_mhz: 
     >>> rotor_of_moments(3.0, np.array([1.0, 0, 0]), np.array([6.0, 50, 50]), 0.0).rho  # half of the molecule turns
     (0.5, 0.0, 0.0)
     """
-    rho = cosines * own / moments
-    free = units.ROTATIONAL_MHZ_U_ANGSTROM2 / (own * (1.0 - float(cosines @ rho)))
+    rho = cosines * top_moment / moments
+    free = units.ROTATIONAL_MHZ_U_ANGSTROM2 / (top_moment * (1.0 - float(cosines @ rho)))
     return InternalRotor(free, barrier_mhz, (float(rho[0]), float(rho[1]), float(rho[2])))
 
 
@@ -141,8 +141,8 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
     p = (p_x, 1j * (p_z @ p_x - p_x @ p_z), p_z)
     rotation = sum(tensor[a, b] * (p[a] @ p[b] + p[b] @ p[a]) / 2 for a in range(3) for b in range(3))
     energies, vectors = torsional_states(rotor, k, species)
-    found, states = np.linalg.eigh(rotation * (vectors @ vectors.T) + np.diag(energies))
-    by_k = found[np.argsort(k**2 @ np.abs(states) ** 2, kind="stable")]
+    eigenvalues, states = np.linalg.eigh(rotation * (vectors @ vectors.T) + np.diag(energies))
+    by_k = eigenvalues[np.argsort(k**2 @ np.abs(states) ** 2, kind="stable")]
     return np.concatenate([by_k[:1], np.sort(by_k[1:].reshape(j, 2), axis=1).ravel()])
 
 
@@ -173,7 +173,7 @@ def line_shifts(constants_mhz: tuple[float, float, float], rotor: InternalRotor,
     """
     same, other = [], []
     for species in (A_SPECIES, E_SPECIES):
-        lower, upper = (species_levels(constants_mhz, rotor, one, species) for one in (j, j + 1))
+        lower, upper = (species_levels(constants_mhz, rotor, number, species) for number in (j, j + 1))
         same.append(upper[: len(lower)] - lower)
         other.append(upper[2:] - lower)
     return LineShifts(same[1] - same[0], other[1] - other[0])

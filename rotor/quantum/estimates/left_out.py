@@ -33,12 +33,12 @@ def left_out_of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tu
     from rotor.quantum.estimates.limits import every_limit
 
     limits = every_limit(top, j, effects)
-    found = [
-        LeftOut(one.name, one.size_mhz, "MHz", f"at J = {j}: {one.text.replace(COMPUTE, HYPERFINE_KEY)}")
-        for one in limits
+    parts = [
+        LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text.replace(COMPUTE, HYPERFINE_KEY)}")
+        for limit in limits
     ]
     field = stray_field(top)
-    return largest_first(found if field is None else [*found, field])
+    return largest_first(parts if field is None else [*parts, field])
 
 
 def stray_field(top: Top) -> LeftOut | None:

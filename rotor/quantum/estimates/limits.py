@@ -66,12 +66,12 @@ def populated_j(top: Top, temperature_k: float) -> int:
 
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
     """The sizes of the effects of a calculation and of those that it leaves out, largest first, at one J."""
-    return sorted([*effect_sizes(top, j, effects), *absent_sizes(top, effects)], key=lambda one: -one.size_mhz)
+    return sorted([*effect_sizes(top, j, effects), *absent_sizes(top, effects)], key=lambda effect: -effect.size_mhz)
 
 
 def absent_sizes(top: Top, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
     """The size of quadrupole coupling where the molecule has it and the calculation has not, as `NuclearQuadrupole.size_mhz` adds it."""
-    nuclei = {one.nucleus: abs(one.chi_mhz) for one in splitting_nuclei(top)}
+    nuclei = {nucleus.nucleus: abs(nucleus.chi_mhz) for nucleus in splitting_nuclei(top)}
     if not nuclei or QUADRUPOLE in {effect.name for effect in effects}:
         return []
     return [EffectSize(QUADRUPOLE, sum(nuclei.values()), False)]
@@ -86,12 +86,13 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
     ['centrifugal distortion']
     """
-    couplings = [one for one in known_couplings(top, j, effects) if one.name != QUADRUPOLE]  # which _of_nuclei has
-    present = {effect.name for effect in effects} | {one.name for one in couplings}
-    found = [*couplings, *_of_constants(top, j), *_of_nuclei(top, j, effects, present)]
+    known = known_couplings(top, j, effects)
+    couplings = [limit for limit in known if limit.name != QUADRUPOLE]  # which _of_nuclei has
+    present = {effect.name for effect in effects} | {limit.name for limit in couplings}
+    limits = [*couplings, *_of_constants(top, j), *_of_nuclei(top, j, effects, present)]
     if top.molecule is not None:
-        found += _of_geometry(top, top.molecule, j, present)
-    return largest_first(found)
+        limits += _of_geometry(top, top.molecule, j, present)
+    return largest_first(limits)
 
 
 def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
@@ -100,9 +101,9 @@ def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limi
     Known couplings of spins take the place of estimated ones.
     """
     couplings, further = known_couplings(top, j, effects), next_order(top, j, effects)
-    known = {one.name for one in couplings}
-    found = [*couplings, *(one for one in model_limits(top, j, effects) if one.name not in known)]
-    return largest_first(found if further is None else [*found, further])
+    known = {limit.name for limit in couplings}
+    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known)]
+    return largest_first(limits if further is None else [*limits, further])
 
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:
@@ -138,24 +139,24 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Seq
         "sizes_at_j": j,
         "effects": [size._asdict() for size in model_sizes(top, j, effects)],
         "limits": [asdict(limit) for limit in largest_first([*model_limits(top, j, effects), *further])],
-        "splitting_nuclei": [asdict(one) for one in splitting_nuclei(top)],
+        "splitting_nuclei": [asdict(splitting) for splitting in splitting_nuclei(top)],
     }
 
 
 def _of_constants(top: Top, j: int) -> list[Limit]:
     """The error of a geometry, and the distortion that rigid constants leave out."""
-    found, b = [], _largest(top)
+    limits, b = [], _largest(top)
     rigid = not any(name not in "ABC" for name in top.constants.values)
     of_geometry = top.molecule is not None and top.source == top.molecule.source
     if of_geometry and top.molecule is not None and top.molecule.uncertainty:
         relative = top.molecule.uncertainty
         text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
-        found.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
+        limits.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
     if top.scaling_error and not of_geometry:
         text = f"A, B, C are scaled from those of another isotopologue, good to about {100 * top.scaling_error:.2g} %"
-        found.append(Limit("error of the scaling", top.scaling_error * 2 * b * (j + 1), text))
+        limits.append(Limit("error of the scaling", top.scaling_error * 2 * b * (j + 1), text))
     if of_geometry and top.molecule is not None:
-        found += _zero_point(top.molecule, 2 * b * (j + 1))
+        limits += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":
         vibration_cm = VIBRATION_CM * (b / units.MHZ_PER_CM) ** VIBRATION_POWER
         d = 4 * b**3 / (vibration_cm * units.MHZ_PER_CM) ** 2
@@ -163,8 +164,8 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
             f"the constants are rigid; as with a vibration of {_rounded(vibration_cm, 2)} cm-1 a line of J = {j}, K = 0 is "
             "lower by so much"
         )
-        found.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
-    return found
+        limits.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
+    return limits
 
 
 def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
@@ -193,18 +194,20 @@ def _largest(top: Top) -> float:
 
 def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collection[str]) -> list[Limit]:
     """Couplings of nuclear spins that no effect of the calculation has; known: names of those that have a size already."""
-    found = []
+    limits = []
     if absent_sizes(top, effects):
         nuclei = splitting_nuclei(top)
-        size = max(one.splitting_mhz if one.known else abs(one.chi_mhz) for one in nuclei)
-        found.append(Limit(QUADRUPOLE, size, _split_text(nuclei)))
+        size = max(nucleus.splitting_mhz if nucleus.known else abs(nucleus.chi_mhz) for nucleus in nuclei)
+        limits.append(Limit(QUADRUPOLE, size, _split_text(nuclei)))
     if top.molecule is None:
-        return found
-    magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0} - _with_magnetic_constants(top))
+        return limits
+    magnetic = sorted(
+        {nucleus.label for nucleus in top.molecule.nuclei if nucleus.spin > 0} - _with_magnetic_constants(top)
+    )
     elsewhere = top.spin_constants is None and {"spin-rotation", "spin-spin"} & set(known)
     if magnetic and not elsewhere:
-        found.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
-    return found
+        limits.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
+    return limits
 
 
 def _with_magnetic_constants(top: Top) -> set[str]:
@@ -216,8 +219,10 @@ def _with_magnetic_constants(top: Top) -> set[str]:
 
 def _split_text(nuclei: Sequence[Splitting]) -> str:
     """Which nuclei split lines, by how much where it is known, and what to do."""
-    known = [f"{one.nucleus} splits J = 1 by {one.splitting_mhz:.3g} MHz" for one in nuclei if one.known]
-    others = sorted({one.nucleus for one in nuclei if not one.known})
+    known = [
+        f"{nucleus.nucleus} splits J = 1 by {nucleus.splitting_mhz:.3g} MHz" for nucleus in nuclei if nucleus.known
+    ]
+    others = sorted({nucleus.nucleus for nucleus in nuclei if not nucleus.known})
     texts = [f"{', '.join(known)}: {COMPUTE}"] if known else []
     if others:
         texts.append(
@@ -232,16 +237,16 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
     from rotor.molecules.bonds import bonded_atoms
     from rotor.quantum.estimates.methyl_groups import methyl_groups
 
-    found, bonds = [], bonded_atoms(molecule)
+    limits, bonds = [], bonded_atoms(molecule)
     if "internal rotation" not in present and (groups := methyl_groups(molecule, bonds)):
-        found.append(_internal_rotation(top, groups, j))
+        limits.append(_internal_rotation(top, groups, j))
     if (nitrogens := _pyramidal_nitrogens(molecule, bonds)) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
-        found.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
-    electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
+        limits.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
+    electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
-        found.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, _MULTIPLETS))
-    return found
+        limits.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, _MULTIPLETS))
+    return limits
 
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
@@ -249,11 +254,11 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
     from rotor.quantum.estimates.internal_rotation import line_shifts
 
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
-    unknown = [one.rotor.f_mhz for one in groups if one.barrier is None]
+    unknown = [group.rotor.f_mhz for group in groups if group.barrier is None]
     if unknown:
         text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
         return Limit("internal rotation", max(unknown), text, at_most=True)
-    least = min(groups, key=lambda one: one.rotor.barrier_mhz / one.rotor.f_mhz)
+    least = min(groups, key=lambda group: group.rotor.barrier_mhz / group.rotor.f_mhz)
     here = min(j, HIGHEST_J)
     shifts = line_shifts(top.rotational_constants_mhz, least.rotor, here)
     return Limit("internal rotation", *_rotor_text(top, what, least, shifts, here))
@@ -294,12 +299,12 @@ def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> list[Ints
     """The neighbours of nitrogens that have three, two of them hydrogens, and are not flat."""
     from rotor.quantum.estimates.methyl_groups import is_flat
 
-    found, x = [], molecule.positions_angstrom
+    pyramidal, x = [], molecule.positions_angstrom
     for atom, near in enumerate(bonds):
         hydrogens = sum(molecule.symbols[i] == "H" for i in near.tolist())
         if molecule.symbols[atom] == "N" and len(near) == 3 and hydrogens >= 2 and not is_flat(x, atom, near):
-            found.append(near)
-    return found
+            pyramidal.append(near)
+    return pyramidal
 
 
 def _inversion_mhz(molecule: Molecule, near: Ints) -> float:

@@ -62,15 +62,15 @@ class MethylGroup:
 def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup]:
     """CH3 and CD3 whose turning is not that of the whole: other atoms lie off their axis. Three unlike hydrogens are left out."""
     x, mass = molecule.positions_angstrom, molecule.masses_u
-    found: list[tuple[int, list[int], Floats]] = []
+    groups: list[tuple[int, list[int], Floats]] = []
     for carbon, near in enumerate(bonds):
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
         if molecule.symbols[carbon] != "C" or len(hydrogens) != 3 or np.ptp(mass[hydrogens]):
             continue
         axis = x[carbon] - x[hydrogens].mean(axis=0)
         if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
-            found.append((carbon, hydrogens, axis / np.linalg.norm(axis)))
-    return _with_moments(molecule, bonds, found) if found else []
+            groups.append((carbon, hydrogens, axis / np.linalg.norm(axis)))
+    return _with_moments(molecule, bonds, groups) if groups else []
 
 
 def _with_moments(
@@ -84,11 +84,13 @@ def _with_moments(
     for carbon, hydrogens, axis in groups:
         off = x[hydrogens] - x[hydrogens].mean(axis=0)
         off -= np.outer(off @ axis, axis)
-        own = float(mass[hydrogens] @ np.sum(off**2, axis=1))
+        top_moment = float(mass[hydrogens] @ np.sum(off**2, axis=1))
         barrier = barrier_beside(molecule, bonds, carbon)
         height = 0.0 if barrier is None else barrier.v3_cm * MHZ_PER_CM
         made.append(
-            MethylGroup(rotor_of_moments(own, frame.axes @ axis, frame.moments, height), barrier, tuple(hydrogens))
+            MethylGroup(
+                rotor_of_moments(top_moment, frame.axes @ axis, frame.moments, height), barrier, tuple(hydrogens)
+            )
         )
     return made
 

@@ -62,7 +62,7 @@ def _names(spins: Sequence[Any]) -> str:
 def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
     from rotor.quantum.effect import effect_sizes
 
-    return tuple(f"{one.name}, {one.size_mhz:.2g} MHz at J = {j}" for one in effect_sizes(top, j, effects))
+    return tuple(f"{effect.name}, {effect.size_mhz:.2g} MHz at J = {j}" for effect in effect_sizes(top, j, effects))
 
 
 def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:

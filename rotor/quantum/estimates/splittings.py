@@ -85,7 +85,7 @@ def line_components(twice_spin: int, j_upper: int, j_lower: int, k: int) -> tupl
     f, g, spin = twice_f / 2, twice_g / 2, twice_spin / 2
     parts = (twice_f + 1) * (twice_g + 1) * six_j(j_upper, f, spin, g, j_lower, 1) ** 2
     energies = [
-        np.array([_first_order(twice_spin, j, k, one) for one in numbers])
+        np.array([_first_order(twice_spin, j, k, number) for number in numbers])
         for j, numbers in ((j_upper, twice_f), (j_lower, twice_g))
     ]
     return energies[0] - energies[1], parts / parts.sum()
@@ -116,34 +116,34 @@ def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | N
         0 to 1.
     """
     left = 1.0
-    every = range(min(numbers) + 1) if k is None else (k,)
-    for one in nuclei:
+    k_values = range(min(numbers) + 1) if k is None else (k,)
+    for nucleus in nuclei:
         shares = []
-        for number in every:
-            shifts, parts = line_components(round(2 * one.spin), *numbers, number)
-            shares.append(float(parts @ np.exp(-4 * math.log(2) * (one.chi_mhz * shifts / fwhm_mhz) ** 2)))
+        for number in k_values:
+            shifts, parts = line_components(round(2 * nucleus.spin), *numbers, number)
+            shares.append(float(parts @ np.exp(-4 * math.log(2) * (nucleus.chi_mhz * shifts / fwhm_mhz) ** 2)))
         left *= sum(shares) / len(shares)
     return 1.0 - left
 
 
 def splitting_nuclei(top: Top) -> list[Splitting]:
     """Every nucleus of spin 1 or more whose coupling is known or can be estimated, the largest splitting first."""
-    found, known = [], set()
+    splittings, known = [], set()
     if top.spin_constants is not None:
         for spin, twice in top.spin_constants.twice.items():
             chi = {name: value for name, value in top.spin_constants.of(spin).items() if _of_tensor(name)}
             if chi and twice > 1:
                 diagonal = np.diag(chi_tensor(chi))
-                found.append(_splitting(spin, twice, float(diagonal[np.abs(diagonal).argmax()]), True))
+                splittings.append(_splitting(spin, twice, float(diagonal[np.abs(diagonal).argmax()]), True))
                 known.add(top.spin_constants.atoms.get(spin))
     if top.molecule is not None:
         labels: dict[str, Splitting] = {}
-        for atom, one in enumerate(top.molecule.nuclei, start=1):
-            if one.spin >= 1 and one.quadrupole_barn and atom not in known:
-                chi_mhz = GRADIENT_MHZ_PER_BARN * GRADIENTS.get(one.symbol, 1.0) * one.quadrupole_barn
-                labels.setdefault(one.label, _splitting(one.label, round(2 * one.spin), chi_mhz, False))
-        found += labels.values()
-    return sorted(found, key=lambda one: -one.splitting_mhz)
+        for atom, nucleus in enumerate(top.molecule.nuclei, start=1):
+            if nucleus.spin >= 1 and nucleus.quadrupole_barn and atom not in known:
+                chi_mhz = GRADIENT_MHZ_PER_BARN * GRADIENTS.get(nucleus.symbol, 1.0) * nucleus.quadrupole_barn
+                labels.setdefault(nucleus.label, _splitting(nucleus.label, round(2 * nucleus.spin), chi_mhz, False))
+        splittings += labels.values()
+    return sorted(splittings, key=lambda splitting: -splitting.splitting_mhz)
 
 
 def _of_tensor(name: str) -> bool:

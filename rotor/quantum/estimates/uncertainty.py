@@ -65,26 +65,28 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
     if top.level_table is not None:
         return None
     if top.covariance is None:
-        found = Covariance.of_uncertainties(top.constants) if top.independent_errors else None
+        covariance = Covariance.of_uncertainties(top.constants) if top.independent_errors else None
     else:
-        found = top.covariance.of(parameters)
+        covariance = top.covariance.of(parameters)
     spins = top.spin_constants.uncertainties if top.spin_constants else {}
-    if found is None:
+    if covariance is None:
         return None
-    alone = {name: error for name, error in spins.items() if error and name in parameters and name not in found.names}
-    return found.beside(alone) if alone else found
+    alone = {
+        name: error for name, error in spins.items() if error and name in parameters and name not in covariance.names
+    }
+    return covariance.beside(alone) if alone else covariance
 
 
-def source_of_errors(top: Top, parameters: Collection[str], given: Covariance | None) -> str | None:
+def source_of_errors(top: Top, parameters: Collection[str], covariance: Covariance | None) -> str | None:
     """Which uncertainties the errors of frequencies come from, in words, None where there are none; given: in place of what the top has."""
-    if given is None and top.level_table is not None:
+    if covariance is None and top.level_table is not None:
         unknown = top.level_table.own_error_mhz is None
         return "none: the energies are from a table" if unknown else "the table of energies"
-    used = given or known_covariance(top, parameters)
+    used = covariance or known_covariance(top, parameters)
     if used is None:
         known = top.constants.uncertainties and top.covariance is None
         return "none: the constants are from a fit whose correlations are not known" if known else None
-    together = given or (top.covariance.of(parameters) if top.covariance else None)
+    together = covariance or (top.covariance.of(parameters) if top.covariance else None)
     alone = [name for name in used.names if together is None or name not in together.names]
     texts = [f"covariance of {', '.join(together.names)}"] if together else []
     texts += [f"uncertainties of {', '.join(alone)}, uncorrelated"] if alone else []

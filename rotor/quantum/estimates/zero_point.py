@@ -63,12 +63,12 @@ def relative_difference(molecule: Molecule, bonds: Sequence[Ints]) -> float:
     if not pairs:
         return 0.0
     if len(molecule.symbols) > LARGE:
-        heavy = [one for one in pairs if "H" not in (molecule.symbols[one[0]], molecule.symbols[one[1]])] or pairs
+        heavy = [pair for pair in pairs if "H" not in (molecule.symbols[pair[0]], molecule.symbols[pair[1]])] or pairs
         return 2 * float(np.mean(list(_elongations(molecule, heavy[:: 1 + len(heavy) // MANY_BONDS]).values())))
     longer = _elongations(molecule, pairs)
     x, mass = molecule.positions_angstrom, molecule.masses_u
     moved = x + _STEP * _displacement(x, bonds, longer)
-    before, after = (principal_frame(point_masses(mass, one)).moments for one in (x, moved))
+    before, after = (principal_frame(point_masses(mass, positions)).moments for positions in (x, moved))
     turning = before > LINEAR_BELOW * before.max()
     return float(np.sqrt(np.mean(((after[turning] / before[turning] - 1) / _STEP) ** 2)))
 
@@ -76,7 +76,7 @@ def relative_difference(molecule: Molecule, bonds: Sequence[Ints]) -> float:
 def _elongations(molecule: Molecule, pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, int], float]:
     """δr/r of bonds, by their atoms in rising order."""
     x, mass = molecule.positions_angstrom, molecule.masses_u
-    charges = np.array([float(one.element_number) for one in molecule.nuclei])
+    charges = np.array([float(nucleus.element_number) for nucleus in molecule.nuclei])
     return {
         (i, k): relative_elongation(charges[[i, k]], mass[[i, k]], float(np.linalg.norm(x[i] - x[k]))) for i, k in pairs
     }
@@ -99,5 +99,5 @@ def _displacement(x: Floats, bonds: Sequence[Ints], longer: dict[tuple[int, int]
         length = float(np.linalg.norm(apart))
         matrix[row, i], matrix[row, k] = apart / length, -apart / length
         target[row] = relative * length
-    found = np.linalg.lstsq(matrix.reshape(len(target), -1), target, rcond=1e-9)[0]
-    return np.asarray(found.reshape(x.shape))
+    displacement = np.linalg.lstsq(matrix.reshape(len(target), -1), target, rcond=1e-9)[0]
+    return np.asarray(displacement.reshape(x.shape))

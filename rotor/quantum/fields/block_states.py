@@ -118,15 +118,15 @@ def enough_states(
         The lowest states in them at the strongest field, as of `solve_fields`, where they were solved.
     """
     size = max(FIRST_BASIS, 2 * count)
-    every = np.sort(order)
+    rising = np.sort(order)
     if len(order) <= max(size, 2 * DENSE):
-        return every, None
+        return rising, None
     strongest = fields[np.argmax(np.abs(fields))][None]
-    whole = problem.over(every)
+    whole = problem.over(rising)
     while size < len(order):
-        basis = np.searchsorted(every, np.sort(order[:size]))
+        basis = np.searchsorted(rising, np.sort(order[:size]))
         states = solve_fields(whole.terms(basis), strongest, count)
         if left_out_mhz(whole, basis, *states[:2], strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
-            return every[basis], states
+            return rising[basis], states
         size = int(1.4 * size) + 1
-    return every, None
+    return rising, None

@@ -37,9 +37,9 @@ TOGETHER = 1 << 19  # numbers of a sweep held at once where several chains are s
 
 def is_chain(terms: tuple[NDArray[np.generic], ...]) -> bool:
     """Whether matrices are real and have no elements beyond the diagonals beside the main one."""
-    if len(terms[0]) < 3 or any(np.iscomplexobj(one) for one in terms):
+    if len(terms[0]) < 3 or any(np.iscomplexobj(term) for term in terms):
         return False
-    return not any(np.triu(one, 2).any() for one in terms)
+    return not any(np.triu(term, 2).any() for term in terms)
 
 
 def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, Floats]] | None:
@@ -49,8 +49,8 @@ def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, 
     """
     size = max(len(terms[0]) for terms, _ in chains)
     if len(chains) > 1 and size * len(fields) * sum(count for _, count in chains) > TOGETHER:
-        each = [chain_states([one], fields) for one in chains]
-        return None if any(one is None for one in each) else [one[0] for one in each if one is not None]
+        each = [chain_states([chain], fields) for chain in chains]
+        return None if any(states is None for states in each) else [states[0] for states in each if states is not None]
     padded, scale = _padded([terms for terms, _ in chains], size, float(np.abs(fields).max()))
     counts = [count for _, count in chains]
     of, rank = np.repeat(np.arange(len(chains)), counts), np.concatenate([np.arange(count) for count in counts])
@@ -58,7 +58,7 @@ def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, 
     powers = fields[:, None] ** np.arange(padded.shape[1])
     main = np.diagonal(padded, 0, 2, 3).transpose(2, 1, 0)[..., of]  # (n, powers, states)
     beside = np.diagonal(padded, 1, 2, 3).transpose(2, 1, 0)[..., of]
-    main, beside = (np.matmul(powers, one) for one in (main, beside))  # (n, fields, states)
+    main, beside = (np.matmul(powers, chain) for chain in (main, beside))  # (n, fields, states)
     vectors = _swept(main, beside, energies, rank, gaps, scale)
     return None if vectors is None else _apart(chains, energies, vectors)
 
@@ -75,13 +75,13 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
     for sweep in range(SWEEPS):
         moved = flat[moving] - OFF_ZERO * scale
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            of_moving = tuple(one[:, moving] for one in bands) if sweep else bands
-            found, change, below = twisted(of_moving[0], of_moving[1], moved)
+            of_moving = tuple(band[:, moving] for band in bands) if sweep else bands
+            turned, change, below = twisted(of_moving[0], of_moving[1], moved)
         flat[moving] = moved + change
         if sweep:
-            vectors[:, moving] = found
+            vectors[:, moving] = turned
         else:
-            vectors = found
+            vectors = turned
         still = np.abs(change - OFF_ZERO * scale) <= least[moving]
         if not ((below == ranks[moving]) | (below == ranks[moving] + 1) | ~still).all():
             return None
@@ -105,8 +105,8 @@ def _padded(chains: Sequence[tuple[Floats, ...]], size: int, strongest: float) -
     """H_n of all chains (chains, powers, size, size), and the largest element at the strongest field."""
     out = np.zeros((len(chains), max(map(len, chains)), size, size))
     for chain, terms in enumerate(chains):
-        for power, one in enumerate(terms):
-            out[chain, power, : len(one), : len(one)] = one
+        for power, term in enumerate(terms):
+            out[chain, power, : len(term), : len(term)] = term
     scale = float(sum(strongest**n * np.abs(out[:, n]).max() for n in range(out.shape[1])))
     for chain, terms in enumerate(chains):
         rest = np.arange(len(terms[0]), size)
@@ -119,12 +119,12 @@ def _between_anchors(padded: Floats, fields: Floats, of: Ints, rank: Ints) -> tu
     places = np.unique(((len(fields) - 1) * np.linspace(0, 1, ANCHORS) ** DENSER).astype(int))
     at, count = fields[places], int(rank.max()) + 1
     powers = at[:, None] ** np.arange(padded.shape[1])
-    values, every = np.linalg.eigh(np.einsum("fp,cpij->cfij", powers, padded))
-    slopes, bends = _derivatives(padded, at, values, every, count)
+    values, all_vectors = np.linalg.eigh(np.einsum("fp,cpij->cfij", powers, padded))
+    slopes, bends = _derivatives(padded, at, values, all_vectors, count)
     gaps = np.diff(values[..., : count + 1], axis=2).min(axis=1)  # (chains, count) to the next state above
     gaps = np.minimum(gaps, np.concatenate([gaps[:, :1], gaps[:, : gaps.shape[1] - 1]], axis=1)[:, : gaps.shape[1]])
     gaps = np.concatenate([gaps, gaps[:, -1:]], axis=1)[:, :count]
-    heights, rises, curves = (one[of, :, rank].T for one in (values, slopes, bends))
+    heights, rises, curves = (table[of, :, rank].T for table in (values, slopes, bends))
     return _joined(at, heights, rises, curves, fields), gaps[of, rank]
 
 

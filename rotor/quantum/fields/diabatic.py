@@ -83,14 +83,14 @@ def _resolved(solve: Solve, fields: Floats, gap_mhz: float) -> tuple[Floats, Flo
         middle = (x[where] + x[where + 1]) / 2
         step = (x[where + 1] - x[where])[:, None]
         predicted = (energies[where] + energies[where + 1]) / 2 + step * (slopes[where] - slopes[where + 1]) / 8
-        found, found_slopes = solve(middle)
-        wrong = (np.abs(predicted - found) > PREDICTED * gap_mhz).any(axis=1)
+        solved, found_slopes = solve(middle)
+        wrong = (np.abs(predicted - solved) > PREDICTED * gap_mhz).any(axis=1)
         order = np.argsort(np.concatenate([x, middle]), kind="stable")
         is_new = np.zeros(len(x) - 1, dtype=bool)
         is_new[where[wrong]] = True
         fresh = np.repeat(is_new, np.where(np.isin(np.arange(len(x) - 1), where), 2, 1))
         x = np.concatenate([x, middle])[order]
-        energies, slopes = np.concatenate([energies, found])[order], np.concatenate([slopes, found_slopes])[order]
+        energies, slopes = np.concatenate([energies, solved])[order], np.concatenate([slopes, found_slopes])[order]
     return x, energies, slopes
 
 
@@ -111,5 +111,5 @@ def _closest(solve: Solve, first: float, last: float, lower: int) -> tuple[float
         energies = solve(np.array([x]))[0][0]
         return float(energies[lower + 1] - energies[lower])
 
-    found = minimize_scalar(gap, bounds=(first, last), method="bounded", options={"xatol": 1e-6 * (last - first)})
-    return float(found.x), float(found.fun)
+    minimum = minimize_scalar(gap, bounds=(first, last), method="bounded", options={"xatol": 1e-6 * (last - first)})
+    return float(minimum.x), float(minimum.fun)

@@ -332,19 +332,21 @@ def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
-def _measured(request: MapRequest, jmax: int, problem: BlockProblem, found: BlockStates) -> _Solved:
+def _measured(request: MapRequest, jmax: int, problem: BlockProblem, states: BlockStates) -> _Solved:
     """Slopes, cosines and leakage of the states of a block."""
-    block, fields, vectors = found.block, request.fields, found.vectors
-    slopes = -derivatives(problem.terms(found.places), fields, vectors)
-    cosines = {name: expectation(over(made(), found.places), vectors) for name, made in problem.observables.items()}
-    edge = (np.abs(vectors[:, block.j[found.places] > jmax - EDGE]) ** 2).sum(axis=1)
-    return _Solved(found.energies, slopes, edge, cosines, found.rows, block, found.error, _round_off(problem, fields))
+    block, fields, vectors = states.block, request.fields, states.vectors
+    slopes = -derivatives(problem.terms(states.places), fields, vectors)
+    cosines = {name: expectation(over(made(), states.places), vectors) for name, made in problem.observables.items()}
+    edge = (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1)
+    return _Solved(
+        states.energies, slopes, edge, cosines, states.rows, block, states.error, _round_off(problem, fields)
+    )
 
 
 def _round_off(problem: BlockProblem, fields: Floats) -> float:
     """Of eigenvalues at any field: LAPACK's are those of a matrix that is off by a few last places of |H|, and move by no more."""
     strongest = float(np.abs(fields).max())
-    norms = [strongest**n * np.abs(one).sum(axis=1).max() for n, one in enumerate(problem.coefficients)]
+    norms = [strongest**n * np.abs(coefficient).sum(axis=1).max() for n, coefficient in enumerate(problem.coefficients)]
     return ROUND_OFF * float(sum(norms))
 
 
@@ -355,40 +357,40 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
     else:
         solved = each_block(request, jmax, partial(_solve_block, request, jmax), executor)
     fields, rows, numbers = request.fields, [], []
-    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, jmax, one) for one in solved]
-    for number, (one, names) in enumerate(zip(solved, named, strict=True)):
-        ours = one.block.levels.j[one.rows] <= request.j_highest
+    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, jmax, each) for each in solved]
+    for number, (each, names) in enumerate(zip(solved, named, strict=True)):
+        ours = each.block.levels.j[each.rows] <= request.j_highest
         listed = ours if names is None else ours | ours[names].any(axis=0)
         ranks = np.flatnonzero(listed).tolist()
-        rows += [(one, rank) for rank in ranks]
+        rows += [(each, rank) for rank in ranks]
         numbers += [number] * len(ranks)
 
     def column(pick: Callable[[_Solved, int], Floats]) -> Floats:
-        return np.concatenate([pick(one, rank) for one, rank in rows])
+        return np.concatenate([pick(each, rank) for each, rank in rows])
 
     def repeated(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
-        return np.repeat([pick(one, rank) for one, rank in rows], len(fields))
+        return np.repeat([pick(each, rank) for each, rank in rows], len(fields))
 
     cosines = list(solved[0].cosines) if solved else []
     return FieldMap(
         field_name=request.field_name,
         slope_name=request.slope_name,
         field=np.tile(fields, len(rows)),
-        m=repeated(lambda one, rank: one.block.m),
-        block=repeated(lambda one, rank: one.block.label),
-        rank=repeated(lambda one, rank: rank),
-        energy_mhz=column(lambda one, rank: one.energies[:, rank]),
-        label=repeated(lambda one, rank: one.block.levels.label(int(one.rows[rank]))),
-        slope=column(lambda one, rank: one.slopes[:, rank]) / request.slope_unit_mhz,
+        m=repeated(lambda each, rank: each.block.m),
+        block=repeated(lambda each, rank: each.block.label),
+        rank=repeated(lambda each, rank: rank),
+        energy_mhz=column(lambda each, rank: each.energies[:, rank]),
+        label=repeated(lambda each, rank: each.block.levels.label(int(each.rows[rank]))),
+        slope=column(lambda each, rank: each.slopes[:, rank]) / request.slope_unit_mhz,
         cosines={name: column(partial(_cosine, name)) for name in cosines},
-        edge_population=column(lambda one, rank: one.edge[:, rank]),
-        copies=repeated(lambda one, rank: one.block.copies),
-        free_row=repeated(lambda one, rank: one.rows[rank]),
-        free_mhz=repeated(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
-        weight=repeated(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
+        edge_population=column(lambda each, rank: each.edge[:, rank]),
+        copies=repeated(lambda each, rank: each.block.copies),
+        free_row=repeated(lambda each, rank: each.rows[rank]),
+        free_mhz=repeated(lambda each, rank: each.block.levels.energy_mhz[each.rows[rank]]),
+        weight=repeated(lambda each, rank: each.block.levels.weight[each.rows[rank]]),
         jmax=jmax,
         truncation_mhz=column(partial(_truncation, request)),
-        round_off_mhz=repeated(lambda one, rank: one.round_off),
+        round_off_mhz=repeated(lambda each, rank: each.round_off),
         block_number=np.repeat(np.array(numbers, dtype=np.int64), len(fields)),
         request=request,
         diabatic_label=_diabatic_labels(solved, named, rows),
@@ -401,17 +403,20 @@ def _truncation(request: MapRequest, solved: _Solved, rank: int) -> Floats:
     return solved.error[:, rank] if is_followed else np.full(len(solved.error), np.nan)
 
 
-def _cosine(name: str, one: _Solved, rank: int) -> Floats:
-    return one.cosines[name][:, rank]
+def _cosine(name: str, block: _Solved, rank: int) -> Floats:
+    return block.cosines[name][:, rank]
 
 
-def _diabatic_ranks(request: MapRequest, jmax: int, one: _Solved) -> Ints:
+def _diabatic_ranks(request: MapRequest, jmax: int, states_of_block: _Solved) -> Ints:
     """Whose name each state of a block has at each field, (fields, states)."""
     from rotor.quantum.fields.diabatic import diabatic_ranks
 
-    count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
+    count, gap = states_of_block.energies.shape[1], request.diabatic_gap_mhz or 0.0
     return diabatic_ranks(
-        partial(_energies_and_slopes, _small(request, jmax, one.block, count), count), request.fields, count, gap
+        partial(_energies_and_slopes, _small(request, jmax, states_of_block.block, count), count),
+        request.fields,
+        count,
+        gap,
     )
 
 
@@ -421,10 +426,10 @@ def _diabatic_labels(
     if not rows or named[0] is None:
         return None
     of_block = {}
-    for one, names in zip(solved, named, strict=True):
-        labels = np.array([one.block.levels.label(int(row)) for row in one.rows])
-        of_block[id(one)] = labels[names]
-    return np.concatenate([of_block[id(one)][:, rank] for one, rank in rows])
+    for each, names in zip(solved, named, strict=True):
+        labels = np.array([each.block.levels.label(int(row)) for row in each.rows])
+        of_block[id(each)] = labels[names]
+    return np.concatenate([of_block[id(each)][:, rank] for each, rank in rows])
 
 
 def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Terms:
@@ -437,7 +442,7 @@ def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Ter
         return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
     basis = spanning(terms, fields, count, request.tolerance_mhz)
-    return terms if basis is None else tuple(basis.conj().T @ one @ basis for one in terms)
+    return terms if basis is None else tuple(basis.conj().T @ term @ basis for term in terms)
 
 
 def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floats, Floats]:

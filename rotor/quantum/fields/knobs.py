@@ -13,9 +13,9 @@ TOLERANCES_MHZ = (1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, 1e-4, 1e-6)
 LEAST_MHZ = 1e-9
 
 
-def largest_difference(one: Any, other: Any) -> float:
+def largest_difference(first: Any, other: Any) -> float:
     """The largest difference of two arrays of one shape."""
-    return float(np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0))
+    return float(np.max(np.abs(np.asarray(first) - np.asarray(other)), initial=0.0))
 
 
 def _with_tolerance(request: Any, name: str, value: Any) -> Any:

@@ -34,7 +34,7 @@ class BlockProblem(NamedTuple):
 
     def terms(self, states: Ints) -> Terms:
         """The coefficients of H(x) over some of the states, which rise."""
-        return tuple(over(one, states) for one in self.coefficients)
+        return tuple(over(coefficient, states) for coefficient in self.coefficients)
 
     def over(self, states: Ints) -> BlockProblem:
         """The problem over some of the states, which rise; without observables."""

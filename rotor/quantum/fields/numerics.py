@@ -30,7 +30,7 @@ def sweeps_of_stark(request: Any) -> Sweeps:
     # energies alone decide on a basis that is to be seen failing
     plain = replace(request, diabatic_gap_mhz=None, most_at_edge=1.0)
     jmax = int(answer_stark(plain).states.jmax)
-    basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda one: (plain, int(one)))
+    basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda number: (plain, int(number)))
     beyond, energy = jmax + MORE_J, Measure("energy", "MHz", largest_difference)
     return Sweeps((Sweep("numerics.jmax", (energy,), basis, (plain, beyond), f"J max {beyond}", _energies),))
 
@@ -44,9 +44,9 @@ def sweeps_of_zeeman(request: Any) -> Sweeps:
     return Sweeps((Sweep("numerics.jmax", (ENERGY,), settings, beyond, f"J max {beyond.jmax}", answer_zeeman),))
 
 
-def _energies(asked: tuple[Any, int]) -> Any:
+def _energies(setting: tuple[Any, int]) -> Any:
     """Energies of all states of a map with one J max of the basis, however small: a map itself refuses one that is too small."""
-    request, jmax = asked
+    request, jmax = setting
     of_map = map_request(
         request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
         request.direction, request.tolerance_mhz, None, request.effects,
@@ -56,8 +56,8 @@ def _energies(asked: tuple[Any, int]) -> Any:
 
 
 def _of_block(request: Any, jmax: int, block: Any) -> Any:
-    found = block_states(request, block, request.fields, jmax)
-    return found.energies[:, block.levels.j[found.rows] <= request.j_highest]
+    states = block_states(request, block, request.fields, jmax)
+    return states.energies[:, block.levels.j[states.rows] <= request.j_highest]
 
 
 def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: dict[str, str]) -> Plan:
@@ -86,7 +86,7 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
         counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
         seconds=cost.seconds,
         memory_mb=cost.memory_mb,
-        left_out=tuple(one for one in described["left_out"] if one.name != words.get("within")),
+        left_out=tuple(part for part in described["left_out"] if part.name != words.get("within")),
     )
 
 

@@ -141,8 +141,8 @@ def _of_rotation(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) ->
     total: Floats | None = None
     for left in up.parts:
         for right in low.parts:
-            found = rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
-            if found is not None:
-                moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
+            elements = rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
+            if elements is not None:
+                moved = up.vectors[left.place].T @ elements @ low.vectors[right.place]
                 total = moved if total is None else total + moved
     return total

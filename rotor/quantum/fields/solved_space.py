@@ -85,7 +85,7 @@ class SolvedFieldBlock(FieldBlock):
     def signs(self) -> Ints:
         """(-1)^(F + c) of the states but for one sign (n,), by which v(-M) differs from v(M)* (see `rotor.quantum.in_field`)."""
         sectors = [self.space.sectors[i] for i in self.members]
-        odd = [(one.twice_f - sectors[0].twice_f) // 2 + c for one, c in zip(sectors, self.colours, strict=True)]
+        odd = [(sector.twice_f - sectors[0].twice_f) // 2 + c for sector, c in zip(sectors, self.colours, strict=True)]
         return np.repeat(np.where(np.array(odd) % 2, -1, 1), np.diff(self.starts))
 
     def matrix(self, operator: FieldOperator) -> NDArray[Any]:
@@ -238,7 +238,7 @@ def solved_space(
     if not set(BEFORE_J) & set(free.quanta):
         return space
     family = np.zeros(len(free), dtype=np.int64)
-    edges = [(up, low) for one in operators for up, lows in space.below(one).items() for low, _ in lows]
+    edges = [(up, low) for operator in operators for up, lows in space.below(operator).items() for low, _ in lows]
     for number, members in enumerate(connected_parts(len(sectors), edges)):
         for i in members:
             family[sectors[i].rows] = number
@@ -262,18 +262,20 @@ def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence
     axis = {"prolate": 0, "oblate": 2}.get(top.kind)
     if axis is None or not any(elements.paired):
         return
-    acting = [Contraction(one.g, np.eye(3)) if isinstance(one, Magnet) else one for one in operators]
-    if not all(one.axial_about(axis) for one in acting):
+    acting = [
+        Contraction(operator.g, np.eye(3)) if isinstance(operator, Magnet) else operator for operator in operators
+    ]
+    if not all(contraction.axial_about(axis) for contraction in acting):
         raise ValueError("a symmetric top with spins is solved with tensors that have its axis")
 
 
 def _refuse_unknown_nuclei(elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
-    asked = {name for one in operators if isinstance(one, Magnet) for name in one.nuclei}
-    if not asked:
+    nuclei = {name for operator in operators if isinstance(operator, Magnet) for name in operator.nuclei}
+    if not nuclei:
         return
     shared = getattr(elements.blocks[0], "shared", None)
     known = [] if shared is None else [spin.name for spin in shared.scheme.spins]
-    if unknown := sorted(asked - set(known)):
+    if unknown := sorted(nuclei - set(known)):
         raise ValueError(f"g of {', '.join(unknown)}: the spins of these effects are {', '.join(known) or 'none'}")
 
 

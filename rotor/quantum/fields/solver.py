@@ -31,15 +31,15 @@ DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below i
 
 def derivatives(terms: Terms, fields: Floats, vectors: Matrix) -> Floats:
     """dE/dx = Σ n x^(n-1) ⟨v|H_n|v⟩ (theorem of Hellmann and Feynman), (fields, states)."""
-    each = [n * fields[:, None] ** (n - 1) * expectation(one, vectors) for n, one in enumerate(terms[1:], 1)]
+    each = [n * fields[:, None] ** (n - 1) * expectation(term, vectors) for n, term in enumerate(terms[1:], 1)]
     return np.asarray(sum(each))
 
 
 def at_fields(terms: Terms, fields: Floats) -> Matrix:
     """H at fields (f, n, n)."""
     out = terms[0] + fields[:, None, None] * terms[1]
-    for power, one in enumerate(terms[2:], 2):
-        out += fields[:, None, None] ** power * one
+    for power, term in enumerate(terms[2:], 2):
+        out += fields[:, None, None] ** power * term
     return np.asarray(out)
 
 
@@ -144,10 +144,10 @@ def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float
     error : (f, count) array
         |residual|²/gap, MHz.
     """
-    found = _spanned(terms, fields, count, tolerance_mhz)
-    if found is None or found[1][2].max() > tolerance_mhz:  # dependent directions were left out
+    spanned = _spanned(terms, fields, count, tolerance_mhz)
+    if spanned is None or spanned[1][2].max() > tolerance_mhz:  # dependent directions were left out
         return _each(terms, fields, count)
-    return found[1]
+    return spanned[1]
 
 
 def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
@@ -173,8 +173,8 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
     (n, r) array or None
         Orthonormal columns; None where it would be as large as half of the matrix.
     """
-    found = _spanned(terms, fields, count, tolerance_mhz)
-    return None if found is None else found[0]
+    spanned = _spanned(terms, fields, count, tolerance_mhz)
+    return None if spanned is None else spanned[0]
 
 
 def _spanned(
@@ -187,7 +187,7 @@ def _spanned(
         basis = _orthonormal(np.concatenate(full, axis=1))
         if basis.shape[1] > len(terms[0]) // 2:
             return None
-        moved, ordered = tuple(one @ basis for one in terms), sorted(anchors)
+        moved, ordered = tuple(term @ basis for term in terms), sorted(anchors)
         middles = np.array([(i + k) // 2 for i, k in pairwise(ordered) if k > i + 1], dtype=np.int64)
         for places in (middles, np.arange(len(fields))) if len(middles) else (np.arange(len(fields)),):
             states = _in_basis(basis, moved, fields[places], count)
@@ -209,10 +209,10 @@ def _orthonormal(vectors: Matrix) -> Matrix:
 
 def _in_basis(basis: Matrix, moved: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
     """Energies, vectors and error estimates (fields, count) of the lowest states in a basis; moved: H_n times it."""
-    energies, inside = np.linalg.eigh(at_fields(tuple(basis.conj().T @ one for one in moved), fields))
+    energies, inside = np.linalg.eigh(at_fields(tuple(basis.conj().T @ term for term in moved), fields))
     gaps = np.maximum(energies[:, min(count + BUFFER, energies.shape[1]) - 1, None] - energies[:, :count], 1e-9)
     energies, inside = energies[:, :count], inside[:, :, :count]
     vectors = basis @ inside
-    acted = sum(fields[:, None, None] ** n * (one @ inside) for n, one in enumerate(moved))
+    acted = sum(fields[:, None, None] ** n * (term @ inside) for n, term in enumerate(moved))
     residual = acted - energies[:, None, :] * vectors
     return energies, vectors, (np.abs(residual) ** 2).sum(axis=1) / gaps

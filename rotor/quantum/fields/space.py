@@ -42,8 +42,8 @@ def field_space(
     ValueError
         For a spherical top, and for a field at an angle with Z beside spins or internal rotation.
     """
-    if not all(isinstance(one, Magnet) or one.along_z for one in operators):
-        contractions = [one for one in operators if isinstance(one, Contraction)]
+    if not all(isinstance(operator, Magnet) or operator.along_z for operator in operators):
+        contractions = [operator for operator in operators if isinstance(operator, Contraction)]
         return tilted_space(top, jmax, contractions, effects)
     if top.kind == "spherical":
         raise ValueError(
@@ -51,8 +51,10 @@ def field_space(
             "or second order turns it"
         )
     axis = 2 if top.kind == "oblate" else 0
-    magnetic = any(isinstance(one, Magnet) for one in operators)
+    magnetic = any(isinstance(operator, Magnet) for operator in operators)
     axial = top.kind != "asymmetric" and not effects and top.states is None
-    if axial and all(isinstance(one, Magnet) or one.axial_about(axis) for one in operators):
-        return AxialSpace(axial_levels(top, jmax), jmax, axis, any(one.rank == 1 for one in operators), magnetic)
+    if axial and all(isinstance(operator, Magnet) or operator.axial_about(axis) for operator in operators):
+        return AxialSpace(
+            axial_levels(top, jmax), jmax, axis, any(operator.rank == 1 for operator in operators), magnetic
+        )
     return solved_space(top, solved_levels(top, jmax, effects), jmax, operators)

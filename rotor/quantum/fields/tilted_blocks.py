@@ -190,8 +190,12 @@ def elements_of_mixed(up: TiltedBlock, low: TiltedBlock, dipole: Contraction) ->
     out = []
     for axis in np.eye(3):
         matrix = np.zeros((len(up), len(low)))
-        for one, other, elements in space.between(replace(dipole, space=axis), members):
-            sides = [(one, other, elements)] if one == other else [(one, other, elements), (other, one, elements.T)]
+        for member, other, elements in space.between(replace(dipole, space=axis), members):
+            sides = (
+                [(member, other, elements)]
+                if member == other
+                else [(member, other, elements), (other, member, elements.T)]
+            )
             for left, right, values in sides:
                 if left in place[0] and right in place[1]:
                     row, column = place[0][left], place[1][right]

@@ -48,14 +48,14 @@ def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors:
     outside = np.ones(len(problem.fixed), dtype=bool)
     outside[places] = False
     rest = np.flatnonzero(outside)
-    couplings = [one[np.ix_(rest, places)] for one in problem.coefficients]
-    touched = np.flatnonzero(np.any([np.any(one, axis=1) for one in couplings], axis=0))
+    couplings = [coefficient[np.ix_(rest, places)] for coefficient in problem.coefficients]
+    touched = np.flatnonzero(np.any([np.any(coupling, axis=1) for coupling in couplings], axis=0))
     if not len(touched):
         return np.zeros(energies.shape)
-    within = [one[np.ix_(rest[touched], rest)] for one in problem.coefficients]
-    diagonals = [one[np.arange(len(touched)), touched].real for one in within]
-    radii = [np.abs(one).sum(axis=1) - np.abs(diagonal) for one, diagonal in zip(within, diagonals, strict=True)]
-    couplings = [one[touched] for one in couplings]
+    within = [coefficient[np.ix_(rest[touched], rest)] for coefficient in problem.coefficients]
+    diagonals = [matrix[np.arange(len(touched)), touched].real for matrix in within]
+    radii = [np.abs(matrix).sum(axis=1) - np.abs(diagonal) for matrix, diagonal in zip(within, diagonals, strict=True)]
+    couplings = [matrix[touched] for matrix in couplings]
     step = max(1, HELD // max(len(touched) * energies.shape[1], energies.shape[1] ** 2))
     parts = [
         _lowering(couplings, diagonals, radii, energies[part], vectors[part], fields[part])
@@ -76,7 +76,7 @@ def _lowering(
     powers = [fields**n for n in range(len(couplings))]
     lowest = np.transpose(powers) @ np.array(diagonals) - np.abs(np.transpose(powers)) @ np.array(radii)  # (f, t)
     distance = np.maximum(lowest[:, :, None] - energies[:, None, :], 0.0)  # (f, t, s)
-    coupled = np.array([x[:, None, None] * (one @ vectors) for x, one in zip(powers, couplings, strict=True)])
+    coupled = np.array([x[:, None, None] * (coupling @ vectors) for x, coupling in zip(powers, couplings, strict=True)])
     residual = np.abs(coupled.sum(axis=0)) ** 2
     total = residual.sum(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):

@@ -141,8 +141,8 @@ def _states_of_parity(energies: Floats, vectors: Floats) -> tuple[Floats, Floats
     even = np.column_stack([np.eye(size)[:, half], pairs + pairs[::-1]])
     halves = []
     for functions, sign in ((even, 1), (pairs - pairs[::-1], -1)):
-        found, states = np.linalg.eigh(functions.T @ matrix @ functions)
-        halves.append((found, functions @ states, np.full(len(found), sign)))
+        eigenvalues, states = np.linalg.eigh(functions.T @ matrix @ functions)
+        halves.append((eigenvalues, functions @ states, np.full(len(eigenvalues), sign)))
     joined, states, parity = (np.concatenate(piece, axis=-1) for piece in zip(*halves, strict=True))
     order = np.argsort(joined, kind="stable")
     return joined[order], states[:, order], parity[order]

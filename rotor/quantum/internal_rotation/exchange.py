@@ -95,11 +95,11 @@ class ExchangedTops(TorsionRotation):
         matrix = self._combined[0]
         pieces = []
         for i, values in enumerate(plain.values):
-            found = matrix.T @ csr_array((values, (plain.rows, plain.columns)), shape=(plain.count,) * 2) @ matrix
-            found = found.tocoo()
-            here = np.zeros((len(plain.values), found.nnz), dtype=plain.values.dtype)
-            here[i] = found.data
-            pieces.append((found.row.astype(np.int64), found.col.astype(np.int64), here))
+            reduced = matrix.T @ csr_array((values, (plain.rows, plain.columns)), shape=(plain.count,) * 2) @ matrix
+            reduced = reduced.tocoo()
+            here = np.zeros((len(plain.values), reduced.nnz), dtype=plain.values.dtype)
+            here[i] = reduced.data
+            pieces.append((reduced.row.astype(np.int64), reduced.col.astype(np.int64), here))
         rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
         return merged(plain.count, rows, columns, values)
 
@@ -116,9 +116,9 @@ def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None
 
     weights = np.ones(len(rows)) if factor is None else factor
     alone = rows == others
-    own = np.where(alone, 1.0, np.where(first > 0, 1.0, -weights) * math.sqrt(0.5))
+    entry = np.where(alone, 1.0, np.where(first > 0, 1.0, -weights) * math.sqrt(0.5))
     beside = np.where(alone, 0.0, np.where(first > 0, weights, 1.0) * math.sqrt(0.5))
-    entries = np.concatenate([own, beside]), (np.concatenate([rows, others]), np.concatenate([rows, rows]))
+    entries = np.concatenate([entry, beside]), (np.concatenate([rows, others]), np.concatenate([rows, rows]))
     return csr_array(entries, shape=(len(rows),) * 2)
 
 
@@ -140,7 +140,7 @@ class SpinCounts:
         """
         n, all_pairs, trace = self.states, math.prod(m * m for m in self.pairs), math.prod(self.pairs)
         d = [(n**3 + 2 * n) // 3, (n**3 - n) // 3]
-        first, second = (d[abs(one)] for one in sigma)
+        first, second = (d[abs(number)] for number in sigma)
         if sigma[0] != sigma[1]:
             return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))
         fermions = 3 * (n % 2 == 0) + sum(m % 2 == 0 for m in self.pairs)

@@ -47,15 +47,15 @@ def with_internal_rotation(top: Top, calculator: Any = None) -> Top:
     """
     group = _group_of(top, with_barrier=calculator is None)
     cosines = np.array(group.rotor.rho) * np.array(top.moments_u_angstrom2)  # λ_g I_α
-    own = float(np.linalg.norm(cosines))
-    direction = cosines / own
+    norm = float(np.linalg.norm(cosines))
+    direction = cosines / norm
     if abs(direction[2]) > IN_PLANE:
         raise ValueError(
             f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {direction[2]:.3g} out of the plane ab; give "
             "constants in the rho-axis frame (RAM)"
         )
     values = {
-        "F0": units.ROTATIONAL_MHZ_U_ANGSTROM2 / own,
+        "F0": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm,
         "delta": float(np.arctan2(direction[1], direction[0])),
     }
     if calculator is None:

@@ -203,7 +203,7 @@ def _of_whole_matrix(up: WangBlock, low: WangBlock, matrix: Complexes) -> Comple
 @lru_cache(maxsize=4096)
 def _places(up: WangBlock, low: WangBlock, q: int) -> tuple[tuple[Ints, Ints, Ints, Complexes], ...]:
     """Of k and of -k: where the elements of a band stand between two blocks, where in the band, and their factors."""
-    j, k, found = low.j, low.k, []
+    j, k, places = low.j, low.k, []
     turn = np.conj(phase(up)) * phase(low)
     for side in (1, -1):
         columns = np.flatnonzero(k > 0) if side < 0 else np.arange(low.size)
@@ -214,5 +214,5 @@ def _places(up: WangBlock, low: WangBlock, q: int) -> tuple[tuple[Ints, Ints, In
         chosen, goal = columns[inside], target[inside]
         back = np.where(goal == 0, 1.0, np.sqrt(0.5)) * np.where(goal < 0, up.sign, 1)
         if len(chosen):
-            found.append((place[inside], chosen, side * k[chosen] + j, turn * amplitude[inside] * back))
-    return tuple(found)
+            places.append((place[inside], chosen, side * k[chosen] + j, turn * amplitude[inside] * back))
+    return tuple(places)

@@ -147,7 +147,7 @@ def _linear(
         components=np.ones_like(j),
         weight=top.spin_weights.of_j(j),
         effects=effects,
-        blocks=tuple(_one_function(int(one), e, row) for row, (one, e) in enumerate(zip(j, energy, strict=True)))
+        blocks=tuple(_one_function(int(number), e, row) for row, (number, e) in enumerate(zip(j, energy, strict=True)))
         if in_blocks
         else (),
     )
@@ -216,16 +216,16 @@ def _symmetric_states(top: Top, effects: tuple[QuantumEffect, ...], model: Model
     def weighted(v: int) -> Top:
         return replace(top, spin_weights=weights.get(v) or top.spin_weights, symmetry_checked=False)
 
-    own = [_symmetric(weighted(v), effects, model.states[v], jmin, jmax) for v in numbers]
-    quanta = {"v": np.repeat(numbers, len(own[0]))}
-    quanta |= {name: np.concatenate([one.quanta[name] for one in own]) for name in ("j", "k")}
+    by_state = [_symmetric(weighted(v), effects, model.states[v], jmin, jmax) for v in numbers]
+    quanta = {"v": np.repeat(numbers, len(by_state[0]))}
+    quanta |= {name: np.concatenate([levels.quanta[name] for levels in by_state]) for name in ("j", "k")}
     order = np.lexsort((quanta["k"], quanta["v"], quanta["j"]))
 
     def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(one, name) for one in own])[order]
+        return np.concatenate([getattr(levels, name) for levels in by_state])[order]
 
     return replace(
-        own[0],
+        by_state[0],
         energy_mhz=joined("energy_mhz"),
         quanta={name: column[order] for name, column in quanta.items()},
         multiplicity=joined("multiplicity"),
@@ -246,10 +246,10 @@ def _in_wang_blocks(
     below_mhz: float = math.inf,
 ) -> Levels:
     representation = representation_of(top)
-    every = range(jmin, jmax + 1)
+    all_j = range(jmin, jmax + 1)
     pieces = [
         (operators, js, representation, vectors, limits, below_mhz)
-        for js in ([[j] for j in every] if executor else [every])
+        for js in ([[j] for j in all_j] if executor else [all_j])
     ]
     solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
     blocks = tuple(_placed(block for of_some_j in solved for block in of_some_j))
@@ -258,7 +258,8 @@ def _in_wang_blocks(
     sizes = [len(b.energies_mhz) for b in blocks]
     j = np.repeat([b.basis.j for b in blocks], sizes)
     ka, kc = (
-        np.concatenate([one[:size] for one, size in zip(of, sizes, strict=True)]) for of in zip(*labels, strict=True)
+        np.concatenate([column[:size] for column, size in zip(columns, sizes, strict=True)])
+        for columns in zip(*labels, strict=True)
     )
     quanta = {"j": j, "ka": ka, "kc": kc}
     return Levels(
@@ -298,8 +299,8 @@ def _solve(
     limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
     """The Wang blocks of some J solved: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
-    every = list(js)
-    of_each = zip(every, matrices_of(operators, every), strict=True)
+    all_j = list(js)
+    of_each = zip(all_j, matrices_of(operators, all_j), strict=True)
     pieces = [piece for j, of_j in of_each for piece in _blocks_of_j(operators, j, of_j, representation, limits)]
     if below_mhz < math.inf and not vectors:
         return [(block, lowest_energies(bands, below_mhz - scalar) + scalar, _NONE) for block, scalar, bands in pieces]

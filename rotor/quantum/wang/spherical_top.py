@@ -62,12 +62,12 @@ def tensor_eigenvalues(j: int, sign: int = 1) -> tuple[NDArray[np.str_], Floats]
     >>> irreps.tolist(), omega.round(9).tolist()
     (['E', 'F2'], [-36.0, 24.0])
     """
-    found = {"F1": _eigenvalues(_block(j, "A2")), "F2": _eigenvalues(_block(j, "B2"))}
-    found["A1"], found["E"] = _one_and_two_dimensional(j, "A1")
-    found["A2"], _ = _one_and_two_dimensional(j, "B1")
+    eigenvalues = {"F1": _eigenvalues(_block(j, "A2")), "F2": _eigenvalues(_block(j, "B2"))}
+    eigenvalues["A1"], eigenvalues["E"] = _one_and_two_dimensional(j, "A1")
+    eigenvalues["A2"], _ = _one_and_two_dimensional(j, "B1")
 
-    irreps = np.repeat(CUBIC_IRREPS, [len(found[irrep]) for irrep in CUBIC_IRREPS])
-    omega = np.concatenate([sign * np.sort(sign * found[irrep]) for irrep in CUBIC_IRREPS])
+    irreps = np.repeat(CUBIC_IRREPS, [len(eigenvalues[irrep]) for irrep in CUBIC_IRREPS])
+    omega = np.concatenate([sign * np.sort(sign * eigenvalues[irrep]) for irrep in CUBIC_IRREPS])
     return irreps, omega + scalar_energy(CUBIC_TENSOR, j)
 
 

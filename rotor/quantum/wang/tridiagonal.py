@@ -66,11 +66,11 @@ def vectors_of_values(
         meeting = np.abs(other, out=other)
         row, least = meeting.argmin(axis=0), meeting.min(axis=0)
         down, up = np.divide(off[:-1], below[1:], out=ratio[:-1]), np.divide(off[:-1], above[:-1], out=off[:-1])
-        found = _products(row, down, up, shifted, other)
-        lengths = np.sqrt(np.einsum("il,il->l", found, found))
+        vectors = _products(row, down, up, shifted, other)
+        lengths = np.sqrt(np.einsum("il,il->l", vectors, vectors))
         right = least <= _RESIDUAL * size * largest[matrix] * lengths
-        found /= lengths
-    return found if right.all() and np.isfinite(lengths).all() else None
+        vectors /= lengths
+    return vectors if right.all() and np.isfinite(lengths).all() else None
 
 
 def _pivots(shifted: Floats, squared: Floats, above: Floats, below: Floats) -> None:
@@ -85,13 +85,13 @@ def _pivots(shifted: Floats, squared: Floats, above: Floats, below: Floats) -> N
 
 def _products(row: Ints, down: Floats, up: Floats, lower: Floats, upper: Floats) -> Floats:
     """z (size, n), in place of `lower`: 1 in a row of its own, and from there the products of the negative ratios down and up."""
-    every = np.arange(len(row))
+    columns = np.arange(len(row))
     lower.fill(0.0)
     upper.fill(0.0)
-    lower[row, every] = upper[row, every] = 1.0
+    lower[row, columns] = upper[row, columns] = 1.0
     for i in range(1, len(lower)):
         lower[i] -= down[i - 1] * lower[i - 1]
         upper[-1 - i] -= up[-i] * upper[-i]
     lower += upper
-    lower[row, every] = 1.0
+    lower[row, columns] = 1.0
     return lower

@@ -16,7 +16,7 @@ def turned(diagonal: Floats, sizes: Sequence[int]) -> tuple[Ints, Ints]:
     return np.flatnonzero((turn > 0) & (turn < size - 1)), turn
 
 
-def order_beyond_the_turn(found: tuple[Ints, Ints], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
     """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
 
     Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
@@ -24,7 +24,7 @@ def order_beyond_the_turn(found: tuple[Ints, Ints], sizes: Sequence[int], energi
 
     Parameters
     ----------
-    found : (array, array)
+    turning : (array, array)
         What `turned` finds of the diagonals, with the sign with which they rise in a molecule.
     sizes : sequence of int
     energies : (blocks, size) array
@@ -32,7 +32,7 @@ def order_beyond_the_turn(found: tuple[Ints, Ints], sizes: Sequence[int], energi
     vectors : (blocks, size, size) array
         In columns.
     """
-    blocks, turn = found
+    blocks, turn = turning
     for b in blocks.tolist():
         n = sizes[b]
         share = vectors[b, :n, :n] ** 2

@@ -62,8 +62,8 @@ class JMatrix:
 def matrices_of(operators: Operators, js: Sequence[int]) -> Iterator[JMatrix]:
     """The matrix elements of each J, computed for some J together."""
     for first in range(0, len(js), J_AT_ONCE):
-        some = js[first : first + J_AT_ONCE]
-        for j, elements in zip(some, _elements(operators, some), strict=True):
+        chunk = js[first : first + J_AT_ONCE]
+        for j, elements in zip(chunk, _elements(operators, chunk), strict=True):
             yield JMatrix(operators, j, elements)
 
 
@@ -78,7 +78,7 @@ def _elements(operators: Operators, js: Sequence[int]) -> list[list[Floats]]:
     steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # what J₊ makes of |J K⟩; zero beyond K = J
     with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
         of_n = [_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
-    return [[own[row, : 2 * order + one + 1] for own in of_n] for row, one in enumerate(js)]
+    return [[elements_of_n[row, : 2 * order + number + 1] for elements_of_n in of_n] for row, number in enumerate(js)]
 
 
 def _of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
