@@ -112,6 +112,8 @@ class InternalRotationConstants:
     def _check_names(self) -> None:
         """ValueError for names that are none, that another frame has, and that are missing."""
         for name in self.values:
+            if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[3-9]", name):
+                raise ValueError(f"{name}: computed are molecules with one or two tops; leave the others locked")
             if not is_torsional(name):
                 known = ", ".join(("F", "rho", *BARRIERS, *NAMED))
                 raise ValueError(

@@ -21,9 +21,9 @@ commute as ½{ , }.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import lru_cache, reduce
 
 import numpy as np
 
@@ -99,7 +99,8 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
     return (_spelled(match, sigma),)
 
 
-def _named(sigma: int, axes: Axes) -> dict[str, Product]:
+@lru_cache(maxsize=8)
+def _named(sigma: int, axes: Axes) -> Mapping[str, Product]:
     a, b, c = axes.a, axes.b, axes.c
     plane = b @ b - c @ c
     p, p2 = p_alpha(sigma), p_alpha(sigma, 2)
