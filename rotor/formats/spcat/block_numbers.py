@@ -24,6 +24,7 @@ import numpy as np
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.hamiltonian.code_types import TURNS, axis_of
 from rotor.formats.spcat.hamiltonian.codes import Digits, split_code
 from rotor.formats.spcat.hamiltonian.series import is_constant
 from rotor.formats.spcat.hamiltonian.states import StateOptions
@@ -32,7 +33,6 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.levels import Levels
 
 _SPECIES = np.array([[0, 3], [1, 2]])  # by Ka odd, Kc odd; Bx and Bz change places in an oblate basis
-_OF_TYP = {0: 0, 1: 3, 2: 2, 3: 1}  # of TYP 20, 40 and 60 on
 
 
 class SubBlock(NamedTuple):
@@ -167,8 +167,7 @@ class _Reach(NamedTuple):
 
 def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
     low, high = sorted((d.v1, d.v2))
-    kind = d.typ // 20 if 20 <= d.typ < 80 else 0
-    species = _OF_TYP[kind]
+    species = int(_SPECIES[TURNS[axis_of(d.typ)]])
     if oblate:
         species = (0, 3, 2, 1)[species]
     if d.ff and (d.ff - 1) // 10 % 2:  # a sine of K

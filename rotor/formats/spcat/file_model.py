@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, with_their_spins
+from rotor.formats.spcat.hamiltonian.code_types import axis_of
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import (
@@ -27,7 +28,7 @@ from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
-from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
+from rotor.formats.spcat.hamiltonian.phases import Phases, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import EVERY_K, StateOptions, states_of
@@ -273,7 +274,7 @@ def allowed(
             own = states[low], states[high]
             why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins))
         if all(why):
-            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
+            reasons.append(line.left_out(why[0]))
             continue
         folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = basis_axes(oblate)

@@ -23,7 +23,7 @@ def with_their_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -
     for line in lines:
         why = _missing_spin(line, states)
         if why:
-            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why}")
+            reasons.append(line.left_out(why))
         else:
             usable.append(line)
     return usable, reasons
@@ -98,9 +98,8 @@ def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
     """A line with the factors that the program has for three equivalent spins."""
     touches = max(line.operator.spins, default=0) > spins - 3
     if touches and isinstance(line.operator.rotor, ByElements):
-        code = line.name.partition("#")[0]
         raise ValueError(
-            f"parameter {code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
+            f"parameter {line.code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
         )
     return line._replace(operator=halved_across(line.operator, axes)) if touches else line
 

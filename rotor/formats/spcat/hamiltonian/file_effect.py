@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
+from rotor.formats.spcat.hamiltonian.code_types import axis_of
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of
-from rotor.formats.spcat.hamiltonian.phases import axis_of, half_turned
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k
+from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.series import (
     Series,
+    coded_operator,
     is_constant,
     is_series,
     refuse_within_pairs,
     series_of,
     symmetry_type,
-    term_of,
 )
 from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
@@ -60,6 +61,15 @@ class CodedLine(NamedTuple):
     reversed_: bool = False
     typ: int = 0
     exchange: int = 0
+
+    @property
+    def code(self) -> str:
+        """The code in the file."""
+        return self.name.partition("#")[0]
+
+    def left_out(self, why: str) -> str:
+        """The note of a line that does not act, as in SPCAT."""
+        return f"parameter {self.code} is left out, as SPCAT does: {why}"
 
 
 def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) -> list[CodedLine]:
@@ -100,12 +110,8 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
         label = f" /{parameter.label}" if parameter.label else ""
         try:
             own = None if low == wild else (low, high)
-            lines = (
-                _of_series(digits, own, states, series, options)
-                if is_series(digits)
-                else [_plain_line(digits, own, options)]
-            )
-            lines = [_within_pairs(line, digits, pairs, options) for line in lines]
+            coded = _lines_of(digits, own, states, series, options)
+            lines = [_within_pairs(line, digits, pairs, options) for line in coded]
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
         found += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
@@ -124,19 +130,15 @@ def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
     return reasons
 
 
-def _plain_line(digits: Digits, states: tuple[int, int] | None, options: Options) -> CodedLine:
-    operator = operator_of(digits, basis_axes(options.nvib < 0))
-    return CodedLine("", 0.0, operator, states, digits.v2 > digits.v1, digits.typ)
-
-
-def _of_series(
+def _lines_of(
     digits: Digits, states: tuple[int, int] | None, count: int, series: Series, options: Options
 ) -> list[CodedLine]:
-    """A term of a series: of every state one with the constants of each."""
+    """The lines of a code: of a series in every state one for each state, with the constants of each."""
     oblate = options.nvib < 0
     typ, axes = symmetry_type(digits, oblate), basis_axes(oblate)
-    every = [states] if states else [(v, v) for v in range(count)]
-    return [CodedLine("", 0.0, term_of(digits, axes, series, own), own, digits.v2 > digits.v1, typ) for own in every]
+    every = [(v, v) for v in range(count)] if states is None and is_series(digits) else [states]
+    back = digits.v2 > digits.v1
+    return [CodedLine("", 0.0, coded_operator(digits, axes, series, own), own, back, typ) for own in every]
 
 
 def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], options: Options) -> CodedLine:
@@ -197,20 +199,17 @@ def real_ones(
     for line in lines:
         axis, between = axis_of(line.typ), bool(line.states and line.states[0] != line.states[1])
         own = not between and not (line.states and line.states[0] in doubled)
-        code = line.name.partition("#")[0]
         if own and not axis and line.operator.odd:
             raise ValueError(
-                f"parameter {code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
+                f"parameter {line.code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
                 "different states only"
             )
         if not own or not axis or line.operator.odd == (axis in odd):
             found.append(line)
             continue
         kind, others = ("even", "odd") if axis in odd else ("odd", "even")
-        reasons.append(
-            f"parameter {code} is left out, as SPCAT does: it is {kind} under time reversal; within one state those along {axis} are "
-            f"{others} ones here (by their number, or by PHASE of XOPT)"
-        )
+        why = f"it is {kind} under time reversal; within one state those along {axis} are {others} ones here"
+        reasons.append(line.left_out(f"{why} (by their number, or by PHASE of XOPT)"))
     return found, list(dict.fromkeys(reasons))
 
 
@@ -327,7 +326,7 @@ class FileEffect(QuantumEffect):
         try:
             return couplings_with_pairs(line.name, of, operator.odd, states, line.reversed_, self.pairs)
         except ValueError as error:
-            raise ValueError(f"parameter {line.name.partition('#')[0]}: {error}") from None
+            raise ValueError(f"parameter {line.code}: {error}") from None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
         """The spins, in the order of the file."""
@@ -384,14 +383,13 @@ class FileEffect(QuantumEffect):
         if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
             return [term]
         if isinstance(term.rotor, ByElements):
-            code = line.name.partition("#")[0]
             raise ValueError(
-                f"parameter {code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
+                f"parameter {line.code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
             )
         try:
             return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
         except ValueError as error:
-            raise ValueError(f"parameter {line.name.partition('#')[0]}: {error}") from None
+            raise ValueError(f"parameter {line.code}: {error}") from None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""

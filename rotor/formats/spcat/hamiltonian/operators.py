@@ -26,14 +26,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from rotor.formats.spcat.hamiltonian.code_types import CROSS, ODD, factor_below, is_odd_type, order_of, shape_of
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits
-from rotor.formats.spcat.hamiltonian.spin_operators import (
-    factor_below,
-    multiplied,
-    order_of,
-    shape_of,
-    tensor_with_spins,
-)
+from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, tensor_with_spins
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -41,21 +36,6 @@ from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, anticommutator, components
 from rotor.tops.operators import Operators
 
-ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
-CROSS = {21: "bc", 41: "ac", 61: "ab"}
-TYPES_BETWEEN = {  # of what connects two states without a spin, by name
-    "G_a": 20,
-    "G_b": 40,
-    "G_c": 60,
-    "F_bc": 21,
-    "F_ac": 41,
-    "F_ab": 61,
-    "W": 0,
-    "W_pm2": 4,
-    "W_pm4": 5,
-    "W_pm6": 6,
-}
-PAIRS = {letters: ("abc".index(letters[0]), "abc".index(letters[1])) for letters in sorted(CROSS.values())}
 REFUSED = {
     "commutator": "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)",
     "own": "a power of N·S of one K",
@@ -105,7 +85,7 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     if 80 <= typ < 90:
         return CodedOperator(of_j=energy_of_k(10 * (typ - 80) + digits.ksq, digits.nsq))
     if 12 <= typ < 80:
-        return CodedOperator(of_j=_of_j(digits, axes), odd=order_of(typ) % 2 == 1)
+        return CodedOperator(of_j=_of_j(digits, axes), odd=is_odd_type(typ))
     return CodedOperator(plain=_plain(digits, axes))
 
 
@@ -147,8 +127,8 @@ def _plain(d: Digits, axes: str) -> Operators:
 
 def _of_j(d: Digits, axes: str) -> OperatorOfJ:
     """With half anticommutators of the powers, and the factor i, in an oblate basis -i, of what is odd under time reversal."""
-    powers, odd = ParameterName("", d.nsq, d.ksq), order_of(d.typ) % 2
-    factor = (1j if axes[2] == "a" else -1j) if odd else 1.0
+    powers = ParameterName("", d.nsq, d.ksq)
+    factor = (1j if axes[2] == "a" else -1j) if is_odd_type(d.typ) else 1.0
 
     def operator(j: int, representation: str) -> JOperator:
         return with_powers(factor * _tensor_of_j(d.typ, j, representation, axes[2]), powers)

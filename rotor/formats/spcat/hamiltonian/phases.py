@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from rotor.formats.spcat.hamiltonian.code_types import axis_of, is_odd_type
 from rotor.formats.spcat.hamiltonian.codes import Digits, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.series import harmonic, is_constant, symmetry_type
-from rotor.formats.spcat.hamiltonian.spin_operators import order_of
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, half_turn
@@ -36,15 +36,6 @@ class Kind(NamedTuple):
     odd: bool
 
 
-def axis_of(typ: int) -> str:
-    """a, b or c, whose half turn alone leaves an operator with this TYP as it is; "" where all do.
-
-    >>> [axis_of(typ) for typ in (0, 4, 21, 40, 62, 80)]
-    ['', '', 'a', 'b', 'c', '']
-    """
-    return {1: "a", 2: "b", 3: "c"}.get(typ // 20, "")
-
-
 def kind_of(d: Digits, oblate: bool) -> Kind:
     """The kind of a code.
 
@@ -53,9 +44,8 @@ def kind_of(d: Digits, oblate: bool) -> Kind:
     [Kind(axis='a', odd=True), Kind(axis='c', odd=False)]
     """
     sine = bool(d.ff) and harmonic(d.ff)[0]
-    odd = 12 <= d.typ < 80 and order_of(d.typ) % 2 == 1
     commutator = d.i1 == 0 and d.i2 > 0
-    return Kind(axis_of(symmetry_type(d, oblate)), (odd != sine) != commutator)
+    return Kind(axis_of(symmetry_type(d, oblate)), (is_odd_type(d.typ) != sine) != commutator)
 
 
 class Phases(NamedTuple):

@@ -28,9 +28,10 @@ from math import pi
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.formats.spcat.hamiltonian.code_types import order_of
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of
-from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, order_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, plain_of_j
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -150,6 +151,13 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
         sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
         return _multiplied(base, sampled, sine, axes)
     return _euler(d, axes, series, states)
+
+
+def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
+    """The operator of a code, with a series between two states; see `operator_of` and `term_of`."""
+    if states is None or not is_series(d):
+        return operator_of(d, axes)
+    return term_of(d, axes, series, states)
 
 
 def harmonic(ff: int) -> tuple[bool, int]:

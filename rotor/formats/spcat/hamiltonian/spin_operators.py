@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import sqrt
 
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.formats.spcat.hamiltonian.code_types import factor_below, order_of, shape_of
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
@@ -29,31 +29,6 @@ from rotor.tops.operators import Operators
 
 FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # of N', N, K', K
 OverK = Callable[[int, int, str], Complexes]  # of N', N and the representation
-
-
-def order_of(typ: int) -> int:
-    """L, the rank of the tensor of TYP 3 + n (2n), 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
-
-    >>> order_of(5), order_of(12), order_of(21), order_of(62)
-    (4, 3, 2, 3)
-    """
-    if typ < 12:
-        return 2 * (typ - 3)
-    return 2 * (typ - 11) + 1 if typ < 20 else typ % 20 + 1
-
-
-def factor_below(typ: int) -> float:
-    """Of {Z, N₊^(L-1)} with its conjugate: ¼ √(2L), for TYP 12 to 19 twice that."""
-    return sqrt(2 * order_of(typ)) * (0.5 if typ < 20 else 0.25)
-
-
-def shape_of(typ: int, z: str) -> tuple[int, bool]:
-    """K of the tensor of TYP 12 to 79, and whether it is E + E† (else (E - E†)/i): by its species, see `operators._tensor_of_n`."""
-    x, y = ("c", "b") if z == "a" else ("a", "b")
-    order = order_of(typ)
-    along = "" if typ < 20 else {x: "x", y: "y", z: "z"}["abc"[typ // 20 - 1]]
-    k = order - (order % 2 if along in ("z", "") else 1 - order % 2)
-    return k, along == ("x" if k == order else "y") or (along == "z" and k < order)
 
 
 @lru_cache(maxsize=256)

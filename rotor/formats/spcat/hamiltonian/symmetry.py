@@ -12,27 +12,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from rotor.formats.spcat.hamiltonian.code_types import TURNS, axis_of, delta_k
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix
 
 _SPECIES = ((0, 0), (0, 1), (1, 1), (1, 0))  # A, Ba, Bb, Bc by parities of Ka and Kc
-
-
-def delta_k(typ: int, oblate: bool) -> int:
-    """The change of K of an operator, by the TYP of its code, the part of Nb², Nc² with ΔK = 2 apart.
-
-    >>> [delta_k(typ, False) for typ in (1, 4, 5, 20, 21, 40, 41, 42, 61)]
-    [0, 2, 4, 0, 2, 1, 1, 3, 1]
-    """
-    if typ < 4 or typ >= 80:
-        return 0
-    if typ < 20:
-        return 2 * (typ - 3) if typ < 12 else 2 * (typ - 11)
-    axis, order = typ // 20, typ % 20 + 1
-    axis = {1: 3, 3: 1}.get(axis, axis) if oblate else axis
-    return order - (axis // 2 + order) % 2
 
 
 def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:
@@ -108,7 +94,7 @@ def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spin
     bool
         Whether two such levels have one weight.
     """
-    turn = {1: (0, 1), 2: (1, 1), 3: (1, 0)}.get(typ // 20, (0, 0))  # species of the operator
+    turn = TURNS[axis_of(typ)]
     for species in _SPECIES:
         other = (species[0] ^ turn[0], species[1] ^ turn[1])
         ours, theirs = _weights(low, *species), _weights(high, *other, odd_spins)

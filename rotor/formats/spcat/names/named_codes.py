@@ -20,6 +20,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.top_constants import TopConstants
+from rotor.formats.spcat.hamiltonian.code_types import CROSS, PAIRS, TYPES_BETWEEN
 from rotor.formats.spcat.hamiltonian.codes import (
     AXES,
     Digits,
@@ -30,7 +31,6 @@ from rotor.formats.spcat.hamiltonian.codes import (
     split_code,
     state_digits,
 )
-from rotor.formats.spcat.hamiltonian.operators import CROSS, PAIRS, TYPES_BETWEEN
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole

@@ -19,11 +19,11 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.file_spins import with_their_spins
+from rotor.formats.spcat.hamiltonian.code_types import PAIRS, TYPES_BETWEEN, axis_of
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_ones, reasons_of_states
-from rotor.formats.spcat.hamiltonian.operators import PAIRS, TYPES_BETWEEN
-from rotor.formats.spcat.hamiltonian.phases import axis_of, phases_of
+from rotor.formats.spcat.hamiltonian.phases import phases_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
