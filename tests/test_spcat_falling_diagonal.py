@@ -130,6 +130,25 @@ def test_a_fit_with_spins_says_how_levels_are_named(tmp_path: Path):
     assert any("falls with K: with spins a fit names levels of a Wang block by energy" in note for note in asked.notes)
 
 
+@pytest.mark.parametrize(
+    ("options", "chi", "said"),
+    [
+        ("-3 -1 0 60 0 1 1 1 0 1 2", 0.001, "DIAG = 2: with spins a fit names levels of a Wang block by energy"),
+        ("-1 -1 0 60 0 1 1 1 0 1 2", 0.0, ""),
+        ("-1 -1 0 60 0 1 1 1 0 1 -1", 0.0, "DIAG is below 0: SPCAT and SPFIT diagonalize nothing"),
+        ("-3 -1 0 60 0 1 1 1 0 1 -1", 0.001, "DIAG is below 0: SPCAT and SPFIT diagonalize nothing"),
+        ("-3 -1 0 60 0 1 1 1 0 1 0", 0.001, ""),
+    ],
+)
+def test_a_fit_says_what_it_does_not_do_as_diag_says(options: str, chi: float, said: str, tmp_path: Path):
+    numbers = "  1  0  2  0  0  1" if chi else "  1  0  0  0"
+    (tmp_path / "a.lin").write_text(numbers.ljust(36) + " 266900.0 0.01\n")
+    asked = spfit_input(_file(options, chi), read_lin(tmp_path / "a.lin", 3 if chi else 2, 900), "a.lin")
+    named = [note for note in asked.notes if "DIAG" in note]
+    assert len(named) == bool(said), named
+    assert not said or said in named[0]
+
+
 CASES = "cases_refused_or_wrong"
 
 

@@ -604,6 +604,28 @@ def test_a_spherical_parent(constants):
     )
 
 
+@pytest.mark.parametrize("b_mhz", [32191.200, 34191.200])
+def test_formaldehyde_from_published_constants(call, folder, b_mhz):
+    """H2(13)CO as in its abstract (Müller et al. 2000, S reduction), H2CO of the library, HD(13)CO of CDMS's page of its entry.
+
+    The B of entry e032507 as it stands there, 32191.200 MHz, is that of no planar molecule and called doubtful; with one digit
+    changed r(CH) = 1.1036(20) Å and HCH = 116.48(27) degrees, so that OCH is 121.76 degrees, as from other
+    species, 1.1039(20) Å and 121.77 degrees.
+    """
+    atoms = [["O", 0, 0, 1.205], ["13C", 0, 0, 0], ["H", 0, 0.9429, -0.5876], ["H", 0, -0.9429, -0.5876]]
+    (folder / "h2co.toml").write_text(
+        f'name = "H2[13C]O"\n[geometry]\natoms = {atoms}\n'
+        '[[isotopologue]]\nconstants = "A=281993.0397(31) B=37809.106966(213) C=33215.941417(207) MHz"\n'
+        f'[[isotopologue]]\nisotopes = "2=12C"\nconstants = "{" ".join(rotor.read("H2CO").constants.text().split()[:3])} MHz"\n'
+        f'[[isotopologue]]\nisotopes = "3=2H"\nconstants = "A=197648.21 B={b_mhz} C=29035.860 MHz"\n'
+    )
+    code, out, err = call("structure", "h2co.toml", "--method", "rs")
+    assert code == 0, err
+    right = b_mhz > 34000
+    assert ("doubtful" in out, "are its constants right?" in err) == (not right, not right)
+    assert ("1.1036(20)" in out, "116.48(27)" in out) == (right, right)
+
+
 def test_imaginary_coordinates_have_digits():
     found = substitution_structure(shaken_family(OCS, ["", "C=13C"], part=0.0))
     assert not found.notes

@@ -23,12 +23,12 @@ from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import is_plain, states_of
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.predict_states import levels_of_files, predicted, refuse_undiagonalized
-from rotor.formats.spcat.prediction_notes import UNDIAGONALIZED_NOTE, note_of_qrot, notes_of_full_basis
+from rotor.formats.spcat.prediction_notes import note_of_qrot, notes_of_full_basis
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
-from rotor.formats.spcat.text.par import Options, ParameterFile, note_of_npar, read_par
+from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Options, ParameterFile, note_of_npar, read_par
 from rotor.formats.spcat.variances import constants_covariance
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels

@@ -21,11 +21,7 @@ from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
 from rotor.formats.spcat.hamiltonian.phases import phases_of, with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
-from rotor.formats.spcat.text.par import ParameterFile, note_of_npar
-
-UNDIAGONALIZED_NOTE = (
-    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
-)
+from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, note_of_npar
 
 
 def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:

@@ -25,7 +25,7 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, i
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
-from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, note_of_npar, read_par
+from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Header, Parameter, ParameterFile, note_of_npar, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
@@ -163,10 +163,14 @@ def _of_codes(file: ParameterFile) -> list[str]:
     """Notes of parameters that act on no level, and of free ones that a search from 0 does not move."""
     from rotor.formats.spcat.file_model import left_out
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
+    from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 
     stay = stay_at_zero(file)
     at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
-    return left_out(file) + ([at_zero] if stay else []) + _of_falling_diagonals(file)
+    diag, spind = file.options[0].diag, file.options[0].spind
+    by_energy = [f"DIAG = {diag}: with spins a fit names levels of a Wang block by energy, as DIAG = 0 does"]
+    named = by_energy if diag in BY_DIAG and abs(spind) > 1 else []
+    return left_out(file) + ([at_zero] if stay else []) + named + _of_falling_diagonals(file)
 
 
 def _of_falling_diagonals(file: ParameterFile) -> list[str]:
@@ -328,6 +332,8 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
     if plain and options.kmax is not None and file.options[0].diag not in (0, 3):
         notes.append(f"DIAG = {file.options[0].diag}: levels are labelled by the order of energy in each Wang block")
+    if file.options[0].diag < 0:
+        notes.append(UNDIAGONALIZED_NOTE)
     return notes
 
 
