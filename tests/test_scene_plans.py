@@ -19,7 +19,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import LevelsScene
-from rotor.scenes.scene_file import read_scene
+from rotor.scenes.scene_file import parse_scene, read_scene
 from rotor.scenes.sections import LevelsObservables
 from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
@@ -195,3 +195,27 @@ def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
     assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
     with_spins = left_out_of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
     assert not any("effects.hyperfine" in one.basis for one in with_spins)
+
+
+STARK = 'schema = 1\nkind = "stark"\nmolecule = "OCS"\n[conditions]\nfield = "0:100:3"\n'
+
+
+def test_a_plan_names_the_coarser_setting_that_the_model_allows():
+    """Without an accuracy: the polarization that a Stark map leaves out, 65 MHz, allows 6.5 MHz and a smaller basis."""
+    scene = parse_scene(STARK)
+    plan = plan_of(scene)
+    words, usual = dict(plan.parts)["enough"], run_scene(scene).answer
+    assert words == 'accuracy = "6.5 MHz" would do, a tenth of 65 MHz: polarization by the static field and 1 more'
+    assert usual.errors.model.value == pytest.approx(65, rel=0.01)
+    coarser = run_scene(parse_scene(STARK.replace("molecule", 'accuracy = "6.5 MHz"\nmolecule', 1))).answer
+    assert coarser.facts()["jmax"] < usual.facts()["jmax"]
+    assert coarser.errors.numerical <= 6.5
+    assert "enough" not in dict(plan_of(parse_scene(STARK + "[numerics]\ntolerance = 1\n")).parts)  # given by hand
+    assert "enough" not in dict(plan_of(parse_scene('schema = 1\nkind = "levels"\nmolecule = "OCS"\n')).parts)
+
+
+def test_a_plan_of_a_map_leaves_out_what_its_run_does():
+    scene = parse_scene(STARK)
+    run = [one["name"] for one in run_scene(scene).answer.facts()["limits"]]
+    assert "polarization by the static field" in run
+    assert set(run) <= {one.name for one in plan_of(scene).left_out}

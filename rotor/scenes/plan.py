@@ -6,14 +6,18 @@ import os
 from dataclasses import replace
 from typing import Any
 
-from rotor.requests.knob import Choice
+import msgspec
+
+from rotor.requests.budget import ErrorBudget
+from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, plan_of_whole, timed
 from rotor.scenes.kind import NoResultError, kind_of
 from rotor.scenes.numerics import answering, numerics_of
-from rotor.scenes.run import choice_of, output_paths, refuse_as_run
+from rotor.scenes.run import answer_as_run, choice_of, output_paths
 from rotor.scenes.scene import Scene
 from rotor.verbs.verb import verb_of
 
+SHARE = 0.1  # of what is uncertain besides, below which a numerical error does not count
 SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory of a scene that is run for its plan
 
 
@@ -57,12 +61,37 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.Pa
 
 
 def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None) -> Plan:
-    """The plan, with a warning where the run reaches no result; ValueError as the run."""
+    """The plan, with a warning where the run reaches no result, or with settings that would do; ValueError as the run."""
     try:
-        refuse_as_run(scene, request, choice)
+        answer = answer_as_run(scene, request, choice)
     except NoResultError as reason:
         return replace(plan, parts=(*plan.parts, ("warning", f"no result: {reason}")))
-    return plan
+    enough = "" if choice is not None else coarser_settings(scene, request, getattr(answer, "errors", None))
+    return replace(plan, parts=(*plan.parts, ("enough", enough))) if enough else plan
+
+
+def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> str:
+    """The accuracy that is a tenth of what the model or the data leave uncertain; empty where the settings are no finer than that.
+
+    Of kinds whose accuracy one field decides on, and where that field is not given.
+    """
+    from rotor.scenes.accuracy import chosen
+
+    goals = numerics_of(scene.kind).goals
+    if errors is None or errors.numerical is None or errors.unit not in goals or goals[errors.unit].choose is not None:
+        return ""
+    uncertain = max((errors.model, errors.data), key=lambda term: term.value or 0.0)
+    goal = float(f"{SHARE * (uncertain.value or 0.0):.2g}")
+    if not 0.0 < goal > errors.numerical:
+        return ""
+    try:
+        choice = chosen(msgspec.structs.replace(scene, accuracy=goal), request)  # type: ignore[call-arg]
+    except ValueError:  # the field is given
+        return ""
+    if choice.how == NOTHING_CHEAPER:
+        return ""
+    enough, size = (f"{value:.2g} {errors.unit}".rstrip() for value in (goal, uncertain.value or 0.0))
+    return f'accuracy = "{enough}" would do, a tenth of {size}: {uncertain.source}'
 
 
 def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:

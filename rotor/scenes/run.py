@@ -95,13 +95,14 @@ def choice_of(scene: Scene, request: Any) -> Choice | None:
         return chosen(scene, request)
 
 
-def refuse_as_run(scene: Scene, request: Any, choice: Choice | None) -> None:
-    """Whatever a run of the scene would raise, without its files; choice: the settings for its accuracy."""
+def answer_as_run(scene: Scene, request: Any, choice: Choice | None) -> Any:
+    """The answer of a run without its files, or whatever it would raise; choice: the settings for its accuracy."""
     kind = kind_of(scene)
     bare = msgspec.structs.replace(scene, outputs=type(scene.outputs)())  # type: ignore[attr-defined]
     answer = kind.answer(request if choice is None else choice.request, bare, ".", None)
     if choice is not None:
         _reached(scene, answer, choice)
+    return answer
 
 
 def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:

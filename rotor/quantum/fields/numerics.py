@@ -19,7 +19,7 @@ from rotor.quantum.fields.stark_request import answer_stark
 from rotor.quantum.fields.zeeman_request import answer_zeeman
 from rotor.requests.knob import Measure, Setting, Sweep, Sweeps, ladder
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, Plan
+from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
 
 MORE_J = 6  # in the reference
 SHORT_FIELDS = (2, 20)  # of the calibration
@@ -72,6 +72,10 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
     cost = Growth(lambda n: at(tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
     described = of_top(top, j, request.effects or SEMI_RIGID)
+    known = {one.name for one in described["left_out"]}
+    of_field = [
+        LeftOut(one["name"], one["size_mhz"], "MHz", one["text"]) for one in facts["limits"] if one["name"] not in known
+    ]
     acts = words["acts"].format(max(map(abs, fields)))
     error = f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off"
     return Plan(
@@ -86,7 +90,9 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
         counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
         seconds=cost.seconds,
         memory_mb=cost.memory_mb,
-        left_out=tuple(part for part in described["left_out"] if part.name != words.get("within")),
+        left_out=largest_first(
+            [*of_field, *(part for part in described["left_out"] if part.name != words.get("within"))]
+        ),
     )
 
 
