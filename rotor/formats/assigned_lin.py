@@ -47,7 +47,7 @@ def as_lin(lines: Assignments) -> LineList:
 def _listed(lines: Assignments) -> LineList:
     """Lines in the order of a .lin file."""
     numbers, places = np.unique(lines.blend, return_inverse=True)
-    order = np.array([one.number for one in _in_order(lines)], dtype=np.int64)
+    order = np.array([line.number for line in _in_order(lines)], dtype=np.int64)
     rank = np.empty(len(numbers), dtype=np.int64)
     rank[np.searchsorted(numbers, order)] = np.arange(len(numbers))
     ordered = _with_widths(lines.take(np.argsort(rank[places.reshape(-1)], kind="stable")))
@@ -105,7 +105,7 @@ def _in_order(lines: Assignments) -> list[_Blend]:
             waiting.append(blend)
             continue
         made.append(blend)
-        ready = next((one for one in waiting if not blend.runs_into(one)), None)
+        ready = next((candidate for candidate in waiting if not blend.runs_into(candidate)), None)
         if ready is not None:
             waiting.remove(ready)
             made.append(ready)
@@ -125,7 +125,7 @@ def _with_widths(lines: Assignments) -> Assignments:
     last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
     wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
     rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")
-    found = lines.take(rows)
+    widened = lines.take(rows)
     second = np.flatnonzero(np.append(False, rows[1:] == rows[:-1]))
-    found.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
-    return found
+    widened.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
+    return widened

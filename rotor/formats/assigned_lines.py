@@ -88,19 +88,19 @@ def read_assigned_lines(
     if not text.endswith(SUFFIXES):
         raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
     if text.endswith(".csv"):
-        found, notes = _from_csv(path, names, halves)
+        lines, notes = _from_csv(path, names, halves)
     elif text.endswith(".lne"):
-        found, notes = _from_westerfit(path, names, halves), []
+        lines, notes = _from_westerfit(path, names, halves), []
     else:
         plain = "v" not in names and names[0] != "n"
         read = _from_lin if text.endswith(".lin") else catalogue_lines if plain else whole_catalogue_lines
-        found, notes = read(path, names)
-        found = with_halves(found, halves)
-    if not len(found):
+        lines, notes = read(path, names)
+        lines = with_halves(lines, halves)
+    if not len(lines):
         raise ValueError(
             f"{path}: no lines in it" + ("" if text.endswith((".lin", ".csv", ".lne")) else " that are measured")
         )
-    return found, notes
+    return lines, notes
 
 
 def with_halves(lines: Assignments, halves: Collection[str]) -> Assignments:
@@ -196,7 +196,7 @@ def _from_csv(
     error = next((name for name in _ERROR if name in columns), None)
     _refuse_rows(path, rows)
     read = [(name, _half if name.rpartition("_")[0] in halves else _whole) for name in labels]
-    numbers = [[of(path, i, name, row) for name, of in read] for i, row in enumerate(rows, 1)]
+    numbers = [[read_number(path, i, name, row) for name, read_number in read] for i, row in enumerate(rows, 1)]
     quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
     for i, row in enumerate(quanta.tolist(), 1):
         for side in (row[: len(names)], row[len(names) :]):
@@ -227,13 +227,13 @@ def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, 
     """A row with the field of both states as a whole number of steps."""
     from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM  # with all that fields need
 
-    found = [name for name in _FIELD if name in columns]
-    if len(found) != 1:
+    units = [name for name in _FIELD if name in columns]
+    if len(units) != 1:
         raise ValueError(f"{path}: one column of {', '.join(_FIELD)} is needed, the field of each line")
-    value = _real(path, line, found[0], row) * _FIELD[found[0]]
+    value = _real(path, line, units[0], row) * _FIELD[units[0]]
     if abs(value) > HIGHEST_KV_PER_CM:
         raise ValueError(
-            f"{path}, line {line} of the table: {found[0]} = {row[found[0]]}: expected at most {HIGHEST_KV_PER_CM:g} kV/cm"
+            f"{path}, line {line} of the table: {units[0]} = {row[units[0]]}: expected at most {HIGHEST_KV_PER_CM:g} kV/cm"
         )
     steps = str(round(value / FIELD_STEP_KV_PER_CM))
     return {
@@ -284,17 +284,17 @@ def _widths(
     path: object, rows: Sequence[Mapping[str, str]], columns: Sequence[str], blends: Sequence[int]
 ) -> dict[int, float]:
     """The width of each blend that states one, by its number."""
-    found, counts = dict[int, float](), Counter(blends)
-    for name in (one for one in _WIDTH if one in columns):
+    widths, counts = dict[int, float](), Counter(blends)
+    for name in (column for column in _WIDTH if column in columns):
         for i, (row, blend) in enumerate(zip(rows, blends, strict=True), 1):
             width = _size(path, i, name, row, 0.0) * _WIDTH[name]
             if width and counts[blend] < 2:
                 raise ValueError(
                     f"{path}, line {i} of the table: a {name} is that of a blend; name the blend of two lines or more"
                 )
-            if width and found.setdefault(blend, width) != width:
+            if width and widths.setdefault(blend, width) != width:
                 raise ValueError(f"{path}, line {i} of the table: another {name} of this blend stands before; give one")
-    return found
+    return widths
 
 
 def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:

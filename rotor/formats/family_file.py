@@ -75,19 +75,19 @@ def read_family(path: str | os.PathLike[str], options: FitOptions | None = None)
 
     fits: dict[str, Fit] = {}
     measured, corrections, sources = [], [], []
-    for i, one in enumerate(species, 1):
+    for i, entry in enumerate(species, 1):
         place = f"{path}, isotopologue {i}"
-        if not isinstance(one, dict):
+        if not isinstance(entry, dict):
             raise ValueError(f"{place}: a table [[isotopologue]] is needed")
-        _refuse_unknown(one, _SPECIES, place)
-        for key in one:
-            if not isinstance(one[key], str):
-                raise ValueError(f"{place}, {key} = {one[key]!r}: text in quotes is needed")
-        label = one.get("name") or (one.get("isotopes") or "parent")
-        values, errors, source = _constants(one, place, Path(path).parent, label, fits, options)
-        measured.append((label, one.get("isotopes", ""), values, errors))
-        corrections.append(_parsed(one, "corrections", place)[0] if "corrections" in one else {})
-        sources.append(one.get("source", source))
+        _refuse_unknown(entry, _SPECIES, place)
+        for key in entry:
+            if not isinstance(entry[key], str):
+                raise ValueError(f"{place}, {key} = {entry[key]!r}: text in quotes is needed")
+        label = entry.get("name") or (entry.get("isotopes") or "parent")
+        values, errors, source = _constants(entry, place, Path(path).parent, label, fits, options)
+        measured.append((label, entry.get("isotopes", ""), values, errors))
+        corrections.append(_parsed(entry, "corrections", place)[0] if "corrections" in entry else {})
+        sources.append(entry.get("source", source))
     try:
         made = family(molecule, measured, corrections_mhz=corrections, sources=sources, name=content.get("name", ""))
         coordinates = _coordinates(molecule, content.get("coordinates", {}))
@@ -118,34 +118,34 @@ def _molecule(content: Mapping[str, Any], path: str) -> Molecule:
         raise ValueError(f"{path}, [geometry]: {error}") from None
 
 
-def _parsed(one: Mapping[str, str], key: str, place: str) -> tuple[dict[str, float], dict[str, float]]:
+def _parsed(entry: Mapping[str, str], key: str, place: str) -> tuple[dict[str, float], dict[str, float]]:
     try:
-        return parse_named(one[key])
+        return parse_named(entry[key])
     except ValueError as error:
         raise ValueError(f"{place}, {key}: {error}") from None
 
 
 def _constants(
-    one: Mapping[str, str], place: str, folder: Path, label: str, fits: dict[str, Fit], options: FitOptions | None
+    entry: Mapping[str, str], place: str, folder: Path, label: str, fits: dict[str, Fit], options: FitOptions | None
 ) -> tuple[dict[str, float], dict[str, float], str]:
     """A, B, C and their errors, given or fitted to measured lines."""
-    if ("constants" in one) == ("lines" in one):
+    if ("constants" in entry) == ("lines" in entry):
         raise ValueError(f"{place}: either constants or lines (with start) say what was measured; give one of them")
-    if "constants" in one:
-        values, errors = _parsed(one, "constants", place)
+    if "constants" in entry:
+        values, errors = _parsed(entry, "constants", place)
         return _rigid(values), _rigid(errors), ""
-    if "start" not in one:
+    if "start" not in entry:
         raise ValueError(f'{place}: lines need start constants, such as start = "B=6062 D=0.0013 MHz"')
     try:
-        if not (folder / one["lines"]).is_file():
-            raise ValueError(f"{one['lines']}: no such file beside the family")
-        fit = _fitted(folder / one["lines"], Constants.parse(one["start"]), options)
+        if not (folder / entry["lines"]).is_file():
+            raise ValueError(f"{entry['lines']}: no such file beside the family")
+        fit = _fitted(folder / entry["lines"], Constants.parse(entry["start"]), options)
     except (ValueError, OSError) as error:
         raise ValueError(f"{place}, lines: {error}") from None
     if not fit.converged or fit.constants is None:
-        raise ValueError(f"{place}, lines = {one['lines']!r}: the fit has not converged: {fit.reason}")
+        raise ValueError(f"{place}, lines = {entry['lines']!r}: the fit has not converged: {fit.reason}")
     fits[label] = fit
-    source = f"fitted to {int(fit.used.sum())} measured lines of {Path(one['lines']).name}, weighted rms {fit.weighted_rms:.3g}"
+    source = f"fitted to {int(fit.used.sum())} measured lines of {Path(entry['lines']).name}, weighted rms {fit.weighted_rms:.3g}"
     return _rigid(fit.named.values), _rigid(fit.named.uncertainties), source
 
 

@@ -43,7 +43,7 @@ def _goal(of: str, error: Callable[[Any], float]) -> Goal:
     def choose(scene: Any, request: Any, accuracy: float) -> Choice:
         """By whole fits."""
         return loosest(
-            DECADES, lambda one: with_options(request, tolerance=one), answer_fit, accuracy, "tolerance", error
+            DECADES, lambda value: with_options(request, tolerance=value), answer_fit, accuracy, "tolerance", error
         )
 
     return Goal(of, choose) if error is stated else Goal(of, choose, error)
@@ -54,12 +54,12 @@ def sweeps_of_fit(request: Any) -> Sweeps:
     measure = Measure("a constant", "σ", _in_errors)
     finest = with_options(request, tolerance=FINEST_TOLERANCE)
     against = f"a search to {FINEST_TOLERANCE:g}"
-    own = request.options
-    counts = [n for n in ITERATIONS if n < own.most_iterations]
+    options = request.options
+    counts = [n for n in ITERATIONS if n < options.most_iterations]
     iterations = ladder(
-        counts, own.most_iterations, lambda n: with_options(request, most_iterations=int(n)), "{:.0f}".format
+        counts, options.most_iterations, lambda n: with_options(request, most_iterations=int(n)), "{:.0f}".format
     )
-    tolerances = ladder(TOLERANCES, own.tolerance, lambda one: with_options(request, tolerance=one))
+    tolerances = ladder(TOLERANCES, options.tolerance, lambda value: with_options(request, tolerance=value))
     return Sweeps(
         (
             Sweep("numerics.iterations", (measure,), iterations, finest, against, answer_fit),
@@ -69,10 +69,10 @@ def sweeps_of_fit(request: Any) -> Sweeps:
     )
 
 
-def _in_errors(found: Any, reference: Any) -> float:
+def _in_errors(answer: Any, reference: Any) -> float:
     """The largest difference of a free constant in its standard errors."""
-    one, true = found.parameters, reference.parameters
-    return float(np.max(np.abs(one.value_mhz - true.value_mhz) / true.error_mhz))
+    fitted, true = answer.parameters, reference.parameters
+    return float(np.max(np.abs(fitted.value_mhz - true.value_mhz) / true.error_mhz))
 
 
 def plan_of_fit(request: Any) -> Plan:
@@ -109,8 +109,8 @@ def plan_of_fit(request: Any) -> Plan:
 def _absent(request: FitRequest, top: Top, j: int) -> tuple[LeftOut, ...]:
     """What the model leaves out; no distortion where a free constant starts at 0, since its order is in the model then."""
     complete = not request.parameters.start.all()
-    found = left_out_of_levels(top, j, SEMI_RIGID)
-    return tuple(one for one in found if not (complete and one.name.startswith("centrifugal distortion")))
+    parts = left_out_of_levels(top, j, SEMI_RIGID)
+    return tuple(part for part in parts if not (complete and part.name.startswith("centrifugal distortion")))
 
 
 def _levels_text(request: FitRequest) -> str:

@@ -154,11 +154,18 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
 
 def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
     """The request of a .par file and its lines; what is free and where it starts, the file says. Raises ValueError as `read_fit`."""
-    asked = read_fit(par, lin)
-    title = " ".join(asked.file.title.split()) or Path(par).stem
+    inputs = read_fit(par, lin)
+    title = " ".join(inputs.file.title.split()) or Path(par).stem
     files = FitFiles(par, lin)
     return FitRequest(
-        asked.lines, asked.constants, asked.parameters, asked.options, title, files, asked, notes=tuple(asked.notes)
+        inputs.lines,
+        inputs.constants,
+        inputs.parameters,
+        inputs.options,
+        title,
+        files,
+        inputs,
+        notes=tuple(inputs.notes),
     )
 
 
@@ -277,9 +284,9 @@ def _dipole_for(top: Top, free: Sequence[str]) -> tuple[str, ...]:
 def with_more_lines(request: FitRequest, path: str) -> FitRequest:
     """The request with the lines of one more file of the same kind."""
     more, notes = read_assigned_lines(path, request.lines.names, request.lines.halves)
-    both, found = merged(request.lines, more)
+    both, remarks = merged(request.lines, more)
     files = replace(request.files, merge=path)
-    return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *found))
+    return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *remarks))
 
 
 def report_of(answer: FitAnswer) -> str:
@@ -287,7 +294,7 @@ def report_of(answer: FitAnswer) -> str:
     from rotor.formats.spcat.fits.fit_table import parameter_section
 
     request, read = answer.request, answer.request.files
-    files = [Path(one).name for one in (read.source, read.lin, read.merge) if one]
+    files = [Path(file).name for file in (read.source, read.lin, read.merge) if file]
     head = [
         f"rotor {version()}; read: {', '.join(files)}" + (f"; start: {Path(read.start).name}" if read.start else "")
     ]
@@ -316,7 +323,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
-    lost = "; ".join(one.text for one in fit.statistics.undetermined)
+    lost = "; ".join(combination.text for combination in fit.statistics.undetermined)
     doubt = "" if fit.converged else f"NOT CONVERGED ({fit.reason}): "
     origin = (
         f"{doubt}fitted by rotor to {counted(int(fit.used.sum()), 'line')} of {Path(request.files.source).name}, weighted by their "
@@ -324,8 +331,8 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
         + (f"; not determined by these lines and left at the start: {lost}" if lost else "")
     )
     start = request.files.start or ""
-    own = start.lower().endswith(".toml") and Path(start).exists()
-    file = read_molecule_file(start) if own else _file_of(request, path)
+    is_toml = start.lower().endswith(".toml") and Path(start).exists()
+    file = read_molecule_file(start) if is_toml else _file_of(request, path)
     sources = {**file.sources, "constants": origin}
     named, states, spins, internal = fit.named, file.states, file.spin_constants, file.internal_rotation
     if isinstance(named, TopConstants):

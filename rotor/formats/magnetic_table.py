@@ -20,7 +20,7 @@ def magnetic_of_table(table: TableReader | None, kind: str) -> MagneticTensors |
     """The tensors of the table, None without one; ValueError, with file, table and key, for what is unknown or missing."""
     if table is None:
         return None
-    endings = ("", *(f"_{one}" for one in (*ELEMENTS, "parallel", "perpendicular")))
+    endings = ("", *(f"_{element}" for element in (*ELEMENTS, "parallel", "perpendicular")))
     table.refuse_unknown(("source", "unverified", *(name + ending for name in _TENSORS for ending in endings)))
     g, chi = (_tensor(table, name, kind) for name in _TENSORS)
     if g is None:
@@ -36,7 +36,7 @@ def _tensor(table: TableReader, name: str, kind: str) -> Tensor | None:
     elif f"{name}_parallel" in table.content or f"{name}_perpendicular" in table.content:
         names = (f"{name}_parallel", f"{name}_perpendicular")
     else:
-        names = tuple(f"{name}_{one}" for one in ELEMENTS)
+        names = tuple(f"{name}_{element}" for element in ELEMENTS)
     present = {key for key in table.content if key == name or key.startswith(f"{name}_")}
     if extra := sorted(present - set(names)):
         raise ValueError(f"{table.place}: {', '.join(extra)} beside {names[0]}: give the tensor in one of its forms")

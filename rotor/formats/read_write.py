@@ -128,14 +128,14 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     reader = reader_of(path)
     if reader is None:
         refuse_bomb(path)
-    found = reader(path) if reader else _top_of_geometry(path)
-    if isinstance(found, Top):
-        return _with_isotopes(found, isotopes)
+    content = reader(path) if reader else _top_of_geometry(path)
+    if isinstance(content, Top):
+        return _with_isotopes(content, isotopes)
     if isotopes:
         raise ValueError(
-            f"{path}: holds a {type(found).__name__}, which has no atoms to substitute; leave the isotopes out"
+            f"{path}: holds a {type(content).__name__}, which has no atoms to substitute; leave the isotopes out"
         )
-    return found
+    return content
 
 
 def read_spcat_top(path: Path, *, errors: bool = False) -> Top:

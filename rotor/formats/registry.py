@@ -124,8 +124,8 @@ def formats() -> Iterator[Format]:
 @cache
 def _declared(folder: Path, package: str) -> tuple[Format, ...]:
     """The formats that files of a folder declare."""
-    files = [one for one in sorted(folder.glob("*.py")) if "\nFORMAT = Format(" in one.read_text(encoding="utf-8")]
-    return tuple(import_module(f"{package}.{one.stem}".lstrip(".")).FORMAT for one in files)
+    files = [file for file in sorted(folder.glob("*.py")) if "\nFORMAT = Format(" in file.read_text(encoding="utf-8")]
+    return tuple(import_module(f"{package}.{file.stem}".lstrip(".")).FORMAT for file in files)
 
 
 def loaded(name: str) -> Any:
@@ -136,10 +136,10 @@ def loaded(name: str) -> Any:
 
 def reader_of(path: Path) -> Callable[[Path], Any] | None:
     """What reads the file of this name; None where no format here has its suffix."""
-    for one in formats():
-        fits = one.reader and path.name.lower().endswith(one.suffixes)
-        if fits and (one.recognises is None or loaded(one.recognises)(path)):
-            reader: Callable[[Path], Any] = loaded(str(one.reader))
+    for known_format in formats():
+        fits = known_format.reader and path.name.lower().endswith(known_format.suffixes)
+        if fits and (known_format.recognises is None or loaded(known_format.recognises)(path)):
+            reader: Callable[[Path], Any] = loaded(str(known_format.reader))
             return reader
     return None
 
@@ -150,9 +150,9 @@ def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
     Raises ValueError, with the suffixes that there are for such a thing, where no format has the suffix.
     """
     name, types = Path(path).name.lower(), [_name_of(cls) for cls in type(thing).__mro__]
-    for one in formats():
-        writers = [one.writers[known] for known in types if known in one.writers]
-        if writers and name.endswith(one.suffixes):
+    for known_format in formats():
+        writers = [known_format.writers[known] for known in types if known in known_format.writers]
+        if writers and name.endswith(known_format.suffixes):
             writer: Writer = loaded(writers[0])
             return writer
     known = suffixes_for(type(thing))
@@ -166,7 +166,7 @@ def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
 def suffixes_for(kind: type) -> list[str]:
     """The suffixes of the files into which things of a class can be written."""
     types = {_name_of(cls) for cls in kind.__mro__}
-    return [suffix for one in formats() if types & {*one.writers} for suffix in one.suffixes]
+    return [suffix for known_format in formats() if types & {*known_format.writers} for suffix in known_format.suffixes]
 
 
 def _name_of(cls: type) -> str:

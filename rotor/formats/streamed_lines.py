@@ -347,17 +347,17 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
-    found = all_transitions(levels, dipoles, plan.range_mhz, cut)
-    own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
+    transitions = all_transitions(levels, dipoles, plan.range_mhz, cut)
+    of_piece = np.minimum(rotational[transitions.upper], rotational[transitions.lower]) <= last
     trusted = are_trusted(plan.top, levels)
-    own &= trusted[found.upper] & trusted[found.lower]
+    of_piece &= trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         plan.top,
         levels,
-        found.frequency_mhz[own],
-        found.strength_debye2[own],
-        found.upper[own],
-        found.lower[own],
+        transitions.frequency_mhz[of_piece],
+        transitions.strength_debye2[of_piece],
+        transitions.upper[of_piece],
+        transitions.lower[of_piece],
         plan.temperature_k,
         plan.min_lgint,
         plan.range_mhz,

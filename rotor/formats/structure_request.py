@@ -79,13 +79,13 @@ class StructureTable(Table):
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
         """method, coordinate, value, error, unit."""
-        rows = [(method, one) for method, values in self.by_method.items() for one in values]
+        rows = [(method, value) for method, values in self.by_method.items() for value in values]
         return {
             "method": np.array([method for method, _ in rows]),
-            "coordinate": np.array([one.name for _, one in rows]),
-            "value": np.array([one.value for _, one in rows], dtype=np.float64),
-            "error": np.array([one.error for _, one in rows], dtype=np.float64),
-            "unit": np.array([one.unit for _, one in rows]),
+            "coordinate": np.array([value.name for _, value in rows]),
+            "value": np.array([value.value for _, value in rows], dtype=np.float64),
+            "error": np.array([value.error for _, value in rows], dtype=np.float64),
+            "unit": np.array([value.unit for _, value in rows]),
         }
 
 
@@ -104,7 +104,7 @@ class StructureAnswer:
     def table(self) -> StructureTable:
         """Bond lengths, angles and vibrational terms."""
         values = {} if self.substitution is None else {"rs": tuple(self.substitution.values)}
-        return StructureTable(values | {one.method: (*one.values, *one.vibrational) for one in self.fitted})
+        return StructureTable(values | {fit.method: (*fit.values, *fit.vibrational) for fit in self.fitted})
 
     @property
     def errors(self) -> ErrorBudget:
@@ -135,11 +135,11 @@ class StructureAnswer:
     @property
     def notes(self) -> list[str]:
         """Doubts about isotopologues, and what the moments do not determine."""
-        found = [*self.doubts, *(self.substitution.notes if self.substitution else ())]
-        for one in self.fitted:
-            found += [f"{one.method}: {text}" for text in one.notes]
-            found += [f"{one.method}: not determined by these moments: {c.text}" for c in one.undetermined]
-        return found
+        remarks = [*self.doubts, *(self.substitution.notes if self.substitution else ())]
+        for fit in self.fitted:
+            remarks += [f"{fit.method}: {text}" for text in fit.notes]
+            remarks += [f"{fit.method}: not determined by these moments: {c.text}" for c in fit.undetermined]
+        return remarks
 
     def facts(self) -> dict[str, Any]:
         """Everything about the structures, by the keys of docs/verbs."""
@@ -189,46 +189,46 @@ def answer_structure(request: StructureRequest) -> StructureAnswer:
 
     fitted = tuple(fitted_to(file.family, name) for name in request.methods if name != "rs")
     without = {
-        one.method: without_each(file.family, one, partial(fitted_to, name=one.method))
-        for one in fitted
+        fit.method: without_each(file.family, fit, partial(fitted_to, name=fit.method))
+        for fit in fitted
         if request.check
     }
-    said = [text for one in fitted for text in gains(one.method, without.get(one.method, []), one.rms_u_angstrom2)]
+    said = [text for fit in fitted for text in gains(fit.method, without.get(fit.method, []), fit.rms_u_angstrom2)]
     planar = tuple(moments_across_planes(file.family))
     return StructureAnswer(request, substitution, fitted, planar, without, (*doubts(file.family), *said))
 
 
-def _substitution_record(found: SubstitutionStructure | None) -> dict[str, Any] | None:
-    if found is None:
+def _substitution_record(structure: SubstitutionStructure | None) -> dict[str, Any] | None:
+    if structure is None:
         return None
     return {
         "atoms": [
             {
-                "atom": one.atom,
-                "isotopologue": one.species,
-                "coordinates_angstrom": one.coordinates_angstrom,
-                "squares_angstrom2": one.squares_angstrom2,
-                "costain_angstrom": one.costain_angstrom,
-                "measured_angstrom": one.measured_angstrom,
+                "atom": atom.atom,
+                "isotopologue": atom.species,
+                "coordinates_angstrom": atom.coordinates_angstrom,
+                "squares_angstrom2": atom.squares_angstrom2,
+                "costain_angstrom": atom.costain_angstrom,
+                "measured_angstrom": atom.measured_angstrom,
             }
-            for one in found.atoms
+            for atom in structure.atoms
         ],
-        "values": [vars(one) for one in found.values],
+        "values": [vars(atom) for atom in structure.values],
     }
 
 
-def _fitted_record(one: FittedStructure) -> dict[str, Any]:
+def _fitted_record(fit: FittedStructure) -> dict[str, Any]:
     return {
-        "converged": one.minimum.converged,
-        "reason": one.minimum.reason,
-        "values": [vars(value) for value in one.values],
-        "vibrational": [vars(value) for value in one.vibrational],
-        "rms_u_angstrom2": one.rms_u_angstrom2,
-        "degrees_of_freedom": one.degrees_of_freedom,
-        "condition": one.condition,
-        "undetermined": [c.text for c in one.undetermined],
-        "positions_angstrom": one.molecule.positions_angstrom,
-        "moments": [{**vars(moment), "difference": moment.difference} for moment in one.moments],
+        "converged": fit.minimum.converged,
+        "reason": fit.minimum.reason,
+        "values": [vars(value) for value in fit.values],
+        "vibrational": [vars(value) for value in fit.vibrational],
+        "rms_u_angstrom2": fit.rms_u_angstrom2,
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "condition": fit.condition,
+        "undetermined": [c.text for c in fit.undetermined],
+        "positions_angstrom": fit.molecule.positions_angstrom,
+        "moments": [{**vars(moment), "difference": moment.difference} for moment in fit.moments],
     }
 
 

@@ -127,26 +127,26 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
 
 def _one_top(values: dict[str, float]) -> dict[str, float]:
     """F0, delta and barriers of one top with its axis in the plane ab."""
-    found = _of_top(values, "")
-    turn = found.pop("epsilon", 0.0)
+    constants = _constants_of_top(values, "")
+    turn = constants.pop("epsilon", 0.0)
     if abs(np.sin(turn)) > 1e-6:
         raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the plane ab; such a top is not computed")
-    return found | {"delta": float(np.cos(turn)) * found["delta"]}
+    return constants | {"delta": float(np.cos(turn)) * constants["delta"]}
 
 
 def _two_tops(values: dict[str, float]) -> dict[str, float]:
-    return {f"{name}_{top}": value for top in (1, 2) for name, value in _of_top(values, f"_{top}").items()}
+    return {f"{name}_{top}": value for top in (1, 2) for name, value in _constants_of_top(values, f"_{top}").items()}
 
 
-def _of_top(values: dict[str, float], suffix: str) -> dict[str, float]:
+def _constants_of_top(values: dict[str, float], suffix: str) -> dict[str, float]:
     """F0, delta, epsilon, V3 and V6 of one top, MHz and radians."""
-    found = {}
+    constants = {}
     for theirs, ours in OF_TOP.items():
         value = values.get(f"{theirs}{suffix}", values.get(f"{theirs}_1") if not suffix else None)
         if value is not None:
-            found[ours] = value if ours in ("delta", "epsilon") else value * MHZ_PER_GHZ
-    missing = [key for key in ("F0", "delta", "V1n") if OF_TOP[key] not in found]
+            constants[ours] = value if ours in ("delta", "epsilon") else value * MHZ_PER_GHZ
+    missing = [key for key in ("F0", "delta", "V1n") if OF_TOP[key] not in constants]
     if missing:
         names = ", ".join(f"{key}{suffix}" for key in missing)
         raise ValueError(f"{names} missing; expected F0, delta and V1n of each top (adj 25 of XIAM)")
-    return found
+    return constants

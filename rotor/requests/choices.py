@@ -24,9 +24,9 @@ class Choices(Reader):
     metavar: str = "TEXT"
     many = True
 
-    def read(self, given: Any) -> tuple[Any, ...]:
+    def read(self, raw: Any) -> tuple[Any, ...]:
         """What tables and lines say, objects as they are; an error of a table names its number and key."""
-        items = given if isinstance(given, list | tuple) else (given,)
+        items = raw if isinstance(raw, list | tuple) else (raw,)
         return tuple(self._read(item, number) for number, item in enumerate(items))
 
     def _read(self, item: Any, number: int) -> Any:
@@ -48,11 +48,11 @@ class Choices(Reader):
         kinds = self.load()
         if name not in kinds:
             raise ValueError(f"{line!r}: no {self.word} is named {name!r}; {nearest(name, kinds)}")
-        fields = {one.last: one for one in all_fields(kinds[name]).values()}
+        fields = {field.last: field for field in all_fields(kinds[name]).values()}
         for key in texts:
             if key not in fields:
                 raise ValueError(f"{line!r}: {name} has no {key!r}; {nearest(key, fields)}")
-        if missing := [key for key, one in fields.items() if one.default is REQUIRED and key not in texts]:
+        if missing := [key for key, field in fields.items() if field.default is REQUIRED and key not in texts]:
             raise ValueError(f"{line!r}: {missing[0]} is missing; give {_usage(fields)}")
         values = {}
         for key, text in texts.items():
@@ -79,7 +79,7 @@ class Choices(Reader):
             raise ValueError(f"a scene holds no {type(other).__name__}; there are {', '.join(names.values())}")
         for thing in value:
             kind: Any = type(thing)
-            if any(not equal(getattr(thing, one.name), one.default) for one in undeclared(kind)):
+            if any(not equal(getattr(thing, field.name), field.default) for field in undeclared(kind)):
                 raise ValueError(f"a scene holds no {type(thing).__name__} of this form")
         return [{self.word: names[type(thing)], **written_fields(thing)} for thing in value]
 
@@ -89,10 +89,10 @@ def _line_text(value: Any) -> str:
     if not isinstance(value, list):
         return f"{value:g}" if isinstance(value, float) else str(value)
     if not all(isinstance(row, list) for row in value):
-        return ",".join(f"{one:g}" for one in value)
-    if all(one == 0 for i, row in enumerate(value) for k, one in enumerate(row) if i != k) and len(value) == len(
-        value[0]
-    ):
+        return ",".join(f"{number:g}" for number in value)
+    if all(element == 0 for i, row in enumerate(value) for k, element in enumerate(row) if i != k) and len(
+        value
+    ) == len(value[0]):
         return ",".join(f"{row[i]:g}" for i, row in enumerate(value))
     return ";".join(map(_line_text, value))
 
@@ -118,7 +118,7 @@ def _words(line: str) -> tuple[str, dict[str, str]]:
 
 def _usage(fields: Mapping[str, Field]) -> str:
     """All parameters, with what each is."""
-    return ", ".join(f"{key} ({one.help})" for key, one in fields.items())
+    return ", ".join(f"{key} ({field.help})" for key, field in fields.items())
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -64,19 +64,19 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     rest = {key: value for key, value in content.items() if key != "kind"}
     _refuse_unknown_keys(rest, kind, where, "", kind)
     try:
-        found: Scene = msgspec.convert(content, kind)
+        scene: Scene = msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
         raise ValueError(f"{where}: {_said(error)}") from None
-    return found
+    return scene
 
 
 def _kind_of(schema: Any, kind: Any, where: str) -> type[Scene]:
     if schema != SCHEMA:
-        found = "it has none" if schema is None else f"this one has {schema!r}"
-        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {found}")
+        said = "it has none" if schema is None else f"this one has {schema!r}"
+        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {said}")
     if not isinstance(kind, str) or kind not in KINDS:
-        found = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), KINDS)}"
-        raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {found}")
+        said = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), KINDS)}"
+        raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {said}")
     return KINDS[kind]
 
 
@@ -87,17 +87,17 @@ def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, plac
         if kind.__struct_config__.tag_field == key:
             continue
         if key not in kind.__struct_fields__:
-            of = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
+            table = "a scene of this kind" if not place else place if place.endswith("]") else f"[{place}]"
             elsewhere = "" if isinstance(value, Mapping) else _other_place(key, scene)
             raise ValueError(
-                f"{where}: {of} has no key {key!r}{elsewhere or '; ' + nearest(key, kind.__struct_fields__)}"
+                f"{where}: {table} has no key {key!r}{elsewhere or '; ' + nearest(key, kind.__struct_fields__)}"
             )
         if not isinstance(value, Mapping | list):
             continue
         inside = f"{place}.{key}" if place else key
         _refuse_unknown_tags(hints[key], value, where, inside)
-        for one, item, number in _tables_in(hints[key], value):
-            _refuse_unknown_keys(item, one, where, inside + number, scene)
+        for structure, item, number in _tables_in(hints[key], value):
+            _refuse_unknown_keys(item, structure, where, inside + number, scene)
 
 
 def _other_place(key: str, scene: type[Scene]) -> str:
@@ -107,14 +107,16 @@ def _other_place(key: str, scene: type[Scene]) -> str:
     tables = [
         name
         for name, hint in get_type_hints(scene).items()
-        if get_origin(hint) is not list and any(key in one.__struct_fields__ for one in structures_in(hint))
+        if get_origin(hint) is not list and any(key in structure.__struct_fields__ for structure in structures_in(hint))
     ]
     return f"; it is a key of {' and '.join(f'[{name}]' for name in tables)}" if tables else ""
 
 
 def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
     """Refuse an effect or a shape of a pulse that there is not, with the nearest."""
-    known = {one.__struct_config__.tag: one.__struct_config__.tag_field for one in structures_in(hint)}
+    known = {
+        structure.__struct_config__.tag: structure.__struct_config__.tag_field for structure in structures_in(hint)
+    }
     for number, item in enumerate(value if isinstance(value, list) else ()):
         for word in {word for word in known.values() if word is not None and isinstance(item, Mapping)}:
             if isinstance(item.get(word), str) and item[word] not in known:
@@ -128,7 +130,7 @@ def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any], str]
     structures = structures_in(hint)
     if isinstance(value, Mapping) and len(structures) == 1:
         return [(structures[0], value, "")]
-    by_tag = {one.__struct_config__.tag: one for one in structures}
+    by_tag = {structure.__struct_config__.tag: structure for structure in structures}
     if not structures or not isinstance(value, list):
         return []
     word = structures[0].__struct_config__.tag_field
@@ -146,14 +148,14 @@ def structures_in(hint: Any) -> list[Any]:
     """The structures that a type allows."""
     if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
         return [hint]
-    return [one for part in get_args(hint) for one in structures_in(part)]
+    return [structure for part in get_args(hint) for structure in structures_in(part)]
 
 
 def _said(error: msgspec.ValidationError) -> str:
     """The words of msgspec with the key first: "Expected `int`, got `str` - at `$.numerics.jmax`"."""
     text = str(error)
-    found = re.fullmatch(r"(.*) - at `\$\.?(.*)`", text)
-    return f"{found[2]}: {_plain(found[1])}" if found else _plain(text)
+    match = re.fullmatch(r"(.*) - at `\$\.?(.*)`", text)
+    return f"{match[2]}: {_plain(match[1])}" if match else _plain(text)
 
 
 def _plain(text: str) -> str:
@@ -165,10 +167,10 @@ def _plain(text: str) -> str:
     if missing := re.fullmatch(r"Object missing required field `(.*)`", text):
         return f"the key {missing[1]!r} is missing"
     if types := re.fullmatch(r"Expected `(.*)`, got `(.*)`", text):
-        allowed = [_TYPES.get(one, one) for one in types[1].split(" | ") if one != "null"]
+        allowed = [_TYPES.get(name, name) for name in types[1].split(" | ") if name != "null"]
         decimal = types[2] == "float" and "float" not in types[1]
-        found = "a number with a decimal point" if decimal else _TYPES.get(types[2], types[2])
-        return f"expected {' or '.join(allowed)}, found {found}"
+        value = "a number with a decimal point" if decimal else _TYPES.get(types[2], types[2])
+        return f"expected {' or '.join(allowed)}, found {value}"
     return text[:1].lower() + text[1:].replace("`", "")
 
 
@@ -235,6 +237,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of all kinds of scene, from which editors complete scene files."""
-    every: Any = Union[tuple(KINDS.values())]  # noqa: UP007  # of types that are known when it runs
-    schema: dict[str, Any] = msgspec.json.schema(every)
+    schemas: Any = Union[tuple(KINDS.values())]  # noqa: UP007  # of types that are known when it runs
+    schema: dict[str, Any] = msgspec.json.schema(schemas)
     return {"title": "A scene of rotor", **schema}

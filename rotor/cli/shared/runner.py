@@ -29,18 +29,18 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     verb = verb.by_what(typed.keys())
     there = {name: typed[name] for name in typed.keys() & places_of(verb)}
     inputs = {name: value for name, value in typed.items() if name not in there}
-    given, there = Given(with_extras(verb, inputs), "option"), with_files(verb, there)
-    shown = verb.read_shown(given)
+    entries, there = Given(with_extras(verb, inputs), "option"), with_files(verb, there)
+    shown = verb.read_shown(entries)
     with as_typed(verb, there):
         files, growing = files_of_options(verb, there), files_of_options(verb, there, grows=True)
         if written := {**files.paths, **growing.paths}:
             refuse_overwriting(written, inputs)
     view = picture_settings(verb, there, "--plot" in files.paths)
-    request, subject = verb.read(given, Place(".", note))
-    if missing := next((one.flag for one in verb.outputs if one.required and one.name not in there), ""):
+    request, subject = verb.read(entries, Place(".", note))
+    if missing := next((output.flag for output in verb.outputs if output.required and output.name not in there), ""):
         raise ValueError(f"{missing} is missing; --help shows what the command takes")
     outputs = by_name(verb, files, growing)
-    request = request if verb.adapt is None else verb.adapt(request, outputs, given)
+    request = request if verb.adapt is None else verb.adapt(request, outputs, entries)
     if "--json" in files.screen:
         outputs["json"] = ()
     if verb.check is not None:
@@ -55,7 +55,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
             with nullcontext() if verb.stepwise else elapsed_time("computing"):
                 answer = verb.answer(request, work)
         with answering():
-            report = report_of(verb, answer, head, given, view, executor)
+            report = report_of(verb, answer, head, entries, view, executor)
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):
             note(text)
@@ -65,7 +65,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         if "--save-scene" in files.paths:
             left_out = outputs.keys() - by_name(verb, files, growing).keys()
             named = {name: value for name, value in there.items() if name not in left_out}
-            writers["--save-scene"] = scene_writer(verb, request, subject, given, named)
+            writers["--save-scene"] = scene_writer(verb, request, subject, entries, named)
         show = partial(show_answer, verb, answer, report)
         with naming(verb):
             deliver(files, writers, lambda: verb.json(answer, report.content), show)
@@ -84,16 +84,16 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 
 def places_of(verb: Verb) -> set[str]:
     """The options that say where results go, not what is computed: files, pictures, processes."""
-    files = {one.name for one in verb.outputs} | {one.option for one in verb.extras if one.files is not None}
+    files = {each.name for each in verb.outputs} | {each.option for each in verb.extras if each.files is not None}
     return files | {"json", "save_scene", "workers", *PLOT_NAMES}
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
     """The texts, options that stand for several files replaced by these."""
     files: dict[str, Any] = {}
-    for one in verb.extras:
-        if one.files is not None and one.option in typed:
-            files |= one.files(typed[one.option])
+    for extra in verb.extras:
+        if extra.files is not None and extra.option in typed:
+            files |= extra.files(typed[extra.option])
     return {**files, **typed}
 
 
@@ -104,13 +104,13 @@ def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
         yield
     except ValueError as error:
         flag, text = str(error).partition(" ")[::2]
-        for one in verb.extras:
+        for extra in verb.extras:
             if (
-                one.files is not None
-                and any(flag == verb.output(name).flag for name in one.files(""))
-                and one.option in typed
+                extra.files is not None
+                and any(flag == verb.output(name).flag for name in extra.files(""))
+                and extra.option in typed
             ):
-                raise ValueError(f"{one.option} {text}") from None
+                raise ValueError(f"{extra.option} {text}") from None
         raise
 
 
@@ -126,26 +126,28 @@ def withhold(verb: Verb, answer: Any, files: Files) -> None:
 def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
     """The texts of inputs alone, options that stand for others replaced by what they mean."""
     values = {name: value for name, value in typed.items() if name in verb.fields}
-    for one in verb.extras:
-        if one.option not in typed or one.read is None:
+    for extra in verb.extras:
+        if extra.option not in typed or extra.read is None:
             continue
-        if double := next((other for other in one.instead_of if other in typed), None):
-            raise ValueError(f"{one.option} and {verb.fields[double].flag}: give one of them")
+        if double := next((other for other in extra.instead_of if other in typed), None):
+            raise ValueError(f"{extra.option} and {verb.fields[double].flag}: give one of them")
         try:
-            values = {**one.read(typed[one.option]), **values}
+            values = {**extra.read(typed[extra.option]), **values}
         except ValueError as error:
-            raise ValueError(f"{one.option}: {error}") from None
+            raise ValueError(f"{extra.option}: {error}") from None
     if verb.read_extras is not None:
-        values |= verb.read_extras({one.option: typed[one.option] for one in verb.extras if one.option in typed})
+        values |= verb.read_extras(
+            {extra.option: typed[extra.option] for extra in verb.extras if extra.option in typed}
+        )
     return values
 
 
 def files_of_options(verb: Verb, typed: Mapping[str, Any], grows: bool = False) -> Files:
     """The files to write when all is done, each with a suffix that can be written; or those that grow while the answer is made."""
     files = Files()
-    for one in verb.outputs:
-        for number, path in enumerate(_paths(typed.get(one.name)) if one.grows == grows else ()):
-            files.ask(one.flag + " " * number, path, one.suffixes)
+    for output in verb.outputs:
+        for number, path in enumerate(_paths(typed.get(output.name)) if output.grows == grows else ()):
+            files.ask(output.flag + " " * number, path, output.suffixes)
     if not grows:
         files.ask("--save-scene", typed.get("save_scene"), (".toml",))
         files.ask_json(typed.get("json"))
@@ -166,13 +168,13 @@ def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) ->
 
 def by_name(verb: Verb, *groups: Files) -> dict[str, tuple[Path, ...]]:
     """The paths of files by the names of their outputs."""
-    names = {"--save-scene": "save_scene", "--json": "json", **{one.flag: one.name for one in verb.outputs}}
-    found: dict[str, tuple[Path, ...]] = {}
+    names = {"--save-scene": "save_scene", "--json": "json", **{output.flag: output.name for output in verb.outputs}}
+    paths_by_name: dict[str, tuple[Path, ...]] = {}
     for files in groups:
         for option, path in files.paths.items():
             name = names[option.strip()]
-            found[name] = (*found.get(name, ()), path)
-    return found
+            paths_by_name[name] = (*paths_by_name.get(name, ()), path)
+    return paths_by_name
 
 
 def _paths(value: Any) -> tuple[str, ...]:
@@ -190,7 +192,7 @@ def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
 def naming(verb: Verb) -> Iterator[None]:
     """Inside, a ValueError that names a field of the request names its option; a tool has checked its own when it was made."""
     fields = verb.fields.values() if verb.has_scenes else ()
-    with renaming({one.name: one.flag for one in fields if one.flag}):
+    with renaming({field.name: field.flag for field in fields if field.flag}):
         yield
 
 
@@ -209,10 +211,10 @@ def working(verb: Verb, workers: Any) -> Any:
     return executor
 
 
-def scene_writer(verb: Verb, request: Any, subject: Subject, given: Given, typed: Mapping[str, Any]) -> Any:
+def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Given, typed: Mapping[str, Any]) -> Any:
     """What writes the scene that gives the same tables again; a note names files that a scene does not write."""
-    outputs = {one.name: typed[one.name] for one in verb.outputs if one.scene and one.name in typed}
-    if left := [one.flag for one in verb.outputs if not one.scene and one.name in typed]:
+    outputs = {output.name: typed[output.name] for output in verb.outputs if output.scene and output.name in typed}
+    if left := [output.flag for output in verb.outputs if not output.scene and output.name in typed]:
         note(f"the scene writes no {', '.join(left)}; its other files are those of this command")
 
     def write(path: Path) -> None:
@@ -221,6 +223,6 @@ def scene_writer(verb: Verb, request: Any, subject: Subject, given: Given, typed
         from rotor.scenes.structures import saved_scene
 
         folder = Path(typed["save_scene"]).parent
-        write_scene(saved_scene(verb, request, subject, folder, outputs, given), path)
+        write_scene(saved_scene(verb, request, subject, folder, outputs, entries), path)
 
     return write

@@ -136,7 +136,7 @@ def _jobs(source: str, entries: Mapping[int, CatdirEntry] | None) -> Iterator[tu
         raise FileNotFoundError(
             f"{source}: no such file or folder; expected .cat, HITRAN's .par, ExoMol's .states, or 'library'"
         )
-    files = sorted(one for one in path.rglob("*") if one.is_file() and _kind(one)) if path.is_dir() else [path]
+    files = sorted(file for file in path.rglob("*") if file.is_file() and _kind(file)) if path.is_dir() else [path]
     if not files:
         raise ValueError(f"{source}: no .cat, .par, .hitran or .states file in this folder")
     for file in files:

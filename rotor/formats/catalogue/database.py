@@ -83,10 +83,8 @@ class LineCatalogue:
 
     def species(self) -> CatalogueSpecies:
         """The table of species, in order of their names."""
-        found = self._engine.execute(
-            f"SELECT number, {', '.join(_FACTS)} FROM species ORDER BY name, number"
-        ).fetchall()
-        columns = list(zip(*found, strict=True)) if found else [()] * (1 + len(_FACTS))
+        rows = self._engine.execute(f"SELECT number, {', '.join(_FACTS)} FROM species ORDER BY name, number").fetchall()
+        columns = list(zip(*rows, strict=True)) if rows else [()] * (1 + len(_FACTS))
         facts = {
             name: np.array([("" if value is None else value) for value in column])
             for name, column in zip(_FACTS, columns[1:], strict=True)
@@ -98,19 +96,19 @@ class LineCatalogue:
         rows = self._engine.execute(
             "SELECT number, name, formula, tag, inchikey FROM species ORDER BY number"
         ).fetchall()
-        found = [
+        matches = [
             row[0] for row in rows if row[1] == word or str(row[3]) == word.lstrip("0") or (row[4] and row[4] == word)
         ]
-        found = found or [row[0] for row in rows if same_species(row[1], word)]
-        if not found and "," not in word:  # a state is behind a comma, and a formula means none
-            found = [row[0] for row in rows if row[2] and row[2] == hill_formula(word)]
-        if not found:
+        matches = matches or [row[0] for row in rows if same_species(row[1], word)]
+        if not matches and "," not in word:  # a state is behind a comma, and a formula means none
+            matches = [row[0] for row in rows if row[2] and row[2] == hill_formula(word)]
+        if not matches:
             import difflib
 
             near = difflib.get_close_matches(word, [row[1] for row in rows], n=3, cutoff=0.5)
             hint = f"; similar names: {', '.join(near)}" if near else ""
             raise ValueError(f"{self.path}: no species {word!r} by name, tag, formula or InChIKey{hint}")
-        return [int(one) for one in found]
+        return [int(each) for each in matches]
 
     def lines(self, first_mhz: float, last_mhz: float, words: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
         """Lines of a range as columns, rising in frequency; of the species that words mean, or of all."""
@@ -154,21 +152,21 @@ class LineCatalogue:
 
     def _partitions(self, numbers: Sequence[int]) -> dict[int, PartitionTable]:
         """Q(T) of species."""
-        found = self._engine.execute(
+        columns = self._engine.execute(
             f"SELECT * FROM partition WHERE species IN ({_listed(numbers)}) ORDER BY 1, 2"
         ).fetchnumpy()
-        number, kelvin, q = (np.asarray(found[name]) for name in ("species", "temperature_k", "q"))
+        number, kelvin, q = (np.asarray(columns[name]) for name in ("species", "temperature_k", "q"))
         return {
-            one: PartitionTable(kelvin[number == one], q[number == one], f"{self.path}, species {one}")
-            for one in numbers
+            species: PartitionTable(kelvin[number == species], q[number == species], f"{self.path}, species {species}")
+            for species in numbers
         }
 
     def _facts(self, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
         """Rows of the table of species."""
-        found = self._engine.execute(
+        rows = self._engine.execute(
             f"SELECT number, {', '.join(_FACTS)} FROM species WHERE number IN ({_listed(numbers)})"
         ).fetchall()
-        return {row[0]: dict(zip(_FACTS, row[1:], strict=True)) for row in found}
+        return {row[0]: dict(zip(_FACTS, row[1:], strict=True)) for row in rows}
 
     def _species(
         self, facts: Mapping[str, Any], partition: PartitionTable, rows: Mapping[str, NDArray[Any]]
@@ -186,15 +184,15 @@ class LineCatalogue:
             rows["g_upper"],
             partition,
             error_mhz=rows["error_mhz"],
-            upper=np.array([self._texts[one] for one in rows["upper"].tolist()], dtype=np.str_),
-            lower=np.array([self._texts[one] for one in rows["lower"].tolist()], dtype=np.str_),
+            upper=np.array([self._texts[text] for text in rows["upper"].tolist()], dtype=np.str_),
+            lower=np.array([self._texts[text] for text in rows["lower"].tolist()], dtype=np.str_),
             source=facts["source"] or str(self.path),
             identity=known,
         )
 
     def _read_texts(self, numbers: NDArray[Any]) -> None:
         """Texts of states that were not read before."""
-        new = np.array([one for one in numbers.tolist() if one not in self._texts], dtype=np.int64)
+        new = np.array([each for each in numbers.tolist() if each not in self._texts], dtype=np.int64)
         if len(new):
             self._engine.register("requested", {"number": new})
             rows = self._engine.execute(

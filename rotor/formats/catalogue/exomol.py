@@ -97,7 +97,7 @@ def exomol_species(path: Path, states: States) -> Iterator[SpeciesLines]:
     Raises ValueError with file and line for what cannot be read, and where there is no .trans file.
     """
     partition, base = partition_of_states(states, path), _base(path)
-    files = sorted(one for one in path.parent.glob(f"{base}*.trans*"))
+    files = sorted(file for file in path.parent.glob(f"{base}*.trans*"))
     if not files:
         raise ValueError(f"{path}: no {base}*.trans file beside it")
     name = base.split("__")[0]

@@ -100,7 +100,7 @@ def _columns_of(lines: list[bytes], path: Path, before: int) -> Columns:
         }
         kinds = {pair: pair.decode("ascii").strip() for pair in np.unique(text[:, :3].copy().view("S3")[:, 0]).tolist()}
         columns["species"] = np.array(
-            [_name(kinds[one]) for one in np.ascontiguousarray(text[:, :3]).view("S3")[:, 0].tolist()]
+            [_name(kinds[code]) for code in np.ascontiguousarray(text[:, :3]).view("S3")[:, 0].tolist()]
         )
         for side, (a, b) in (("upper", _COLUMNS["upper"]), ("lower", _COLUMNS["lower"])):
             words = np.ascontiguousarray(text[:, a:b]).view("S15")[:, 0]

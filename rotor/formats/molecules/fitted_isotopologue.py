@@ -61,13 +61,13 @@ def _elements(formula: str) -> dict[str, int]:
     return counts
 
 
-def _same(one: Molecule, other: Molecule) -> bool:
+def _same(molecule: Molecule, other: Molecule) -> bool:
     """Whether two molecules have the same isotopes, and between them the same distances."""
-    if sorted(zip(one.symbols, one.mass_numbers, strict=True)) != sorted(
+    if sorted(zip(molecule.symbols, molecule.mass_numbers, strict=True)) != sorted(
         zip(other.symbols, other.mass_numbers, strict=True)
     ):
         return False
-    first, second = _distances(one), _distances(other)
+    first, second = _distances(molecule), _distances(other)
     return all(np.allclose(first[pair], second[pair], rtol=_NEAR) for pair in first)
 
 

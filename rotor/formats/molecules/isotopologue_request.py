@@ -58,9 +58,9 @@ class IsotopologueTable(Table):
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
         """label, formula, abundance, arrangements, mass_u, kind, a_mhz, b_mhz, c_mhz, mu_a_debye, mu_b_debye, mu_c_debye."""
-        tops = [one.top for one in self.family]
+        tops = [isotopologue.top for isotopologue in self.family]
         texts = {
-            name: np.array([getattr(one, name) for one in self.family])
+            name: np.array([getattr(isotopologue, name) for isotopologue in self.family])
             for name in ("label", "formula", "abundance", "arrangements")
         }
         rigid = np.array([top.rotational_constants_mhz for top in tops]).reshape(-1, 3)
@@ -90,22 +90,22 @@ class IsotopologuesAnswer:
     def remarks(self) -> list[str]:
         """What is not said of the parent, each text once with the isotopologues that it is about."""
         about: dict[str, list[str]] = {}
-        for one in self.family:
-            for text in one.top.notes:
+        for each in self.family:
+            for text in each.top.notes:
                 if text not in self.request.top.notes:
-                    about.setdefault(text, []).append(one.label)
+                    about.setdefault(text, []).append(each.label)
         return [f"{', '.join(labels)}: {text}" for text, labels in about.items()]
 
     @property
     def errors(self) -> ErrorBudget:
         """How far A, B and C of all of them can be trusted."""
-        return constants_budget([one.top for one in self.family])
+        return constants_budget([isotopologue.top for isotopologue in self.family])
 
     def facts(self) -> dict[str, Any]:
         """Everything about the isotopologues, by the keys of docs/verbs."""
         return {
             "name": self.request.top.name or None,
-            "isotopologues": [record(one) for one in self.family],
+            "isotopologues": [record(isotopologue) for isotopologue in self.family],
             "errors": self.errors.as_json(),
         }
 
@@ -124,8 +124,11 @@ def answer_isotopologues(request: IsotopologuesRequest) -> IsotopologuesAnswer:
         family += _named("each", text, lambda value: single_substitutions(request.top, *_substitution(value)))
     if request.site:
         family.append(_named("site", ",".join(request.site), lambda text: isotopologue(request.top, text)))
-    found = {one.label: replace(one, top=with_fitted_isotopologue(one.top)) for one in family}
-    return IsotopologuesAnswer(request, tuple(found.values()))
+    by_label = {
+        isotopologue.label: replace(isotopologue, top=with_fitted_isotopologue(isotopologue.top))
+        for isotopologue in family
+    }
+    return IsotopologuesAnswer(request, tuple(by_label.values()))
 
 
 def _named(name: str, text: Any, make: Any) -> Any:
@@ -142,15 +145,15 @@ def _substitution(text: str) -> tuple[str, str]:
     return element, name
 
 
-def record(one: Isotopologue) -> dict[str, Any]:
+def record(isotopologue: Isotopologue) -> dict[str, Any]:
     """One isotopologue by the keys of docs/verbs."""
-    top, symmetry = one.top, one.top.symmetry
+    top, symmetry = isotopologue.top, isotopologue.top.symmetry
     return {
-        "formula": one.formula,
-        "label": one.label,
-        "substituted": dict(one.substituted),
-        "arrangements": one.arrangements,
-        "abundance": one.abundance,
+        "formula": isotopologue.formula,
+        "label": isotopologue.label,
+        "substituted": dict(isotopologue.substituted),
+        "arrangements": isotopologue.arrangements,
+        "abundance": isotopologue.abundance,
         "mass_u": top.mass_u,
         "kind": top.kind,
         "point_group": symmetry.point_group if symmetry else None,
@@ -159,8 +162,8 @@ def record(one: Isotopologue) -> dict[str, Any]:
         "reduction": top.constants.reduction,
         "representation": top.constants.representation,
         "rotational_constants_mhz": top.rotational_constants_mhz,
-        "axes_of_parent": one.axes,
-        "turned_degrees": one.turned_degrees,
+        "axes_of_parent": isotopologue.axes,
+        "turned_degrees": isotopologue.turned_degrees,
         "dipole_abc_debye": top.dipole_abc_debye,
         "spin_weights": top.spin_weights.to_mapping(),
         "spin_constants_mhz": dict(top.spin_constants.values) if top.spin_constants else None,

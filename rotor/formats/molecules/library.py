@@ -35,8 +35,8 @@ def folders() -> tuple[Path, ...]:
     for folder in named:
         if not folder.is_dir():
             raise ValueError(f"{VARIABLE}: {folder} is no folder; make it, or take it out of the variable")
-    own = Path(os.path.expanduser("~")) / ".rotor" / "molecules"
-    return (*named, *([own] if own.is_dir() else []), data_folder() / "molecules")
+    home = Path(os.path.expanduser("~")) / ".rotor" / "molecules"
+    return (*named, *([home] if home.is_dir() else []), data_folder() / "molecules")
 
 
 def names() -> dict[str, Path]:
@@ -46,10 +46,10 @@ def names() -> dict[str, Path]:
 
     Raises ValueError where two files of one folder claim one name.
     """
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for folder in reversed(folders()):
-        found.update(_index(folder))
-    return found
+        paths.update(_index(folder))
+    return paths
 
 
 def library_file(name: str) -> Path | None:
@@ -101,9 +101,9 @@ def written_formula(name: str, formula: str) -> str:
     path = library_file(parent) if parent else None
     if path is None:
         return formula
-    known = [path.stem, *(key for key, of in names().items() if of == path)]
-    same = (one for one in known if atoms_of(one) == atoms_of(formula))
-    return next(same, None) or next(filter(None, (_substituted(one, formula) for one in known)), formula)
+    known = [path.stem, *(key for key, file in names().items() if file == path)]
+    same = (key for key in known if atoms_of(key) == atoms_of(formula))
+    return next(same, None) or next(filter(None, (_substituted(key, formula) for key in known)), formula)
 
 
 def _substituted(written: str, formula: str) -> str | None:
@@ -118,15 +118,15 @@ def _substituted(written: str, formula: str) -> str | None:
         isotopes.setdefault(re.sub(r"[\[\]\d]", "", atom), {})[_SHORT.get(atom, atom)] = count
     elements = [element for element, _ in tokens]
     whole = "".join(f"{element}{count}" for element, count in tokens) == written
-    if not whole or atoms_of(written) != {element: sum(found.values()) for element, found in isotopes.items()}:
+    if not whole or atoms_of(written) != {element: sum(counts.values()) for element, counts in isotopes.items()}:
         return None
-    if any(len(found) > 1 and (element != "H" or elements.count("H") > 1) for element, found in isotopes.items()):
+    if any(len(counts) > 1 and (element != "H" or elements.count("H") > 1) for element, counts in isotopes.items()):
         return None
-    one = {element: next(iter(found)) for element, found in isotopes.items()}
+    isotope = {element: next(iter(counts)) for element, counts in isotopes.items()}
     return "".join(
         "".join(f"{atom}{n if n > 1 else ''}" for atom, n in isotopes[element].items())
         if len(isotopes[element]) > 1
-        else one[element] + count
+        else isotope[element] + count
         for element, count in tokens
     )
 
@@ -151,12 +151,12 @@ def _index(folder: Path) -> dict[str, Path]:
 
 @lru_cache(maxsize=32)
 def _read_index(folder: Path, files: Stamp) -> dict[str, Path]:
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for path in (folder / name for name, _ in files):
         for key in dict.fromkeys(map(_key, (*_names_in(path), path.stem))):
-            if found.setdefault(key, path) != path:
-                raise ValueError(f"{path}: the name {key!r} belongs to {found[key]} already; give one of them another")
-    return found
+            if paths.setdefault(key, path) != path:
+                raise ValueError(f"{path}: the name {key!r} belongs to {paths[key]} already; give one of them another")
+    return paths
 
 
 def _names_in(path: Path) -> tuple[str, ...]:
@@ -170,8 +170,8 @@ def _names_in(path: Path) -> tuple[str, ...]:
     except (ValueError, RecursionError):  # no TOML, no UTF-8
         return ()
     listed = content.get("names", [])
-    found = [content.get("name"), *(listed if isinstance(listed, list) else [])]
-    return tuple(name for name in found if isinstance(name, str) and name)
+    listed_names = [content.get("name"), *(listed if isinstance(listed, list) else [])]
+    return tuple(name for name in listed_names if isinstance(name, str) and name)
 
 
 def _key(name: str) -> str:

@@ -146,9 +146,9 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def refuse_unknown_keys(given: Iterable[str], known: Iterable[str], place: str) -> None:
+def refuse_unknown_keys(keys: Iterable[str], known: Iterable[str], place: str) -> None:
     known = tuple(known)
-    for key in given:
+    for key in keys:
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
@@ -313,13 +313,13 @@ def polarizability_of(
         return None
     table.refuse_unknown(("unit", "source", "unverified", *_ELEMENTS, *_AXIAL[0], *_AXIAL[1]))
     unit = table.text("unit", "Å3")
-    given = [key for key in table.content if key not in ("unit", "source", "unverified")]
-    values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in given}
-    if tuple(sorted(given)) in (tuple(sorted(pair)) for pair in _AXIAL):
+    elements = [key for key in table.content if key not in ("unit", "source", "unverified")]
+    values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in elements}
+    if tuple(sorted(elements)) in (tuple(sorted(pair)) for pair in _AXIAL):
         return _axial(table, values, kind_of(constants, molecule))
-    if not {"aa", "bb", "cc"} <= set(given) <= set(_ELEMENTS):
+    if not {"aa", "bb", "cc"} <= set(elements) <= set(_ELEMENTS):
         raise ValueError(
-            f"{table.place}: {', '.join(given) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
+            f"{table.place}: {', '.join(elements) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
             "or parallel and perpendicular, or mean and anisotropy"
         )
     aa, bb, cc, ab, ac, bc = (values.get(key, 0.0) for key in _ELEMENTS)
@@ -369,12 +369,12 @@ def spin_weights_of(table: TableReader | None, constants: Constants | None) -> S
 def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, float | None]:
     """Value and standard deviation in MHz of an entry that is a number, text with a unit, or a table of value and uncertainty."""
     item = table.content[key]
-    one = TableReader(table.place, key, item if isinstance(item, dict) else {"value": item})
-    one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
-    value = one.quantity("value", one.content.get("value"), unit, "MHz")
-    if "uncertainty" not in one.content:
+    entry = TableReader(table.place, key, item if isinstance(item, dict) else {"value": item})
+    entry.refuse_unknown(("value", "uncertainty", "source", "unverified"))
+    value = entry.quantity("value", entry.content.get("value"), unit, "MHz")
+    if "uncertainty" not in entry.content:
         return value, None
-    return value, one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+    return value, entry.quantity("uncertainty", entry.content["uncertainty"], unit, "MHz")
 
 
 def catalogue_of(table: TableReader | None) -> MeasuredLines | None:

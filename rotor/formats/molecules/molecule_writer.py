@@ -79,7 +79,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
 def _states(states: StateConstants | None) -> dict[str, Any]:
     if states is None:
         return {}
-    weights = {str(v): one.to_mapping() for v, one in states.weights.items()}
+    weights = {str(v): weight.to_mapping() for v, weight in states.weights.items()}
     dipoles = {",".join(map(str, sorted(set(pair)))): list(moment) for pair, moment in states.dipoles.items()}
     values = {name: uncertain_entry(value, states.uncertainties.get(name)) for name, value in states.values.items()}
     more = {"names": list(states.names), "symmetry": states.symmetry, "weights": weights, "dipoles": dipoles}
@@ -90,7 +90,7 @@ def _geometry(molecule: MoleculeFile) -> dict[str, Any]:
     if molecule.molecule is None:
         return {}
     body = molecule.molecule
-    labels = [one.label for one in body.nuclei]
+    labels = [nucleus.label for nucleus in body.nuclei]
     return {
         "kind": molecule.geometry_kind,
         "vibrational_difference": molecule.vibrational_difference,

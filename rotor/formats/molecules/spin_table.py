@@ -77,9 +77,9 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
 
 def _twice(part: TableReader, name: str) -> int:
     """Twice a spin, from the isotope it is called after or from what the table says."""
-    given = part.content.get("spin")
-    size = str(given) if isinstance(given, float | int) and not isinstance(given, bool) else None
-    size = part.text("spin") if given is not None and size is None else size
+    stated = part.content.get("spin")
+    size = str(stated) if isinstance(stated, float | int) and not isinstance(stated, bool) else None
+    size = part.text("spin") if stated is not None and size is None else size
     try:
         return twice_of(name) if size is None else parse_spins(f"{name}={size}")[name]
     except ValueError as reason:
@@ -94,7 +94,9 @@ def _atom(part: TableReader, name: str, molecule: Molecule | None) -> int | None
             raise part.error("atom", "expected only with a geometry, for one nucleus")
         return None
     label = name.partition("_")[0]
-    alike = [i for i, one in enumerate(molecule.nuclei, start=1) if label in (one.label, *_own_name(one.label))]
+    alike = [
+        i for i, nucleus in enumerate(molecule.nuclei, start=1) if label in (nucleus.label, *_own_name(nucleus.label))
+    ]
     if number is None:
         return alike[0] if len(alike) == 1 else None
     if number not in alike:

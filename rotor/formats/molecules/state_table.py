@@ -23,7 +23,9 @@ def states_of(table: TableReader | None, constants: Constants | None) -> StateCo
             values[key], error = uncertain_number(table, key, unit)
             if error is not None:
                 errors[key] = error
-    weights = {_state(table, v): _weights_of_state(table, one, constants) for v, one in _part(table, "weights").items()}
+    weights = {
+        _state(table, v): _weights_of_state(table, weight, constants) for v, weight in _part(table, "weights").items()
+    }
     dipoles = {}
     for pair, moment in _part(table, "dipoles").items():
         a, b = sorted(_state(table, part) for part in (pair.split(",") * 2)[:2])
