@@ -136,7 +136,9 @@ def _lines_of(
     """The lines of a code: of a series in every state one for each state, with the constants of each."""
     oblate = options.nvib < 0
     typ, axes = symmetry_type(digits, oblate), basis_axes(oblate)
-    every = [(v, v) for v in range(count)] if states is None and is_series(digits) else [states]
+    every: list[tuple[int, int] | None] = [states]
+    if states is None and is_series(digits):
+        every = [(v, v) for v in range(count)]
     back = digits.v2 > digits.v1
     return [CodedLine("", 0.0, coded_operator(digits, axes, series, own), own, back, typ) for own in every]
 
