@@ -274,7 +274,7 @@ def plan_of_fluid(request: Any) -> Plan:
     settings = request.settings
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
-    made = replace(with_box(request), box_equilibration_ps=0.0)
+    made: Any = replace(with_box(request), box_equilibration_ps=0.0)  # its box is made
     least_ps, most_ps = equilibration_range(request.equilibration_ps)
     before = round(1e3 * least_ps / settings.step_fs)
 

@@ -135,7 +135,7 @@ def _top(name: str, sections: Mapping[str, Sequence[tuple[int, str]]]) -> Top:
         raise ValueError(f"{', '.join(spins)} beside S = 0: expected the spin S of the nucleus")
     named = {f"{key}({SPIN})": value for key, value in spins.items()}
     return Top.from_constants(
-        Constants(reduction="A", representation="Ir", **rotation),  # type: ignore[arg-type]  # names are those of constants
+        Constants(reduction="A", representation="Ir", **rotation),
         dipole_abc_debye=dipole if any(dipole) else None,
         spin_constants=SpinConstants(named, {SPIN: twice}, "file of westerfit") if twice and named else None,
         internal_rotation=internal,

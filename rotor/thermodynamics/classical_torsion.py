@@ -114,7 +114,7 @@ def passage_rate(body: TurningTop, kt: float) -> float:
     """The equilibrium flux over all maxima of V, in both directions.
 
     >>> free = TurningTop([8.0, 40.0, 44.0], [1.0, 0.0, 0.0], 3.0, {3: 1e-9})
-    >>> round(passage_rate(free, 2.0) / (3 / (2 * np.pi) * np.sqrt(4.0 / (np.pi * free.reduced_moment))), 6)
+    >>> round(float(passage_rate(free, 2.0) / (3 / (2 * np.pi) * np.sqrt(4.0 / (np.pi * free.reduced_moment)))), 6)
     1.0
     """
     weight = np.exp(-body.potential(ANGLES) / kt)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, json_text, show_facts, show_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
-from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
+from rotor.verbs.cat_request import CatRequest
 from rotor.verbs.comparing import (
     Compared,
     beside,
@@ -35,79 +34,6 @@ Examples:
   rotor cat c060503.cat.gz --compare OCS
   rotor cat c052009.cat.gz --compare CH3Cl --isotope Cl=37Cl --plot difference.png
   rotor cat case.cat --compare case.int --json difference.json"""
-
-
-COMPARED = "Comparison"
-
-
-@dataclass(frozen=True)
-class CatRequest:
-    """Which lines are shown, and what they are compared with."""
-
-    file: str = declared(REQUIRED, Text(metavar="FILE"), "Catalogue (.cat, .cat.gz)", option="FILE")
-    range_mhz: tuple[float, float] = declared(
-        INFINITE, Range("MHz"), "First and last frequency (MHz)", option="--range"
-    )
-    min_lgint: float | None = declared(
-        None,
-        Quantity(least=-300, most=300),
-        "Leave out lines with log10(nm² MHz) below",
-        option="--min-lgint",
-        none="none",
-    )
-    measured: str | None = declared(None, Text(metavar="FILE"), "Catalogue whose measured lines are merged in")
-    compare: str | None = declared(
-        None,
-        Text(metavar="OTHER"),
-        "Another .cat, an .int, or a molecule to predict: what differs in OTHER",
-        panel=COMPARED,
-    )
-    temperature: float | None = declared(
-        None,
-        Quantity("K", above=0, metavar="T"),
-        "Of the intensities of FILE, for a molecule (K; by default what FILE says, else 300)",
-        panel=COMPARED,
-    )
-    isotope: tuple[str, ...] = declared(
-        (),
-        Names("1=2H"),
-        "Another isotope of the molecule to predict, by atom number or element; repeatable",
-        panel=COMPARED,
-    )
-    as_spcat: bool = declared(
-        False,
-        Flag(),
-        "OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum",
-        panel=COMPARED,
-    )
-    full_basis: bool = declared(
-        False,
-        Flag(),
-        "OTHER, an .int, is predicted with every K in the basis, whatever KNMIN and KNMAX say",
-        panel=COMPARED,
-    )
-    top_lines: int = declared(20, Whole(0), "How many lines are shown", option="--top", panel=OUTPUT)
-
-    def __post_init__(self) -> None:
-        """--temperature and --isotope belong to a molecule that is predicted, --as-spcat and --full-basis to an .int file."""
-        check_fields(self)
-        other = (self.compare or "").lower()
-        for name in ("as_spcat", "full_basis"):
-            if getattr(self, name) and not other.endswith(".int"):
-                raise ValueError(f"{name}: expected with --compare and an .int file to predict")
-        for name in ("temperature", "isotope"):
-            if getattr(self, name) and (not other or other.endswith((".cat", ".cat.gz", ".int"))):
-                raise ValueError(f"{name}: expected with --compare and a molecule to predict; a file has its own")
-
-    def chosen(self, lines: Catalogue) -> Catalogue:
-        """The lines in the range and above the cut."""
-        import numpy as np
-
-        from rotor.formats.spcat.compare import in_mhz
-
-        frequency, _ = in_mhz(lines)
-        least = -np.inf if self.min_lgint is None else self.min_lgint
-        return lines.take((frequency >= self.range_mhz[0]) & (frequency <= self.range_mhz[1]) & (lines.lgint >= least))
 
 
 @dataclass(frozen=True)

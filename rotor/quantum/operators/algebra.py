@@ -87,6 +87,7 @@ def diagonal(factor: Factor) -> Operator:
 def shift(factor: Factor, **steps: int) -> Operator:
     """The operator that changes labels by `steps` and multiplies by a function of the labels before.
 
+    >>> import numpy as np
     >>> raise_k = shift(lambda labels: np.sqrt(labels["K"] + 1.0), K=1)
     >>> [(s.change, float(s.factor({"K": np.array(3)}))) for s in (raise_k @ raise_k).shifts]  # √4 √5
     [((('K', 2),), 4.47213595499958)]

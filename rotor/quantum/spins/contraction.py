@@ -81,7 +81,7 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
     sections, start = [], 0
     for parts in zip(*(block.parts for block in own), strict=True):
         largest = max((part.basis for part in parts), key=lambda basis: basis.size)
-        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))  # type: ignore[arg-type]
+        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
         start += largest.size
     sizes = [len(block.energies_mhz) for block in own]
     vectors = np.zeros((len(own), start, max(sizes)))

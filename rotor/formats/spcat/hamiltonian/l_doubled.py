@@ -28,12 +28,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.quantum.coupled import CoupledBlock, Part
+from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.operators import AxialState, Basis
 from rotor.quantum.spins.parts import assigned
 from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.basis import WangBlock, names_of
+from rotor.quantum.wang.basis import Part, WangBlock, names_of
 from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
 
 
