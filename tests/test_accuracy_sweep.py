@@ -318,3 +318,9 @@ def test_compiling_is_no_part_of_a_time():
     calls.clear()
     assert accuracy_sweep.timed(call, 0.4)[1] >= 0.5
     assert len(calls) == 1
+
+
+def test_times_that_fall_by_less_than_their_scatter_have_one_value():
+    """By 0.3 at medians of 2 and 1.7: more than a tenth, less than quartiles that lie 0.8 and 0.7 apart."""
+    assert accuracy_sweep.without_scatter([[1.2, 2.0, 2.8], [1.0, 1.7, 2.4]]) == pytest.approx([1.85, 1.85])
+    assert accuracy_sweep.without_scatter([[1.9, 2.0, 2.1], [1.6, 1.7, 1.8]]) == pytest.approx([2.0, 1.7])

@@ -7,6 +7,7 @@ import gzip
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 import rotor
 from rotor.assignment.answer import AssignAnswer
 from rotor.assignment.families import Bounds
+from rotor.assignment.growth import prior_weight
 from rotor.assignment.peaks import PeakList, peak_list, spurs
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.assignment.rigid_table import PARAMETERS
@@ -386,3 +388,11 @@ def test_wrong_guesses_are_refused(guess: str, message: str) -> None:
 
     with pytest.raises(ValueError, match=message):
         guess_values(guess)
+
+
+def test_what_is_known_beforehand_weighs_as_its_standard_errors() -> None:
+    """Of A, B, C 5 %, or the spread of the field; of distortion the sizes that are given."""
+    sizes, constants = np.array([1e-3, 2e-3, 3e-3, 4e-5, 5e-6]), np.array([9000.0, 3000.0, 2500.0])
+    for spread, errors in ((None, 0.05 * constants), (np.array([30.0, 2.0, 1.0]), [30.0, 2.0, 1.0])):
+        covariance = np.linalg.inv(prior_weight(SimpleNamespace(spread=spread), constants, sizes))  # type: ignore[arg-type]
+        assert np.allclose(np.sqrt(np.diag(covariance)), [*errors, *sizes], rtol=1e-12)

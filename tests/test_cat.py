@@ -12,7 +12,14 @@ from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.spcat.text import _kernels, cat, rows
 from rotor.formats.spcat.text.cat import format_lines, read_cat, write_cat
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
-from rotor.formats.spcat.text.fields import BLANK, read_degeneracy, read_quantum, spell_degeneracy, spell_quantum
+from rotor.formats.spcat.text.fields import (
+    BLANK,
+    read_degeneracy,
+    read_quantum,
+    spell_decimal,
+    spell_degeneracy,
+    spell_quantum,
+)
 from rotor.formats.spcat.text.line import spell_record
 
 SAMPLES = sorted((Path(__file__).parent / "oracles" / "spcat").glob("*.cat"))
@@ -86,6 +93,7 @@ def test_codes_of_quantum_numbers_and_degeneracies_are_one_to_one():
     assert len({spell_quantum(q) for q in quanta}) == len(quanta)
     assert [spell_quantum(q) for q in (-269, -10, -9, 0, 99, 100, 359)] == ["z9", "a0", "-9", " 0", "99", "A0", "Z9"]
     assert [read_degeneracy(spell_degeneracy(g)) for g in range(3600)] == list(range(3600))
+    assert [read_degeneracy(text) for text in ("   ", "  7")] == [0, 7]
     assert [spell_degeneracy(g) for g in (999, 1000, 2600, 3599)] == ["999", "A00", "Q00", "Z99"]
 
 
@@ -272,11 +280,35 @@ def test_more_than_six_quantum_numbers():
     assert format_lines(mixed) == line + LINE * 2
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-12.3456, "-12.3456"),
+        (-1234.5678, "-1234.57"),
+        (-12345.678, "-12345.7"),
+        (123456.78, "123456.8"),
+        (12345678.4, "12345678"),
+    ],
+)
+def test_a_number_has_as_many_decimals_as_fit_down_to_none(value, text):
+    assert spell_decimal(value, 8, 4) == text
+    with pytest.raises(ValueError, match="does not fit a field of 8 characters"):
+        spell_decimal(-123456789.0, 8, 4)
+
+
 def test_quantum_numbers_without_room_are_refused():
     wide = read_cat(LINE[:51] + b" 308" + b" 1 2 3 4 5 6 7 8" * 2 + b"\n")
     columns = {name: getattr(wide, name) for name in DTYPES}
     with pytest.raises(ValueError, match="line 1 cannot be written: QNFMT 303 can hold 6"):
         format_lines(Catalogue(**{**columns, "qnfmt": np.array([303])}))
+
+
+@pytest.mark.parametrize("widths", [(6, 8), (8, 6), (4, 4)])
+def test_columns_of_quantum_numbers_are_as_many_for_both_states_and_six_or_more(widths):
+    columns = {name: getattr(read_cat(LINE), name) for name in DTYPES}
+    sides = {f"quanta_{side}": np.zeros((1, width)) for side, width in zip(("upper", "lower"), widths, strict=True)}
+    with pytest.raises(ValueError, match="must have the same number of columns, 6 or more"):
+        Catalogue(**{**columns, **sides})
 
 
 def test_a_kept_spelling_does_not_outlive_its_numbers():

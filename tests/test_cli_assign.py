@@ -124,3 +124,11 @@ def test_a_grid_in_ghz_and_an_inverted_one(factor: float, sign: float, message: 
     grid, x = gridded()
     with pytest.raises(ValueError, match=message):
         peaks_of_spectrum(factor * grid, sign * x)
+
+
+@pytest.mark.parametrize("array", [np.ones((5, 4)), np.ones(6), np.ones((2, 3, 2)), np.array([["a", "b"]] * 3)])
+def test_an_array_that_is_no_list_of_peaks_is_refused(call: Call, array: np.ndarray) -> None:
+    np.save("peaks.npy", array)
+    code, _, error = call("assign", "peaks.npy")
+    assert code == 2
+    assert f"an array of shape {array.shape}; two or three columns or rows of numbers are needed" in error

@@ -219,6 +219,10 @@ def test_a_comparison_is_drawn_as_a_mirror_with_differences():
     np.testing.assert_allclose(-tips[2], tips[0])  # the same lines
     assert np.ptp(below.lines[1].get_ydata()) == 0
     assert [text.get_text() for text in above.texts] == ["measured.cat", "SO$_{2}$"]
+    ticks, labels = above.get_yticks(), [text.get_text() for text in above.get_yticklabels()]
+    half = len(ticks) // 2
+    np.testing.assert_allclose(ticks[:half], -ticks[half:])  # the scale below is that above, upside down
+    assert labels[:half] == labels[half:]
 
 
 def test_the_plot_of_a_comparison_is_written(call, tmp_path):

@@ -265,6 +265,13 @@ chi_aa = -4.3
 """
 
 
+def test_a_tensor_in_two_forms_is_refused(call):
+    Path("m.toml").write_text(NITRILE.replace("g = -0.01", "g = -0.01\ng_perpendicular = -0.01"))
+    code, _, err = call("zeeman", "m.toml", "--field", "1 T", "--states", "J<=1")
+    assert code == 2
+    assert "g_perpendicular beside g: give the tensor in one of its forms" in err
+
+
 def test_zeeman_writes_what_the_library_computes(call):
     """Tensors of the file, g of 14N of the table of isotopes, a field in gauss; the same request from Python."""
     Path("m.toml").write_text(NITRILE)

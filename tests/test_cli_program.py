@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -58,3 +59,21 @@ def test_a_shell_can_complete_words(words, found):
         [sys.executable, "-m", "rotor"], env=environment, capture_output=True, text=True, check=False, timeout=60
     )
     assert done.stdout.split() == [found]
+
+
+@pytest.mark.parametrize("ignored", [True, False])
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
+def test_a_process_started_by_nohup_goes_on(ignored):
+    """A terminal that closes sends SIGHUP: it ends a command, but one that ignores it goes on ignoring it."""
+    code = (
+        "import signal, sys, rotor.cli as cli\n"
+        f"signal.signal(signal.SIGHUP, signal.{'SIG_IGN' if ignored else 'SIG_DFL'})\n"
+        "cli.run = lambda: print(signal.getsignal(signal.SIGHUP) == signal.SIG_IGN)\n"
+        "cli.process.end = lambda _: None\n"
+        "cli.main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        check=False, timeout=60,
+    )  # fmt: skip
+    assert done.stdout.split() == [str(ignored)], done.stderr

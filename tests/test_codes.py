@@ -74,6 +74,15 @@ def test_codes_and_signs_are_those_of_the_hamiltonian(kind, reduction, table):
         assert (item.code, item.sign) == (codes.code_of_term(*term), coefficient)
 
 
+@pytest.mark.parametrize(
+    ("letter", "code", "reduction"), [("s", 41000, "A"), ("s", 2000, "S"), ("a", 50000, "S"), ("s", 40100, "S")]
+)
+def test_the_reduction_is_that_of_the_operators_before_that_of_the_letter(letter, code, reduction):
+    """deltaK, 41000, is Watson's A-reduction alone; DeltaK and deltaJ, 2000 and 40100, are in both."""
+    text = f"x\n4 1 1 0\n{letter} 1 1 0 99\n10000 9400.0 0\n20000 3100.0 0\n30000 2500.0 0\n{code} -1e-3 0\n"
+    assert codes.constants_of(read_par(text.encode())).reduction == reduction
+
+
 def test_signs_of_published_constants():
     a = codes.constants_of(read_par(SAMPLES / "h2o_octic.var"))
     assert (a["DeltaJ"], a["deltaJ"], a["PhiK"], a["LK"]) == (37.59422, 15.210402, 3.733028, -0.005)

@@ -19,6 +19,8 @@ from rotor.formats.spcat.predict import predict_file
 from rotor.formats.spcat.text.egy import format_egy, read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import format_par, read_par
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants
 from rotor.verbs.convert import ConvertRequest, lost_options, top_with_errors
 
 ORACLES = Path(__file__).parent / "oracles"
@@ -215,7 +217,7 @@ def test_an_int_file_of_a_molecule_cuts_off_weak_lines_alone(tmp_path):
     assert run(["convert", "CO", str(tmp_path / "co.int")]) == 0
     assert run(["convert", "CO", str(tmp_path / "co.var")]) == 0
     request = read_int(tmp_path / "co.int").request
-    assert (request.str0, request.str1) == (-12.0, -12.0)
+    assert (request.str0, request.str1, request.maxv) == (-12.0, -12.0, 0)
     frequency = predict_file(tmp_path / "co.int").catalogue.frequency_mhz
     assert len(frequency) >= 20
     assert frequency[:2] == pytest.approx([115271.2, 230538.0], abs=1.0)
@@ -226,3 +228,17 @@ def test_the_file_of_a_kind_is_read(tmp_path):
     assert len(KINDS) > 50
     assert read_par(copied("co", tmp_path).with_suffix(".var")).parameters
     assert read_int(tmp_path / "co.int").dipoles
+
+
+def test_three_states_with_weights_of_their_own_go_to_a_file_and_come_back():
+    """Every line of options but the last says that another follows: VSYM below 0."""
+    weights = {1: SpinWeights.from_mapping({"even": 3, "odd": 1}), 2: SpinWeights.from_mapping({"even": 1, "odd": 1})}
+    states = StateConstants({"E[1]": 100.0, "E[2]": 250.0}, weights=weights)
+    top = replace(
+        rotor.Top.from_constants("A=9000 B=3000 C=2500 MHz"),
+        states=states,
+        spin_weights=SpinWeights.from_mapping({"even": 1, "odd": 3}),
+    )
+    options = read_par(format_par(named_parameter_file(top, 20))).options
+    assert [(line.wtpl, line.wtmn) for line in options] == [(1, 3), (3, 1), (1, 1)]
+    assert [line.vsym < 0 for line in options] == [True, True, False]

@@ -266,3 +266,12 @@ def test_help_fits_on_two_screens(call, kind):
 def test_what_is_the_default_is_not_written():
     assert written_fields(toy_verb.RingRequest("CO")) == {}
     assert written_fields(toy_verb.RingRequest("CO", cut_mhz=None)) == {"observables.cut": "none"}
+
+
+def test_files_of_spcat_are_no_scene(call):
+    """An .int file and the constants beside it say all themselves."""
+    (case, *_) = Path(__file__).parent.joinpath("oracles").glob("**/co.int")
+    code, _, err = call("spectrum", str(case), "--save-scene", "s.toml")
+    assert code == 2
+    assert "a scene holds none" in err
+    assert not Path("s.toml").exists()

@@ -7,6 +7,8 @@ from rotor.molecules.mmff_dipole import GAS_SCALE, estimate_dipole
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.readers.read import g2_molecule
 from rotor.molecules.readers.smiles import from_smiles
+from rotor.tops.estimated_dipole import with_dipole_estimate
+from rotor.tops.top import Top
 
 # Measured dipoles in D of molecules in the gas: CRC Handbook of Chemistry and Physics, section 9, Dipole Moments
 MEASURED_DEBYE = {
@@ -65,6 +67,8 @@ def test_where_there_are_no_bonds_or_charges_the_note_says_so(name, capfd):
     assert dipole is None
     assert note.startswith("no dipole")
     assert capfd.readouterr().err == ""
+    with pytest.raises(ValueError, match="no dipole for"):
+        with_dipole_estimate(Top.from_molecule(g2_molecule(name)))
 
 
 def test_a_crowd_of_atoms_is_not_tried():

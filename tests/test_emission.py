@@ -180,3 +180,12 @@ def test_a_line_beyond_the_edge_shows_its_wing():
     assert (
         np.abs(part.spectrum.brightness_k - there).max() < 0.01 * whole.peak.brightness_k
     )  # of the grid, 8 points a width
+
+
+@pytest.mark.parametrize("name", ["column_per_cm2", "excitation_k", "fwhm_km_s"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.inf, -math.inf, math.nan])
+def test_a_source_is_finite_and_above_zero(name, value):
+    fine = {"column_per_cm2": 1e15, "excitation_k": 20.0, "fwhm_km_s": 1.0}
+    assert Source(**fine).fwhm_km_s == 1.0
+    with pytest.raises(ValueError, match=f"{name} = .*: expected a finite number above 0"):
+        Source(**{**fine, name: value})

@@ -244,3 +244,9 @@ def test_mass_numbers_are_raised_in_latex(chloride: Path):
     assert name_text("chi_aa(35Cl)", "text") == "χ_aa(35Cl)"
     assert run(["fit", "cl.csv", "--start", "start.toml", "--free", ",".join(FREE), "--table", "t.tex"]) == 0
     assert r"$\chi_{aa}$($^{35}$Cl)" in (chloride / "t.tex").read_text()
+
+
+def test_a_list_with_fewer_quantum_numbers_than_the_top_has_is_refused(tmp_path):
+    (tmp_path / "a.lin").write_text("  1  1  0  0".ljust(36) + " 5600.0 0.01\n")
+    with pytest.raises(ValueError, match="line 1 of the list: 2 quantum numbers for each state; 3 are needed"):
+        read_assigned_lines(str(tmp_path / "a.lin"), NAMES)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import rotor
+from rotor.fitting.assignment import Assignments
 from rotor.fitting.first_values import beside_zero
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.orders import order_of
@@ -337,3 +338,9 @@ def test_wrong_files_are_one_line(case, call, old, new, said):
     code, _, err = call("fit", "lines.csv", "--start", "start.toml", "--free", "A")
     assert (code, err.count("\n")) == (2, 1), err
     assert said in err
+
+
+def test_lines_by_other_labels_than_those_of_the_start_are_refused():
+    lines = Assignments.from_rows(("j",), [[1, 0, 12000.0, 0.01], [2, 1, 24000.0, 0.01]])
+    with pytest.raises(ValueError, match="labels j: expected j, ka, kc, those of the start"):
+        fit_of_lines(lines, Top.from_constants("A=9 B=6 C=5 GHz"), ["B"])

@@ -131,6 +131,7 @@ def test_the_var_file_is_the_one_that_spfit_writes(shared: Path):
     assert len(ours) == 35 * 36 / 2
     assert np.abs(np.abs(ours) - np.abs(theirs)).max() < 3e-7  # seven decimals are printed
     assert error_factor(fit, asked.file.header) == 1.0
+    assert str(error_factor(fit, replace(asked.file.header, frac=0.0))) == "0.0"  # not -0.0, which a file would show
 
 
 TWO_STATES = b"""two states, one spin

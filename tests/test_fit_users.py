@@ -13,6 +13,8 @@ from rotor.fitting.choose import choose_constants
 from rotor.fitting.fit import Fit, FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.resampling import bootstrap
+from rotor.formats import fit_further
+from rotor.formats.fit_request import answer_fit, fit_of_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
@@ -347,3 +349,20 @@ def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, see
 def write_csv(path, lines: Assignments) -> None:
     rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
     path.write_text(HEAD + "".join(f"{','.join(map(str, [*u, *low]))},{f:.5f},0.003\n" for u, low, f in rows))
+
+
+@pytest.mark.parametrize(
+    ("step", "name"),
+    [("try_constants", "try_constants"), ("suggest_lines", "suggest"), ("_bootstrap", "bootstrap")],
+)
+def test_an_interrupt_beside_a_fit_leaves_what_is_done(step, name, monkeypatch):
+    def interrupted(*_args, **_options):
+        raise KeyboardInterrupt
+
+    rows = [[j + 1, j, 2 * 6000.0 * (j + 1) + 0.01 * (-1) ** j, 0.01] for j in range(6)]
+    answer = answer_fit(fit_of_lines(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"]))
+    monkeypatch.setattr(fit_further, step, interrupted)
+    further = fit_further.with_further(answer, ["D"], "B", 10, 0)
+    assert further.interrupted == f"{name} is not complete"
+    assert further.fit is answer.fit
+    assert len(further.trials) == (name != "try_constants")

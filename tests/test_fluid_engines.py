@@ -412,6 +412,14 @@ def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path)
     assert_same(energy, terms, motion, frame, 1e-6)  # as above
 
 
+def test_a_cutoff_beyond_half_the_cell_is_refused() -> None:
+    atoms = box("spce", 64, 0.9)
+    half = 0.5 * float(np.diag(atoms.cell).min())
+    assert engine_input_of(atoms, settings_for("spce", cutoff_angstrom=half)).edges.min() == 2 * half
+    with pytest.raises(ValueError, match="at most half of it will do"):
+        engine_input_of(atoms, settings_for("spce", cutoff_angstrom=1.001 * half))
+
+
 def test_an_input_of_molecules_on_top_of_each_other_is_refused() -> None:
     atoms = box("spce", 64, 0.9)
     atoms.positions[3:6] = atoms.positions[:3] + 0.05

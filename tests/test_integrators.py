@@ -274,3 +274,9 @@ def test_compensated_sums_hold_the_lengths_thirty_times_better():
     lengths = np.linalg.norm(motion.momentum[:, -1], axis=-1) / np.linalg.norm(momenta, axis=-1) - 1.0
     assert np.sqrt(np.mean(lengths**2)) < 4e-15  # 200 000 steps; 3e-14 when the carry is dropped
     assert np.sqrt(np.mean((np.linalg.norm(motion.attitude[:, -1], axis=-1) - 1.0) ** 2)) < 4e-15
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [0.0, 0.0]])
+def test_times_that_turn_back_or_stand_still_are_refused(times):
+    with pytest.raises(ValueError, match="times must all increase, or all decrease, without repetition"):
+        integrate(RotationSplitting(0.1), MOMENTS, MOMENTUM, times)

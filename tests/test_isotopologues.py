@@ -96,6 +96,13 @@ def test_one_at_a_time():
         single_substitutions(rotor.read("CH3CN"), "O", "18O")
 
 
+def test_the_lowest_of_equivalent_atoms_is_named_also_for_a_lighter_isotope():
+    """Of boron 11B is the abundant one."""
+    pair = Molecule(("B", "B"), [[0.0, 0.0, 0.0], [0.0, 0.0, 1.6]])
+    family = isotopologues(Top.from_molecule(pair), min_abundance=1e-3)
+    assert [dict(one.substituted) for one in family] == [{}, {1: "10B"}, {1: "10B", 2: "10B"}]
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

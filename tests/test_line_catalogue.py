@@ -131,6 +131,7 @@ def test_exomol_states_and_packed_transitions(tmp_path: Path) -> None:
         ("1 0.0 1 0\n2 x 3 1\n", "2 1 1e-7\n", r"\.states, line 2"),
         ("1 0.0 1 0\n2 3.8 3 1\n", "2 1 1e-7\n2 1\n", r"line 2: '2 1"),
         ("1 0.0 1 0\n2 3.8 3 1\n", "3 1 1e-7\n", "state 3 is not in"),
+        ("", "2 1 1e-7\n", r"\.states: no states"),
     ],
 )
 def test_faults_of_exomol_are_named(tmp_path: Path, states: str, trans: str, rule: str) -> None:

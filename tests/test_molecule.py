@@ -163,3 +163,9 @@ def test_arrays_are_copies_that_nobody_changes():
     assert molecule.positions_angstrom[0, 0] == 0
     with pytest.raises(ValueError, match="read-only"):
         molecule.positions_angstrom[0, 0] = 1
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, np.inf, np.nan])
+def test_a_constant_of_the_electron_spin_is_finite_and_above_zero(size):
+    with pytest.raises(ValueError, match=r"electron_spin_mhz .*: expected a finite number above 0"):
+        Molecule(("O", "O"), [[0, 0, 0], [0, 0, 1.2]], multiplicity=3, electron_spin_mhz=size)

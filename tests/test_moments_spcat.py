@@ -17,7 +17,10 @@ from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.text.int_file import Dipole, read_int
 from rotor.formats.spcat.text.par import read_par
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins.moments import moments_of
 from rotor.spectra.transitions import all_transitions
+from rotor.tops.top import Top
 
 TOP = 2  # highest N that is compared
 CONSTANTS = ({"a": 9400.0, "b": 3100.0, "c": 2500.0}, {"a": 9340.0, "b": 3120.0, "c": 2500.0})
@@ -228,3 +231,10 @@ def test_a_cosine_without_an_angle_is_the_plain_dipole(beside, as_spcat):
     plain, cosine = ({lines: value for lines, value in one.items() if value > 1e-12} for one in found)  # of 1 D²
     assert len(plain) > 100
     assert cosine == pytest.approx(plain, rel=1e-6)  # 1e-12 of 1 D² where amplitudes cancel
+
+
+def test_moments_beside_plain_dipoles_need_levels_with_spins():
+    levels = solve_levels(Top.from_constants("A=9 B=6 C=5 GHz"), 2)
+    for plain in (levels, replace(levels, blocks=())):
+        with pytest.raises(ValueError, match="need levels that were solved with spins"):
+            moments_of(plain, {(0, 0): (1.0, 0.0, 0.0)}, [])

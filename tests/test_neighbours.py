@@ -95,6 +95,13 @@ def test_more_neighbours_than_one_block_holds() -> None:
     assert found.energy_ev == pytest.approx(4 * epsilon * np.sum(six**2 - six), rel=1e-9)  # k_B to ten digits
 
 
+def test_molecules_end_to_end_that_overlap_are_refused() -> None:
+    """N2 behind N2 on one line: centres are 1.5 Å apart, the atoms between them 0.4 Å."""
+    atoms = Atoms("N4", positions=[[0, 0, 0], [0, 0, 1.1], [0, 0, 1.5], [0, 0, 2.6]])
+    with pytest.raises(ValueError, match=r"atoms 1 and 2 of different molecules are 0\.4 Å apart"):
+        RigidPotential("trappe-n2", cutoff_angstrom=5.0).evaluate(atoms)
+
+
 def test_pairs_before_an_update_are_refused() -> None:
     lists = Neighbours(assemble(Atoms("Ar"), models_of("argon")), np.zeros(3), 5.0, 1.0)
     with pytest.raises(ValueError, match="not called yet"):

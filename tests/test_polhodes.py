@@ -165,6 +165,21 @@ def test_every_kind_of_body_has_a_picture(moments, momentum):
     assert np.linalg.det(view.axes) == pytest.approx(1.0)  # not mirrored
 
 
+@pytest.mark.parametrize(
+    ("moments", "axis"),
+    [((1.0, 2.0, 2.0), 0), ((2.0, 1.0, 2.0), 1), ((1.0, 1.0, 2.0), 2), ((2.0, 1.0, 1.0), 0), ((0.0, 1.0, 1.0), 0)],
+)
+def test_a_body_with_two_equal_moments_rests_at_right_angles_to_its_axis(moments, axis):
+    start = np.array([0.0, 0.4, -0.9]) if 0.0 in moments else np.array([1.8, 0.4, -0.9])
+    left = polhode_figure(free_motion(moments, start), [0.0, 12.0]).axes[0]
+    (dotted,) = (line for line in left.lines if line.get_label() == "points at rest")
+    view = view_of(np.array(moments), start / np.linalg.norm(start))
+    x, y = dotted.get_xydata().T
+    z = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))  # of the front
+    along = np.stack([x, y, z], axis=-1) @ view.axes[:, axis]
+    assert np.nanmax(np.abs(along[z > 0.1])) < 1e-12
+
+
 def test_a_long_motion_is_cut_and_said_to_be():
     figure = polhode_figure(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]), [0.0, 1e4], time_factor=2.0)
     right = figure.axes[1]

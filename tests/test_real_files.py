@@ -157,3 +157,10 @@ def test_parameters_at_zero_that_move_no_level_to_first_order_stay_out(w: str, l
     assert not left_at_zero(small)
     free = read_par(TWO.format(w=w, held="1E+00").encode())
     assert set(stay_at_zero(free)) == left - {"W"}  # W is held
+
+
+def test_what_two_couplings_join_a_parameter_at_zero_may_move():
+    """G_a and G_b lead from one state to the other and back by a product of the symmetry of N_a N_b + N_b N_a: D_ab acts, F_ab does not."""
+    text = TWO.format(w="0.0", held="1E-37").replace("200001 0.0", "200001 30.").replace("400001 0.0", "400001 20.")
+    file = read_par(text.encode())
+    assert {file.parameters[i].label for i in left_at_zero(file)} == {"W", "Fab", "WK"}

@@ -20,6 +20,9 @@ def test_a_screw_leaves_its_line_where_it_is_but_for_the_shift():
         assert np.allclose(exp(screw.angle * screw.axis) @ q, np.sign(q[0]), atol=1e-12)
     moved = screw_of([1, 0, 0, 0], [0.0, 3.0, 4.0])
     assert (moved.angle, moved.shift, moved.axis.tolist()) == (0.0, 5.0, [0.0, 0.6, 0.8])
+    at_rest = screw_of([1, 0, 0, 0], [0.0, 0.0, 0.0])
+    assert (at_rest.angle, at_rest.shift, at_rest.axis.tolist()) == (0.0, 0.0, [0.0, 0.0, 1.0])
+    assert moved.point.tolist() == at_rest.point.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_the_bracket_is_what_a_small_loop_leaves():

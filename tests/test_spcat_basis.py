@@ -225,3 +225,15 @@ def test_names_of_levels_that_mix_are_noted(call, folder):
     assert re.search(
         r"note: \d+ levels from J = 1 on are mixed by more than 50 %: what names a level has less than half", err + out
     )
+
+
+@pytest.mark.parametrize(("diag", "whole"), [(1, False), (2, True), (4, True)])
+def test_the_share_that_names_a_level_is_that_of_a_function_or_of_its_wang_block(diag, whole, tmp_path):
+    """States of a rigid top lie in one block of Wang's functions; DIAG = 1 names them by single functions."""
+    text = (TOP % (b"1", 0, 60)).replace(b" 1 1 1 0 1 0\n", b" 1 1 1 0 1 %d\n" % diag)
+    (tmp_path / "a.var").write_bytes(text)
+    (tmp_path / "a.int").write_bytes(ASKED % 8)
+    mixing = levels_of_file(tmp_path / "a.int").mixing
+    assert mixing.max() == pytest.approx(1.0, abs=1e-12)  # J = 0; round-off
+    assert (mixing.min() > 1 - 1e-12) == whole
+    assert (mixing.min() < 0.9) != whole

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.predict import Prediction, predict
+from rotor.formats.spcat.predict_states import summed_q
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 
@@ -30,6 +32,18 @@ def test_a_range_without_levels_is_refused(options):
         _predicted(f"{options}\n{values}", "1 1.0\n", 3)
 
 
+def test_levels_without_a_weight_to_maxv_are_refused():
+    """State 0 has no weights, and MAXV = 0 leaves out state 1."""
+    par = f"limits\n4 1 1 0\na 1 -2 0 8 0 1 0 0 -1\na 1 1 0 8 0 1 1 1 0\n{ABC.replace(chr(10), ' 0' + chr(10))}11 900.0 0\n"
+    for maxv, message in ((0, "no level has a weight from FBGN = 0 to FEND = 3, MAXV = 0"), (1, None)):
+        asked = read_int(f"limits\n0 1 1000 0 3 -15 -15 99999 100 {maxv}\n111 1.0\n".encode())
+        if message:
+            with pytest.raises(ValueError, match=message):
+                predict(read_par(par.encode()), asked, as_spcat=True)
+        else:
+            assert len(predict(read_par(par.encode()), asked, as_spcat=True).catalogue) > 0
+
+
 def test_half_integer_f_begins_at_one_half():
     with pytest.raises(ValueError, match="no level exists from FBGN = 0 to FEND = 0"):
         _predicted(f"a 2 1 0 8\n{ABC}10010000 0.1\n", "1 1.0\n", 0)
@@ -52,3 +66,27 @@ def test_levels_of_two_weights_have_no_lines(spin):
     along = _predicted(f"{options}1 3\n{ABC}{spin}", "1 1.0\n", 3)
     assert 0 < len(both[0].catalogue) < len(both[1].catalogue)
     assert np.array_equal(both[0].catalogue.frequency_mhz, along.catalogue.frequency_mhz)
+
+
+def test_lines_of_states_apart_stand_in_order_of_frequency():
+    """State 1, which nothing couples with state 0, has its lines a little above those of it."""
+    values = ABC + "11 900.0\n10011 1.0\n20011 1.0\n30011 1.0\n"
+    listed = _predicted(f"a 1 2 0 8\n{values}", "1 1.0\n111 1.0\n", 3).catalogue
+    assert set(listed.quanta_upper[:, 3].tolist()) == {0, 1}
+    assert listed.quanta_upper[0, 3] == 0
+    assert (np.diff(listed.frequency_mhz) >= 0).all()
+
+
+def test_q_of_states_apart_says_the_highest_f_of_all():
+    """State 1 has no levels that count at 20 K; those of state 0 are summed to F above 8."""
+    par = read_par(
+        f"limits\n7 1 1 0\na 1 2 0 20 0\n{(ABC + '11 3e8' + chr(10)).replace(chr(10), ' 0' + chr(10))}".encode()
+    )
+    asked = read_int(b"limits\n0 1 1000 0 3 -15 -15 99999 20\n1 1.0\n111 1.0\n")
+    groups = groups_of(par, asked)
+    assert len(groups) == 2
+    single = [summed_q([group], 20.0) for group in groups]
+    both = summed_q(groups, 20.0)
+    assert both.jmax == max(one.jmax for one in single) > min(one.jmax for one in single)
+    assert both.q == pytest.approx(sum(one.q for one in single), rel=1e-12)
+    assert f"summed from levels to F = {both.jmax}" in both.source

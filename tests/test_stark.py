@@ -16,6 +16,7 @@ from scipy.special import obl_cv
 
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
 from rotor.quantum.fields.chains import chain_states, is_chain
+from rotor.quantum.fields.diabatic import crossings
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.solver import reduced_basis, solve_fields
 from rotor.quantum.fields.space import field_space
@@ -273,6 +274,20 @@ def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
     assert (
         max(abs(ends(fine, "label")[key] - symmetric[key]) for key in symmetric) > 1e3
     )  # adiabatic ones do cross over
+
+
+def test_two_crossings_between_two_fields_are_seen():
+    """sin(9x + 0.4) crosses 0 at (π - 0.4)/9 and (2π - 0.4)/9; a level far off, which has no slope, does not stop the search."""
+
+    def solve(x):
+        levels = np.stack([100 * np.sin(9 * x + 0.4), 0 * x, 0 * x + 1000], axis=-1)
+        slopes = np.stack([900 * np.cos(9 * x + 0.4), 0 * x, 0 * x], axis=-1)
+        order = np.argsort(levels, axis=-1)
+        return np.take_along_axis(levels, order, -1), np.take_along_axis(slopes, order, -1)
+
+    found = crossings(solve, np.array([0.0, 1.0]), 1.0)
+    assert [rank for _, rank in found] == [0, 0]
+    assert [at for at, _ in found] == pytest.approx([(np.pi - 0.4) / 9, (2 * np.pi - 0.4) / 9], abs=1e-4)
 
 
 # Bad input

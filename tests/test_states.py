@@ -156,6 +156,12 @@ def test_q_is_the_sum_over_states():
     )  # the peak of two states is in both
 
 
+@pytest.mark.parametrize("moment", ['[0, "x", 1.5]', "[0, 1.5]", "1.5", "[0, true, 1.5]"])
+def test_a_dipole_of_states_is_three_numbers(moment):
+    with pytest.raises(ValueError, match="state 0,1: expected three numbers, along a, b, c in D"):
+        parse_molecule_file(FILE.replace("[0, 0, 1.5] }", f"{moment} }}"))
+
+
 def test_a_file_is_read_and_written_with_its_states(folder):
     file = parse_molecule_file(FILE)
     text = molecule_file_text(file)

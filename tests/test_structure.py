@@ -168,6 +168,13 @@ def test_there_are_as_many_symmetric_displacements_as_totally_symmetric_vibratio
     assert symmetric_displacements(molecule).shape == (3 * len(molecule.symbols), count)
 
 
+def test_a_linear_molecule_with_an_atom_at_its_centre_has_equal_bonds():
+    bent = Molecule(("O", "C", "O"), [[0, 0, 1.16004], [0, 0, 0], [0, 0, -1.16]])
+    heights = symmetric_geometry(bent).positions_angstrom[:, 2]
+    assert heights[0] - heights[1] == pytest.approx(heights[1] - heights[2], abs=1e-14)  # round-off
+    assert heights[0] - heights[2] == pytest.approx(2.32004, abs=1e-14)
+
+
 def test_coordinates_are_set_without_loss_of_symmetry():
     molecule = symmetric_geometry(rotor.read("CH3CN").molecule)
     space, coordinates = symmetric_displacements(molecule), bonds_and_angles(molecule)[:4]

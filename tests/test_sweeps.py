@@ -151,7 +151,12 @@ def test_a_scene_that_no_point_can_be_is_refused_at_once(call, folder):
     assert not Path("s.sweep.jsonl").exists()
 
 
-@pytest.mark.parametrize("line", ["1", "[]", "null", '"a"', '{"key": 1}', '{"key": "a", "values": {}}', "schema = 1"])
+ONE_NUMBER = '{"key": "a", "values": {}, "files": [], "rows": 1}'
+
+
+@pytest.mark.parametrize(
+    "line", ["1", "[]", "null", '"a"', '{"key": 1}', '{"key": "a", "values": {}}', ONE_NUMBER, "schema = 1"]
+)
 def test_odd_lines_of_a_record_are_errors_in_one_line(call, folder, line):
     write_scene(levels(sweep={"observables.jmax": [1]}), "s.toml")
     call("run", "s.toml")

@@ -217,3 +217,8 @@ def test_a_field_is_refused_where_levels_have_no_m():
 
     with pytest.raises(ValueError, match="labelled by M"):
         solve_levels(top_in(), 3, effects=(*SEMI_RIGID, Field(0.01, TILTED)))
+
+
+def test_a_linear_top_refuses_operators_off_the_diagonal():
+    with pytest.raises(ValueError, match="a linear top in a Σ state has K = 0 and operators of J² alone"):
+        solve_levels(Top.from_constants("B=6000 MHz"), 2, effects=(*SEMI_RIGID, LadderSquares(100.0)))

@@ -512,6 +512,9 @@ def test_a_list_of_peaks_is_drawn_as_sticks_and_a_drag_takes_its_peak(service, t
     strongest = float(lines.frequency_mhz[np.argmax(lines.intensity_nm2_mhz)])
     peak = done(listed, "peak", first_mhz=strongest - 0.3, last_mhz=strongest + 0.3)["peak"]
     assert (peak["error_mhz"], peak["width_mhz"], round(peak["height"], 5)) == (0.004, None, 1.0)
+    edge = float(listed.peaks.frequency_mhz[0])
+    for first, last in ((edge, edge + 1e-4), (edge - 1e-4, edge)):  # both ends of a range belong to it
+        assert done(listed, "peak", first_mhz=first, last_mhz=last)["peak"]["frequency_mhz"] == edge
     assert "the list has no peak there" in done(listed, "peak", first_mhz=8000.001, last_mhz=8000.002)["why"]
     for upper, lower in SERIES:
         assert assign_line(listed, upper, lower)["ok"]["label"]
