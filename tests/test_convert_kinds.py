@@ -232,13 +232,23 @@ def test_the_file_of_a_kind_is_read(tmp_path):
 
 def test_three_states_with_weights_of_their_own_go_to_a_file_and_come_back():
     """Every line of options but the last says that another follows: VSYM below 0."""
-    weights = {1: SpinWeights.from_mapping({"even": 3, "odd": 1}), 2: SpinWeights.from_mapping({"even": 1, "odd": 1})}
-    states = StateConstants({"E[1]": 100.0, "E[2]": 250.0}, weights=weights)
+    weights = {
+        v: SpinWeights.from_mapping({"ee": even, "eo": even, "oe": odd, "oo": odd})
+        for v, even, odd in ((0, 1, 3), (1, 3, 1), (2, 5, 7))
+    }
+    states = StateConstants(
+        {
+            f"{name}[{v}]": value * v
+            for v in (1, 2)
+            for name, value in (("E", 100.0), ("A", 9e3), ("B", 3e3), ("C", 2.5e3))
+        },
+        weights=weights,
+    )
     top = replace(
         rotor.Top.from_constants("A=9000 B=3000 C=2500 MHz"),
         states=states,
-        spin_weights=SpinWeights.from_mapping({"even": 1, "odd": 3}),
+        spin_weights=weights[0],
     )
     options = read_par(format_par(named_parameter_file(top, 20))).options
-    assert [(line.wtpl, line.wtmn) for line in options] == [(1, 3), (3, 1), (1, 1)]
+    assert len({(line.wtpl, line.wtmn) for line in options}) == len(options) == 3
     assert [line.vsym < 0 for line in options] == [True, True, False]

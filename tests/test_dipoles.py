@@ -67,8 +67,11 @@ def test_where_there_are_no_bonds_or_charges_the_note_says_so(name, capfd):
     assert dipole is None
     assert note.startswith("no dipole")
     assert capfd.readouterr().err == ""
-    with pytest.raises(ValueError, match="no dipole for"):
-        with_dipole_estimate(Top.from_molecule(g2_molecule(name)))
+
+
+def test_a_top_without_an_estimate_is_refused():
+    with pytest.raises(ValueError, match="MMFF94 has no charges for it"):
+        with_dipole_estimate(Top.from_molecule(g2_molecule("HCl")))
 
 
 def test_a_crowd_of_atoms_is_not_tried():

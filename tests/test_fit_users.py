@@ -12,6 +12,7 @@ from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.choose import choose_constants
 from rotor.fitting.fit import Fit, FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
+from rotor.fitting.report import dfbetas, influential
 from rotor.fitting.resampling import bootstrap
 from rotor.formats import fit_further
 from rotor.formats.fit_request import answer_fit, fit_of_lines
@@ -366,3 +367,14 @@ def test_an_interrupt_beside_a_fit_leaves_what_is_done(step, name, monkeypatch):
     assert further.interrupted == f"{name} is not complete"
     assert further.fit is answer.fit
     assert len(further.trials) == (name != "try_constants")
+
+
+def test_influential_lines_are_named_the_worst_first():
+    rows = [
+        [j + 1, j, 2 * 6000.0 * (j + 1) + 0.01 * error, 0.01]
+        for j, error in enumerate((1, -1, 2, 0, -3, 1, 0, 2, -1, 4))
+    ]
+    fit = answer_fit(fit_of_lines(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"])).fit
+    moved = np.abs(dfbetas(fit)).max(axis=1)
+    named = [int(text.split(",")[0].removeprefix("line ")) - 1 for text in influential(fit, 0.0)]
+    assert named == np.argsort(-moved, kind="stable")[:5].tolist()

@@ -280,3 +280,9 @@ def test_compensated_sums_hold_the_lengths_thirty_times_better():
 def test_times_that_turn_back_or_stand_still_are_refused(times):
     with pytest.raises(ValueError, match="times must all increase, or all decrease, without repetition"):
         integrate(RotationSplitting(0.1), MOMENTS, MOMENTUM, times)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, -1e-9, float("nan")])
+def test_a_tolerance_is_between_0_and_1(tolerance):
+    with pytest.raises(ValueError, match="the tolerance is a number between 0 and 1"):
+        LieRungeKutta(tolerance)

@@ -351,3 +351,9 @@ def test_command_line_shows_states(folder, call):
     code, out, _ = call(*command, "--state-constants", "E[1]=5 A[1]=9.1 B[1]=3.1 C[1]=2.1 GHz W[0,1]=3MHz")
     assert code == 0
     assert "v J Ka Kc" in out
+
+
+@pytest.mark.parametrize(("name", "power"), [("G_c[0,1]", 1), ("F_ab[0,1]", 2), ("W[0,1]", 0)])
+def test_the_size_of_a_coupling_is_that_at_k_equal_to_j(name, power):
+    top = Top.from_constants("A=9 B=6 C=5 GHz")
+    assert InteractingStates({"E[1]": 1e5, name: -3.0}).size_mhz(top, 5) == 3.0 * 5**power

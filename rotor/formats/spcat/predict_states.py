@@ -247,7 +247,7 @@ def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:
             levels = group.levels((2 * f + half, 2 * (f + _STEP) - 2 + half))
             piece = float((levels.degeneracy * np.exp(-levels.energy_mhz / kt)).sum())
             own, f = own + piece, f + _STEP
-            if piece < before and piece * piece / (before - piece) < _TAIL * own:
+            if piece < before < math.inf and piece * piece / (before - piece) < _TAIL * own:
                 break
             if f > _LAST:
                 raise ValueError(f"Q({temperature_k:g} K) needs levels beyond F = {_LAST}; give QROT")
