@@ -85,7 +85,7 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
     if not 0.0 < goal > errors.numerical:
         return ""
     try:
-        choice = chosen(msgspec.structs.replace(scene, accuracy=goal), request)  # type: ignore[call-arg]
+        choice = chosen(msgspec.structs.replace(scene, accuracy=goal), request)
     except ValueError:  # the field is given
         return ""
     if choice.how == NOTHING_CHEAPER:

@@ -51,7 +51,7 @@ BY_OVERLAP = """
     for n in range(1, len(fields)):
         follow = np.abs(vectors[n - 1].conj().T @ vectors[n]).argmax(axis=1)
         energies[n], vectors[n] = energies[n][follow], vectors[n][:, follow]
-    found = type(found)(found.block, found.rows, energies, found.places, vectors, found.error)
+    states = type(states)(states.block, states.rows, energies, states.places, vectors, states.error)
 """
 
 MUTATIONS = (
@@ -63,8 +63,8 @@ MUTATIONS = (
     ),
     Mutation(
         2, "rotor/quantum/estimates/convergence.py",
-        "    found = disordered_blocks(top, levels)\n    if not found:",
-        "    found = disordered_blocks(top, levels)\n    if True:",
+        "    disordered = disordered_blocks(top, levels)\n    if not disordered:",
+        "    disordered = disordered_blocks(top, levels)\n    if True:",
         "tests/test_reliability.py::test_quartic_water_is_told_of",
     ),
     Mutation(
@@ -185,8 +185,8 @@ MUTATIONS = (
     ),
     Mutation(
         22, "rotor/quantum/fields/field_map.py",
-        "    block, fields, vectors = found.block, request.fields, found.vectors\n",
-        "    block, fields, vectors, energies = found.block, request.fields, found.vectors.copy(), found.energies.copy()\n" + BY_OVERLAP,
+        "    block, fields, vectors = states.block, request.fields, states.vectors\n",
+        "    block, fields, vectors, energies = states.block, request.fields, states.vectors.copy(), states.energies.copy()\n" + BY_OVERLAP,
         "tests/hard/test_safeguards.py::test_labels_are_ranks_whatever_the_grid",
     ),
     Mutation(
@@ -201,7 +201,7 @@ MUTATIONS = (
     ),
     Mutation(
         23, "rotor/quantum/fields/solver.py",
-        "if found is None or found[1][2].max() > tolerance_mhz:", "if found is None:",
+        "if spanned is None or spanned[1][2].max() > tolerance_mhz:", "if spanned is None:",
         "tests/test_field_bounds.py::test_stated_errors_are_bounds",
     ),
     Mutation(
