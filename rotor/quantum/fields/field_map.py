@@ -382,7 +382,7 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
         energy_mhz=column(lambda each, rank: each.energies[:, rank]),
         label=repeated(lambda each, rank: each.block.levels.label(int(each.rows[rank]))),
         slope=column(lambda each, rank: each.slopes[:, rank]) / request.slope_unit_mhz,
-        cosines={name: column(partial(_cosine, name)) for name in cosines},
+        cosines={name: column(lambda each, rank, name=name: each.cosines[name][:, rank]) for name in cosines},
         edge_population=column(lambda each, rank: each.edge[:, rank]),
         copies=repeated(lambda each, rank: each.block.copies),
         free_row=repeated(lambda each, rank: each.rows[rank]),
@@ -401,10 +401,6 @@ def _truncation(request: MapRequest, solved: _Solved, rank: int) -> Floats:
     """Bound of what the basis leaves out (fields,); NaN for states listed for their diabatic label alone."""
     is_followed = solved.block.levels.j[solved.rows[rank]] <= request.j_highest
     return solved.error[:, rank] if is_followed else np.full(len(solved.error), np.nan)
-
-
-def _cosine(name: str, block: _Solved, rank: int) -> Floats:
-    return block.cosines[name][:, rank]
 
 
 def _diabatic_ranks(request: MapRequest, jmax: int, states_of_block: _Solved) -> Ints:
