@@ -382,7 +382,7 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
         energy_mhz=column(lambda each, rank: each.energies[:, rank]),
         label=repeated(lambda each, rank: each.block.levels.label(int(each.rows[rank]))),
         slope=column(lambda each, rank: each.slopes[:, rank]) / request.slope_unit_mhz,
-        cosines={name: column(lambda each, rank, name=name: each.cosines[name][:, rank]) for name in cosines},
+        cosines={name: np.concatenate([each.cosines[name][:, rank] for each, rank in rows]) for name in cosines},
         edge_population=column(lambda each, rank: each.edge[:, rank]),
         copies=repeated(lambda each, rank: each.block.copies),
         free_row=repeated(lambda each, rank: each.rows[rank]),
