@@ -14,9 +14,9 @@ import numpy as np
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parts_of
-from rotor.quantum.effect import QuantumEffect, k_limits_of
+from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, weights_by_state
-from rotor.quantum.states import Coupling, OperatorOfJ, State, couplings_of
+from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators

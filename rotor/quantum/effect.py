@@ -20,7 +20,7 @@ from rotor.tops.operators import Operators
 if TYPE_CHECKING:
     from rotor.quantum.moments import Moment
     from rotor.quantum.spins.terms import Spin, SpinTerm
-    from rotor.quantum.states import Coupling, State
+    from rotor.quantum.states import Coupling, OperatorOfJ, State
     from rotor.quantum.wang.j_operators import JOperator
     from rotor.tops.top import Top
 
@@ -178,3 +178,25 @@ def effect_sizes(
 def k_limits_of(top: Top, effects: Iterable[QuantumEffect]) -> dict[int, tuple[int, int]]:
     """The limits of K that the effects set, by states."""
     return {v: limits for effect in effects for v, limits in effect.k_limits(top).items()}
+
+
+def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str) -> list[Coupling]:
+    """Couplings of effects, and what acts in the top's own state by other operators of J than powers."""
+    from rotor.quantum.states import Coupling
+
+    couplings: list[Coupling] = []
+    for effect in effects:
+        couplings += effect.couplings(top)
+        for name in effect.parameters(top):
+            if effect.j_operator(top, name, 1, representation) is not None:
+                couplings.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
+    return couplings
+
+
+def _own_operator(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
+    def operator(j: int, representation: str) -> JOperator:
+        matrix = effect.j_operator(top, name, j, representation)
+        assert matrix is not None
+        return matrix
+
+    return operator

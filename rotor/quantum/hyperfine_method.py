@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.checks import require_one_of, require_positive
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.levels import Used
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
@@ -16,15 +17,6 @@ if TYPE_CHECKING:
 METHODS = ("auto", "exact", "N-diagonal", "first-order")
 EXACT, N_DIAGONAL, FIRST_ORDER = "exact", "N-diagonal", "first-order"
 TOLERANCE_MHZ = 1e-4
-
-
-@dataclass(frozen=True)
-class Used:
-    """The method of a calculation, and by how much its lines may differ from exact ones, in MHz."""
-
-    method: str
-    estimate_mhz: float
-    tolerance_mhz: float
 
 
 def are_with_spins(levels: Levels) -> bool:

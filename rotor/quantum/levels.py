@@ -23,12 +23,20 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.hyperfine_method import Used
     from rotor.quantum.states import State
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
 FEW_LEVELS = 64  # among which one is found by looking at all
+
+
+@dataclass(frozen=True)
+class Used:
+    """The method of a calculation, and by how much its lines may differ from exact ones, in MHz."""
+
+    method: str
+    estimate_mhz: float
+    tolerance_mhz: float
 
 
 class Block(ABC):

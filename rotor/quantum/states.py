@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators, added
 from rotor.tops.spins.spin_weights import SpinWeights
-
-if TYPE_CHECKING:
-    from rotor.quantum.effect import QuantumEffect
-    from rotor.tops.top import Top
 
 OperatorOfJ = Callable[[int, str], JOperator]  # (J, representation) -> the operator in |J k⟩
 
@@ -47,23 +42,3 @@ class Coupling:
     bra: int
     ket: int
     operator: OperatorOfJ
-
-
-def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str) -> list[Coupling]:
-    """Couplings of effects, and what acts in the top's own state by other operators of J than powers."""
-    couplings: list[Coupling] = []
-    for effect in effects:
-        couplings += effect.couplings(top)
-        for name in effect.parameters(top):
-            if effect.j_operator(top, name, 1, representation) is not None:
-                couplings.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
-    return couplings
-
-
-def _own_operator(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
-    def operator(j: int, representation: str) -> JOperator:
-        matrix = effect.j_operator(top, name, j, representation)
-        assert matrix is not None
-        return matrix
-
-    return operator

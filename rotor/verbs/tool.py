@@ -20,8 +20,7 @@ class Unshown:
 class Tool(Verb):
     """A verb that works on files, lists or a browser: no scene says it, and what its report shows is a part of its request.
 
-    of: the field that is the input of the JSON and of files. text: the JSON, where it is not the facts; None: there is none. instead:
-    the options by which it takes the place of another verb, in words.
+    of: the field that is the input of the JSON and of files. text: the JSON, where it is not the facts; None: there is none.
     """
 
     table: Callable[[Any], Any] = lambda answer: None
@@ -34,7 +33,6 @@ class Tool(Verb):
     sound: bool = False
     of: str = ""
     text: Callable[[Any, Mapping[str, Any]], str] | None = lambda answer, content: json_text(content)
-    instead: str = ""
     has_scenes: ClassVar[bool] = False
 
     @property

@@ -23,7 +23,6 @@ from rotor.version import version
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from rotor.verbs.tool import Tool
 
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
@@ -214,7 +213,7 @@ class Verb:
     build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
     these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
     stepwise: it shows every step from the first one on. stated: keys of the JSON that its files have in their
-    provenance. other: a verb that takes the place of this one where an option that it alone has is typed.
+    provenance. other: a verb that takes the place of this one where an option that it alone has is typed; instead: these options, in words.
     """
 
     name: str
@@ -251,7 +250,8 @@ class Verb:
     records: Callable[[Any], Table | None] | None = None
     stepwise: bool = False
     stated: tuple[str, ...] = ()
-    other: Tool | None = None
+    other: Verb | None = None
+    instead: str = ""
     has_scenes: ClassVar[bool] = True
 
     def load_numerics(self) -> Any:

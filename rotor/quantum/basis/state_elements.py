@@ -9,23 +9,22 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import NOTHING, CoupledBlock, parts_of
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import QuantumEffect, couplings_of
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, numbered
-from rotor.quantum.states import OperatorOfJ, State, couplings_of
+from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
-    from rotor.quantum.spins.rotor import RotorBlock
     from rotor.tops.top import Top
 
 _TRIED_AT = 3  # J at which a pair of kinds of Wang blocks is tried
@@ -269,9 +268,17 @@ class ElementsOfJ(NamedTuple):
         return LinearBlock(size, *np.divmod(places, size), factors, mix[:, parameters], parameters)
 
 
-def vertices_of(block: SolvedBlock | CoupledBlock | RotorBlock) -> list[Vertex]:
+class BlockOfParts(Protocol):
+    """A solved block: of one Wang block, of coupled states, or of N as spins see it."""
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """Its states v, each with the basis of its functions."""
+
+
+def vertices_of(block: BlockOfParts) -> list[Vertex]:
     """The states and Wang blocks of a solved block."""
-    return [(part.v, part.basis) for part in block.parts]  # type: ignore[misc]
+    return [(part.v, part.basis) for part in block.parts]
 
 
 def linear_blocks_of(
@@ -283,7 +290,7 @@ def linear_blocks_of(
 
 
 def blocks_of_terms(
-    terms: StateTerms, count: int, representation: str, blocks: Sequence[SolvedBlock | CoupledBlock | RotorBlock]
+    terms: StateTerms, count: int, representation: str, blocks: Sequence[BlockOfParts]
 ) -> list[LinearBlock]:
     """The linear blocks of so many parameters over the functions of solved blocks."""
     every, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()

@@ -20,8 +20,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.hyperfine_method import FIRST_ORDER, Used
-from rotor.quantum.levels import Block
+from rotor.quantum.hyperfine_method import FIRST_ORDER
+from rotor.quantum.levels import Block, Used
 from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between

@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.hyperfine_method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
+from rotor.quantum.hyperfine_method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod
+from rotor.quantum.levels import Used
 from rotor.quantum.spins.blocks import Plan
 from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.neglected import largest_shifts
