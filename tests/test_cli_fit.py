@@ -12,6 +12,7 @@ import pytest
 from documented_options import undocumented
 
 import rotor
+from rotor.formats.family_file import read_family
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import line_list
@@ -323,6 +324,7 @@ def test_a_family_file_becomes_a_structure(call, folder):
     assert code == 0, err
     assert "CO" in out
     content = json.loads((folder / "o.json").read_text(encoding="utf-8"))
+    assert [one.name for one in read_family("ocs.toml").family.species] == ["parent", "C=13C", "S=34S", "O=18O"]
     rs = {one["name"]: one["value"] for one in content["rs"]["values"]}
     assert rs == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published
     assert content["r0"]["degrees_of_freedom"] == 2

@@ -451,3 +451,10 @@ def test_a_geometry_alone_is_taken_for_a_closed_shell_and_says_so():
     assert "odd number" in ion.weights_source
     with pytest.raises(ValueError, match="electronic 'ungerade'"):
         replace(pair, electronic="ungerade")
+
+
+@pytest.mark.parametrize(("name", "changes"), [("water", "1=18O"), ("H2CO", "1=18O"), ("HCOOH", "1=13C")])
+def test_axes_that_keep_their_order_have_no_note_of_another(name, changes):
+    top = isotopologue(rotor.read(name), changes).top
+    assert any("scaled" in note for note in (*top.notes, top.source))
+    assert not any("another order" in note for note in top.notes)

@@ -15,6 +15,7 @@ from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.reports.screen import plain, rows_of
+from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
 from rotor.thermodynamics import VibrationalStates
@@ -207,3 +208,10 @@ def test_a_body_with_an_angular_velocity():
     assert request.angular_momentum == pytest.approx((1.3, 20.0, 0.0), rel=1e-15)  # one product each
     assert answer.facts()["energy"] == pytest.approx(0.5 * (13 * 0.01 + 10 * 4), rel=1e-15)  # a few roundings
     assert answer.facts()["units"]["time"] == "s"
+
+
+@pytest.mark.parametrize("value", [True, 2.0, "3", None])
+def test_a_whole_number_is_one_by_its_type(value):
+    Whole(0).check(3)
+    with pytest.raises(ValueError, match="expected a whole number, of type int"):
+        Whole(0).check(value)

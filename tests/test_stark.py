@@ -394,3 +394,12 @@ def _nth_energy(main, squares, rank, near):
 def test_a_tolerance_that_round_off_does_not_allow_is_refused():
     with pytest.raises(ValueError, match="have a round-off of"):
         stark_map(OCS, [20000.0], j_highest=1, tolerance_mhz=1e-14)
+
+
+def test_a_vector_connects_nothing_where_j_even_and_odd_are_apart():
+    light = Contraction(np.diag([2.0, 1.0, 1.0]), np.diag([0.0, 0.0, 1.0]))
+    blocks = field_space(OCS, 6, [light]).blocks(0)
+    assert len(blocks) == 2
+    for block in blocks:
+        assert np.abs(block.matrix(light)).max() > 0
+        assert np.abs(block.matrix(Contraction((1.0, 0.0, 0.0), [0, 0, 1]))).max() == 0

@@ -9,15 +9,18 @@ import sys
 import time
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, true_lines, write_case
 
 from rotor.viewer.actions import ACTIONS
+from rotor.viewer.fits import assignments_of
 from rotor.viewer.opening import open_session
 from rotor.viewer.peak_fit import fit_peak
 from rotor.viewer.pyramid import pyramid
+from rotor.viewer.records import Line
 from rotor.viewer.session import SUFFIX, read_session
 
 
@@ -627,3 +630,10 @@ def test_the_widget_answers_messages_and_announces_changes(service):
 
 def test_dipole_of_the_case_is_that_of_its_file(service):
     assert service.session.state.species[1].dipole_abc_debye == DIPOLE
+
+
+def test_the_comment_of_one_line_of_several_is_kept():
+    model = SimpleNamespace(quanta=("j",), record=SimpleNamespace(name="OCS"), halves=frozenset())
+    lines = {n: Line(1, (n,), (n - 1,), 12163.0 * n, 0.01, n, comment="weak" if n == 2 else "") for n in (1, 2, 3)}
+    assert list(assignments_of(model, lines).comments) == ["", "weak", ""]
+    assert not any(assignments_of(model, {1: lines[1], 3: lines[3]}).comments)
