@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotor.classical.effects.dipole_in_field import PermanentDipole
-from rotor.classical.effects.drag import LinearDrag
 from rotor.classical.effects.gyrostat import SpinningRotor
 from rotor.classical.euler import energy
 from rotor.classical.free.free_motion import free_motion
@@ -287,8 +286,3 @@ def test_times_that_turn_back_or_stand_still_are_refused(times):
 def test_a_tolerance_is_between_0_and_1(tolerance):
     with pytest.raises(ValueError, match="the tolerance is a number between 0 and 1"):
         LieRungeKutta(tolerance)
-
-
-def test_a_motion_that_grows_without_bound_is_refused():
-    with pytest.raises(ValueError, match="no step is short enough at time"):
-        integrate(LieRungeKutta(), [1, 1, 1], [0, 0, 1], [0.0, 100.0], effects=[LinearDrag([-50.0, -50.0, -50.0])])

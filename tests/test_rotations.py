@@ -10,6 +10,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from rotor.geometry import rotations as rot
+from rotor.geometry.quaternions import to_third
 
 EPS = np.finfo(float).eps
 
@@ -203,3 +204,11 @@ def test_log_gives_back_the_smallest_rotation_vectors_in_any_direction(size):
 
 def test_log_scales_with_the_vector_where_squares_underflow():
     assert rot.log(rot.exp([3e-160, 4e-160, 0.0])).tolist() == pytest.approx([3e-160, 4e-160, 0.0], rel=4e-16, abs=0.0)
+
+
+def test_every_direction_is_turned_to_the_third_axis():
+    directions = np.random.default_rng(5).normal(size=(40, 3))
+    for direction in directions / np.linalg.norm(directions, axis=1)[:, None]:
+        q = np.array(to_third(tuple(direction.tolist())))
+        assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-15)
+        assert rot.rotate(q, direction) == pytest.approx(np.array([0.0, 0.0, 1.0]), abs=1e-15)
