@@ -8,6 +8,8 @@ import numpy as np
 
 from rotor.fitting.fit import Fit
 
+ROUNDING = 1e-12  # of a weighted residual: less is no scatter
+
 
 def chi_squared(fit: Fit) -> float:
     """Σ of squared weighted residuals, a-priori values included."""
@@ -19,7 +21,8 @@ def aicc(fit: Fit) -> float:
     n, k = len(fit.residuals), fit.statistics.rank + 1  # the scale of the errors counts
     if n - k - 1 <= 0:
         return math.inf
-    return n * math.log(chi_squared(fit) / n) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    scatter = max(chi_squared(fit) / n, ROUNDING**2)  # lines that fit exactly have none
+    return n * math.log(scatter) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
 
 
 def cross_validated_rms(fit: Fit) -> float:
@@ -39,5 +42,6 @@ def f_test(smaller: Fit, larger: Fit) -> tuple[float, float]:
     free = larger.degrees_of_freedom
     if more < 1 or free < 1:
         return 0.0, 1.0
-    ratio = (chi_squared(smaller) - chi_squared(larger)) / more / (chi_squared(larger) / free)
+    left = max(chi_squared(larger), free * ROUNDING**2)  # lines that fit exactly leave no scatter to compare with
+    ratio = (chi_squared(smaller) - chi_squared(larger)) / more / (left / free)
     return float(ratio), float(fdtrc(more, free, max(ratio, 0.0)))
