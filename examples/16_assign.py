@@ -1,3 +1,4 @@
+# long: 60
 # %% [markdown]
 # # Constants from a spectrum, nothing known
 #
