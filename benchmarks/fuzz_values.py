@@ -258,7 +258,8 @@ def run_case(number: int, folder: Path, weighted: Weighted, hostile: dict[str, b
     new = sorted({str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} - before)
     scene = folder / "s.toml"
     sweep = words[:2] == ["run", "s.toml"] and scene.exists() and b"[sweep]" in scene.read_bytes()
-    rows_stay = sweep or words[:1] in (["fluid"], ["catalogue"], ["fit"])
+    not_converged = words[:1] == ["fit"] and outcome.code == 1  # it writes what it reached
+    rows_stay = sweep or not_converged or words[:1] in (["fluid"], ["catalogue"])
     outcome.left = [
         name for name in new if Path(name).name.startswith(".rotor") or (outcome.code != 0 and not rows_stay)
     ]
