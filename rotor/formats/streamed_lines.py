@@ -11,7 +11,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ from rotor.version import version
 
 PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
 MEMORY_MB = 500  # for the sort, beside the program itself
+MOST_TRANSITIONS = 1e11  # before the cut, some days of work
 _BATCH = 1 << 18  # lines that are made into text at once
 
 
@@ -288,6 +289,11 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         jmax = jmax_for_cut(top, dipole, start.temperature_k, q.q, least)
     if jmax < 1:
         raise ValueError(f"J max = {jmax}: expected 1 or more, J = 0 alone has no line")
+    if (count := transition_count(top, jmax)) > MOST_TRANSITIONS:
+        raise ValueError(
+            f"J max {jmax}: about {count:.0e} transitions before the cut, more than {MOST_TRANSITIONS:.0e}; lower J max, or leave "
+            "it out: it then follows from min_lgint"
+        )
     effects = start.levels.effects
     ground = solve_levels(
         top, 3, effects=effects, vectors=False
@@ -344,12 +350,14 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     """Lines with lower J from `first` to `last`, sorted, as a Parquet file."""
     top_j = min(last + 1, plan.jmax)
     levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
+    trusted = are_trusted(plan.top, levels, plan.ground_mhz)
+    if trusted.any():  # the others may lie far below the ground; without any there are no lines at all
+        levels = replace(levels, weight=np.where(trusted, levels.weight, 0))
     rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     transitions = all_transitions(levels, dipoles, plan.range_mhz, cut)
     of_piece = np.minimum(rotational[transitions.upper], rotational[transitions.lower]) <= last
-    trusted = are_trusted(plan.top, levels)
     of_piece &= trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         plan.top,
@@ -370,7 +378,7 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
 
 def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
     """The columns of `Lines`, energies and intensities from the lowest level of all J instead of that of the piece."""
-    offset_mhz = lines.levels.ground_mhz - plan.ground_mhz
+    offset_mhz = lines.levels.ground_mhz - plan.ground_mhz if len(lines) else 0.0
     offset_k = offset_mhz / units.MHZ_PER_K
     error = lines.error_mhz
     return {

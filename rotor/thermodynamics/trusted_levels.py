@@ -76,16 +76,16 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
     return np.where(wrong, estimate, energy), np.where(wrong, lowest, energy)
 
 
-def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
+def are_trusted(top: Top, levels: Levels, ground_mhz: float | None = None) -> NDArray[np.bool_]:
     """Which levels (n,) are energies of a molecule; all of a rigid top.
 
     Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them; of one
-    with further states those of a J without a level below the ground.
+    with further states those of a J without a level below the ground, `ground_mhz` where the levels have no low J themselves.
     """
     if "irrep" in levels.quanta or "species" in levels.quanta or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
     if "v" in levels.quanta:
-        return _above_the_ground(levels)
+        return _above_the_ground(levels, ground_mhz)
     if "n" in levels.quanta:
         return _trusted_by_rotation(top, levels)
     if (tabulated := in_level_table(top, levels)) is not None:
@@ -96,12 +96,12 @@ def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
     return ~_untrusted(levels, levels.energy_mhz, _simpler_mhz(top, levels, rigid)[0])
 
 
-def _above_the_ground(levels: Levels) -> NDArray[np.bool_]:
-    """Levels of every J but those that have one below all of low J, which no rotating molecule has; all, of a piece without low J."""
+def _above_the_ground(levels: Levels, ground_mhz: float | None) -> NDArray[np.bool_]:
+    """Levels of every J but those that have one below all of low J, or below the ground given for levels without low J."""
     low = levels.rotational <= GROUND_J
-    if not low.any():
+    if not low.any() and ground_mhz is None:
         return np.ones(len(levels), dtype=np.bool_)
-    fallen = levels.energy_mhz < levels.energy_mhz[low].min()
+    fallen = levels.energy_mhz < (levels.energy_mhz[low].min() if low.any() else ground_mhz)
     return ~np.isin(levels.rotational, levels.rotational[fallen])
 
 
