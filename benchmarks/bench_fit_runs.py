@@ -2,9 +2,9 @@
 
     python benchmarks/bench_fit_runs.py [--rounds 9] [--spfit PATH] [--only twelve] [--json benchmarks/results/fit_runs.json]
 
-The cases are lines made for known constants (tests/fit_kinds.py) with normal errors of 20 kHz and starts a little off. Processes take
-their turn in every round, so that a change of the machine's speed meets all alike. What counts is processor time, user and system,
-of the whole process, one thread; the median of the rounds and the fastest. An iteration of SPFIT is its whole run over its
+The cases are lines made for known constants (tests/helpers/fit_kinds.py) with normal errors of 20 kHz and starts a little off.
+Processes take their turn in every round, so that a change of the machine's speed meets all alike. What counts is processor time,
+user and system, of the whole process, one thread; the median of the rounds and the fastest. An iteration of SPFIT is its whole run over its
 iterations; here it is levels, derivatives, residuals, QR and step. SPFIT is taken from the PATH unless it is given.
 """
 
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "helpers"), str(ROOT / "benchmarks")]
 
 from fit_kinds import Kind, write_case  # noqa: E402
 

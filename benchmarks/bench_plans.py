@@ -4,8 +4,8 @@
 
 All scenes of examples/scenes, and others that are longer, so that both stand above what is always there. Plans hold within a factor of 3
 above a second, and above a megabyte. Each case has a process of its own; the seconds of a run are the median of three, after one that may
-compile; of a run beyond some seconds, one. benchmarks/results/plans.json is written, and tests/test_scenes_measured.py reads it. A run
-that is traced for its memory takes several times as long; its seconds are those of another.
+compile; of a run beyond some seconds, one. benchmarks/results/plans.json is written, and tests/scenes/test_scenes_measured.py reads
+it. A run that is traced for its memory takes several times as long; its seconds are those of another.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python benchmarks/bounds_and_coverage.py [--only KIND ...] [--page]
 
-The cases and their references are those of tests/stated_bounds.py and tests/stated_coverage.py, which the tests run too. All of them
-need about six minutes of one core. benchmarks/results/stated_bounds.json and docs/validation/stated_bounds.md are written; --page
-measures nothing.
+The cases and their references are those of tests/helpers/stated_bounds.py and tests/helpers/stated_coverage.py, which the tests run
+too. All of them need about six minutes of one core. benchmarks/results/stated_bounds.json and docs/validation/stated_bounds.md are
+written; --page measures nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
 from stated_bounds import CASES  # noqa: E402
 from stated_coverage import CONFIDENCE, COVERED, covered  # noqa: E402
@@ -31,8 +31,8 @@ MOST_MEDIAN, MOST_95 = 10.0, 100.0  # of stated over actual, or over the roundin
 
 HEAD = """# Stated errors in random cases
 
-Made by `python benchmarks/bounds_and_coverage.py`; the cases and their references are in `tests/stated_bounds.py` and
-`tests/stated_coverage.py`, and every full run of the tests computes all of them anew.
+Made by `python benchmarks/bounds_and_coverage.py`; the cases and their references are in `tests/helpers/stated_bounds.py` and
+`tests/helpers/stated_coverage.py`, and every full run of the tests computes all of them anew.
 
 ## Rounding and truncation are bounds
 

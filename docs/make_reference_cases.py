@@ -62,9 +62,10 @@ In `{case}` Fermi and two Coriolis couplings leave no symmetry: both components 
 {levels} levels have the program's labels and its energies within {energy:.1g} cm⁻¹, and every line in both lists its frequency within
 {frequency:.1g} MHz. But {close} levels lie within 1e-4 MHz of their partner. How two components so close mix is decided by round-off, in
 the program too (compiled so that the processor multiplies and adds in one step, it does not equal itself), and with it the
-intensities of single lines between them; tests/test_round_off_lines.py has one of them in 50 digits. Summed over the components
+intensities of single lines between them; tests/formats/test_round_off_lines.py has one of them in 50 digits. Summed over the components
 of both doublets the intensities agree: of {sums} sums beyond 10,000 cuts, which no component below the cut can change, the worst differs by
-{ratio:.1e} of itself, a last digit or two of print. Below N = 7 single lines are equal in every column (tests/test_oracles_spins.py).
+{ratio:.1e} of itself, a last digit or two of print. Below N = 7 single lines are equal in every column
+(tests/formats/spcat/test_oracles_spins.py).
 
 The program does not repeat this list itself where a constant changes in its last digit. Run on the same files with A0 = 9400.000000000002
 in place of 9400 MHz (compiled from its public C source, gcc -O2, which with the files as they are gives all 67262 lines of 2008),

@@ -2,7 +2,7 @@
 
     python docs/make_view_pictures.py [FOLDER]      # by default docs/pictures
 
-Needs the extras `view` and `test` and Chromium. The spectrum is that of tests/view_cases.py.
+Needs the extras `view` and `test` and Chromium. The spectrum is that of tests/helpers/view_cases.py.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "helpers")]
 
 
 def main() -> None:

@@ -5,7 +5,8 @@
 (G. W. King, R. M. Hainer, P. C. Cross, J. Chem. Phys. 11, 27 (1943), eqs. 7 to 9). E_κ, its derivatives by A, B, C and the quartic
 constants (S reduction, Iʳ) and the strengths S of dipole components a, b, c depend on κ alone. `rotor.quantum` computes them at
 Chebyshev nodes in θ; between nodes they are interpolated. Distortion shifts levels to first order. What interpolation
-neglects stays below 1e-5 (A-C) (`tests/test_assignment_table.py`); refined constants come from `rotor.fitting` with the full Hamiltonian.
+neglects stays below 1e-5 (A-C) (`tests/assignment/test_assignment_table.py`); refined constants come from `rotor.fitting` with the
+full Hamiltonian.
 """
 
 from __future__ import annotations

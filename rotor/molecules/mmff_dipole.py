@@ -13,7 +13,9 @@ from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
-GAS_SCALE = 0.74  # least squares over 30 molecules (tests/test_dipoles.py): median error 0.2 D; without it 0.6 D
+GAS_SCALE = (
+    0.74  # least squares over 30 molecules (tests/molecules/test_dipoles.py): median error 0.2 D; without it 0.6 D
+)
 CHARGES_SOURCE = "estimate from MMFF94 partial charges"
 NO_DIPOLE_DEBYE = 1e-4  # smaller ones are round-off of a geometry that symmetry leaves without a dipole
 MOST_ATOMS = 200  # beyond this, finding the bonds of a bare geometry takes too long

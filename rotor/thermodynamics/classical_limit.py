@@ -25,9 +25,9 @@ that is known that is the same, no spurious terms get into the heat capacity, an
 What comes next, and how it is bounded here: (1) the terms in T⁻³, of the size of those before multiplied and of (Θ_b/T)³/100
 (a linear molecule has 0.0028), and of an asymmetric top, with s = A(B - C)²/BC, of [As(A + s)/40 + s³/400]/T³: of 60 tops with A/B
 up to 16 and B/C up to 8 the whole is 2.2 to 110 times what sums over the levels show, 2.8 times in the median
-(tests/test_thermo_functions.py); (2) distortion in T³, f T³, the next cumulants of H_4, H_6 and H_8; (3) products of quantum and
-distortion terms, such as a d, which no power of T removes; (4) what spin weights that repeat after n levels leave of the sum over
-their classes, exp(-π² T/n²Θ) by Poisson's summation, Θ the largest.
+(tests/thermodynamics/test_thermo_functions.py); (2) distortion in T³, f T³, the next cumulants of H_4, H_6 and H_8; (3) products of
+quantum and distortion terms, such as a d, which no power of T removes; (4) what spin weights that repeat after n levels leave of
+the sum over their classes, exp(-π² T/n²Θ) by Poisson's summation, Θ the largest.
 """
 
 from __future__ import annotations

@@ -59,13 +59,13 @@ MUTATIONS = (
         1, "rotor/quantum/wang/rotation.py",
         "    labels = [names_of(b.basis, representation) for b in blocks]\n",
         "    labels = [tuple(q[np.abs(b.vectors).argmax(axis=0)] for q in names_of(b.basis, representation)) for b in blocks]\n",
-        "tests/test_levels.py::test_every_label_stands_once",
+        "tests/quantum/test_levels.py::test_every_label_stands_once",
     ),
     Mutation(
         2, "rotor/quantum/estimates/convergence.py",
         "    disordered = disordered_blocks(top, levels)\n    if not disordered:",
         "    disordered = disordered_blocks(top, levels)\n    if True:",
-        "tests/test_reliability.py::test_quartic_water_is_told_of",
+        "tests/package/test_reliability.py::test_quartic_water_is_told_of",
     ),
     Mutation(
         3, "rotor/quantum/wang/rotation.py",
@@ -84,12 +84,12 @@ MUTATIONS = (
     Mutation(
         5, "rotor/tops/distortion.py",
         "        if abs(bx - by) < _NEAR_SYMMETRIC * bz:", "        if False:",
-        "tests/test_distortion.py::test_near_symmetric_tops_refuse_the_a_reduction",
+        "tests/molecules/test_distortion.py::test_near_symmetric_tops_refuse_the_a_reduction",
     ),
     Mutation(
         5, "rotor/quantum/reductions.py",
         "    place = [old.index(axis) for axis in new]", "    place = [old.index(axis) for axis in (new if new[2] != old[2] else old)]",
-        "tests/test_conversions.py::test_left_handed_axes_change_signs_alone",
+        "tests/quantum/test_conversions.py::test_left_handed_axes_change_signs_alone",
     ),
     Mutation(
         6, "rotor/tops/kind_of_constants.py",
@@ -101,28 +101,28 @@ MUTATIONS = (
         7, "rotor/quantum/wang/rotation.py",
         "        out.append((block, scalar, block_bands(of_j, block)))",
         "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, 0.0, bands))",
-        "tests/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
+        "tests/quantum/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
     ),
     Mutation(
         8, "rotor/geometry/inertia.py",
         "    moments = np.where(moments < 1e-12 * moments[2], 0.0, moments)\n", "",
-        "tests/test_top.py::test_linear_in_any_orientation",
+        "tests/tops/test_top.py::test_linear_in_any_orientation",
     ),
     Mutation(
         9, "rotor/geometry/inertia.py", "LINEAR_BELOW = 1e-6", "LINEAR_BELOW = 1e-14",
-        "tests/test_top.py::test_near_linear_says_by_which_number",
+        "tests/tops/test_top.py::test_near_linear_says_by_which_number",
     ),
     Mutation(
         10, "rotor/quantum/wang/spherical_top.py",
         "    of_a, of_e = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
         "    of_a, of_e = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
-        "tests/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
+        "tests/tops/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
     ),
     Mutation(
         11, "rotor/tops/spins/spin_weights.py",
         "        if self.rule == \"none\":\n            return np.asarray(np.where(k == 0, 1, 2))",
         "        if self.rule in (\"none\", \"KaKc\"):\n            return np.asarray(np.where(k == 0, 1, 2))",
-        "tests/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
+        "tests/tops/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
     ),
     Mutation(
         12, "rotor/structures/least_squares.py",
@@ -132,56 +132,56 @@ MUTATIONS = (
     Mutation(
         13, "rotor/tops/isotopes/isotopic_scaling.py",
         "    best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))", "    best = next(ways)",
-        "tests/test_isotopologues.py::test_axes_that_change_places_are_matched_by_overlap",
+        "tests/molecules/test_isotopologues.py::test_axes_that_change_places_are_matched_by_overlap",
     ),
     Mutation(
         14, "rotor/geometry/inertia.py",
         "    if not (np.isfinite(m).all() and (m > 0).all() and np.isfinite(r).all()):", "    if False:",
-        "tests/test_inertia.py::test_impossible_masses",
+        "tests/tops/test_inertia.py::test_impossible_masses",
     ),
     Mutation(
         15, "rotor/molecules/readers/xyz.py",
         "    plain = word.translate(_MINUS_SIGNS)", "    plain = word",
-        "tests/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+        "tests/molecules/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
     ),
     Mutation(
         15, "rotor/molecules/readers/xyz.py",
         '        return float(plain.replace("D", "e").replace("d", "e"))', '        return float(plain.replace("D", "").replace("d", "e"))',
-        "tests/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+        "tests/molecules/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
     ),
     Mutation(
         16, "rotor/statistics/regression.py",
         "    safe = np.where(blind, 1.0, scale)", "    safe = np.ones_like(scale)",
-        "tests/test_fit.py::test_a_of_a_near_prolate_chain_has_an_honest_error",
+        "tests/fitting/test_fit.py::test_a_of_a_near_prolate_chain_has_an_honest_error",
     ),
     Mutation(
         17, "rotor/statistics/regression.py",
         "    covariance[np.diag_indices_from(covariance)] = np.where(open_, np.inf, np.diag(covariance))\n", "",
-        "tests/test_least_squares.py::test_what_is_not_determined_is_named",
+        "tests/statistics/test_least_squares.py::test_what_is_not_determined_is_named",
     ),
     Mutation(
         18, "rotor/quantum/label_tracking.py",
         "        if not moved.any():", "        if True:",
-        "tests/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
+        "tests/fitting/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
     ),
     Mutation(
         19, "rotor/statistics/least_squares.py",
         "    return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED", "    return CONVERGED",
-        "tests/test_least_squares.py::test_a_search_at_the_edge_of_the_model_has_not_converged",
+        "tests/statistics/test_least_squares.py::test_a_search_at_the_edge_of_the_model_has_not_converged",
     ),
     Mutation(
         19, "rotor/statistics/least_squares.py",
         "                return state.ended(EXHAUSTED, linear, taken)", "                return state.ended(CONVERGED, linear, taken)",
-        "tests/test_least_squares.py::test_it_does_not_say_that_it_has_converged_when_it_has_not",
+        "tests/statistics/test_least_squares.py::test_it_does_not_say_that_it_has_converged_when_it_has_not",
     ),
     Mutation(
         20, "rotor/quantum/levels.py", "self.energy_mhz[self.weight > 0].min()", "self.energy_mhz.min()",
-        "tests/test_requests.py::test_levels_count_from_the_lowest_that_exists",
+        "tests/requests/test_requests.py::test_levels_count_from_the_lowest_that_exists",
     ),
     Mutation(
         21, "rotor/spectra/transitions.py",
         "        keep &= (levels.weight[lower] > 0) & (levels.weight[upper] > 0)\n", "",
-        "tests/test_safeguards.py::test_levels_that_do_not_exist_make_no_lines_in_closed_form",
+        "tests/quantum/test_safeguards.py::test_levels_that_do_not_exist_make_no_lines_in_closed_form",
     ),
     Mutation(
         22, "rotor/quantum/fields/field_map.py",
@@ -192,27 +192,27 @@ MUTATIONS = (
     Mutation(
         23, "rotor/quantum/fields/field_map.py",
         "        if error <= request.tolerance_mhz and leaked", "        if True or leaked",
-        "tests/test_field_bounds.py::test_the_lowest_j_max_is_chosen",
+        "tests/quantum/fields/test_field_bounds.py::test_the_lowest_j_max_is_chosen",
     ),
     Mutation(
         23, "rotor/quantum/fields/block_states.py",
         "max() <= PART_OF_TOLERANCE * tolerance_mhz:", "max() <= np.inf:",
-        "tests/test_field_bounds.py::test_enough_free_states_are_taken_at_the_strongest_field",
+        "tests/quantum/fields/test_field_bounds.py::test_enough_free_states_are_taken_at_the_strongest_field",
     ),
     Mutation(
         23, "rotor/quantum/fields/solver.py",
         "if spanned is None or spanned[1][2].max() > tolerance_mhz:", "if spanned is None:",
-        "tests/test_field_bounds.py::test_stated_errors_are_bounds",
+        "tests/quantum/fields/test_field_bounds.py::test_stated_errors_are_bounds",
     ),
     Mutation(
         23, "rotor/quantum/fields/solver.py",
         "            if error.max(initial=0.0) > PART_OF_TOLERANCE * tolerance_mhz:", "            if False:",
-        "tests/test_field_bounds.py::test_the_basis_grows_until_its_error_is_within_the_tolerance",
+        "tests/quantum/fields/test_field_bounds.py::test_the_basis_grows_until_its_error_is_within_the_tolerance",
     ),
     Mutation(
         23, "rotor/quantum/fields/truncation.py",
         "lowering + mixed.sum(axis=2)", "lowering",
-        "tests/test_field_bounds.py::test_the_bound_in_small_cases",
+        "tests/quantum/fields/test_field_bounds.py::test_the_bound_in_small_cases",
     ),
     Mutation(
         24, "rotor/alignment/pulse.py", "    2 * math.pi * 1e-30 * 1e4", "    4 * math.pi * 1e-30 * 1e4",
@@ -222,12 +222,12 @@ MUTATIONS = (
         25, "rotor/classical/free/theta.py",
         "        rates=np.stack([c.pace.hi, c.pace.lo, c.start.hi, c.start.lo, half_turns.hi, half_turns.lo], axis=-1),",
         "        rates=np.stack([c.pace.hi, 0 * y, c.start.hi, 0 * y, half_turns.hi, 0 * y], axis=-1),",
-        "tests/test_free.py::test_double_double_phases_are_what_keeps_a_million_periods",
+        "tests/classical/test_free.py::test_double_double_phases_are_what_keeps_a_million_periods",
     ),
     Mutation(
         26, "rotor/geometry/rotations.py", "    angle = np.asarray(2.0 * np.arctan2(sine, q[..., 0]))",
         "    angle = np.asarray(2.0 * np.arccos(np.clip(q[..., 0], -1.0, 1.0)))",
-        "tests/test_rotations.py::test_log_gives_back_the_smallest_rotation_vectors_in_any_direction",
+        "tests/geometry/test_rotations.py::test_log_gives_back_the_smallest_rotation_vectors_in_any_direction",
     ),
     Mutation(
         27, "rotor/classical/exponents.py", "        errors=np.hypot(spread, settings.bias),", "        errors=spread,",
@@ -237,7 +237,7 @@ MUTATIONS = (
         28, "rotor/statistics/degrees_of_freedom.py",
         "    turns = rotating_axes(array, linear_below).sum(axis=-1)",
         "    turns = 3 * rotating_axes(array, linear_below).any(axis=-1)",
-        "tests/test_degrees.py::test_a_linear_triatomic_has_five_degrees_not_six",
+        "tests/geometry/test_degrees.py::test_a_linear_triatomic_has_five_degrees_not_six",
     ),
     Mutation(
         29, "rotor/fluids/motion/thermometers.py",
@@ -248,28 +248,28 @@ MUTATIONS = (
     Mutation(
         20, "rotor/thermodynamics/classical_limit.py",
         "(middle**3 / 100 + of_asymmetry)", "(middle**3 / 100)",
-        "tests/test_thermo_functions.py::test_the_next_quantum_correction_is_bounded",
+        "tests/thermodynamics/test_thermo_functions.py::test_the_next_quantum_correction_is_bounded",
     ),
     Mutation(
         20, "rotor/thermodynamics/level_sums.py",
         "    return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))", "    return 0 * tail",
-        "tests/test_thermo.py::test_error_is_below_what_was_asked",
+        "tests/thermodynamics/test_thermo.py::test_error_is_below_what_was_asked",
     ),
     Mutation(
         20, "rotor/thermodynamics/level_sums.py",
         "        done = errors.max(axis=0) < enough[0]\n", "        done = errors.max(axis=0) < np.inf\n",
-        "tests/test_thermo.py::test_error_is_below_what_was_asked",
+        "tests/thermodynamics/test_thermo.py::test_error_is_below_what_was_asked",
     ),
     Mutation(
         23, "rotor/quantum/fields/truncation.py",
         " - np.abs(np.transpose(powers)) @ np.array(radii)", "",
-        "tests/test_field_bounds.py::test_the_bound_in_small_cases",
+        "tests/quantum/fields/test_field_bounds.py::test_the_bound_in_small_cases",
     ),
     Mutation(
         24, "rotor/alignment/align.py",
         "        if jmax_option is not None:\n            raise BasisTooSmallError(",
         "        if jmax_option is not None:\n            return carried(problem, pilot)\n            raise BasisTooSmallError(",
-        "tests/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
+        "tests/alignment/test_alignment.py::test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough",
     ),
     Mutation(
         24, "rotor/alignment/steps.py",
@@ -279,17 +279,17 @@ MUTATIONS = (
     Mutation(
         27, "rotor/classical/step_errors.py",
         "if other.steps >= TRIPLED * motion.steps", "if other",
-        "tests/test_error_budgets.py::test_fixed_steps_longer_than_the_times_are_apart_have_an_error",
+        "tests/scenes/test_error_budgets.py::test_fixed_steps_longer_than_the_times_are_apart_have_an_error",
     ),
     Mutation(
         29, "rotor/fluids/budgets.py",
         "    if settings.every > 1:\n", "    if False:\n",
-        "tests/test_error_budgets.py::test_the_steps_of_a_fluid_are_counted_about_the_mean",
+        "tests/scenes/test_error_budgets.py::test_the_steps_of_a_fluid_are_counted_about_the_mean",
     ),
     Mutation(
         20, "rotor/thermodynamics/level_sums.py",
         "        raise OutOfReachError(refusal(t, error, at_worst) + others)", "        return",
-        "tests/test_thermo.py::test_levels_that_distortion_does_not_serve_are_counted_with_their_error",
+        "tests/thermodynamics/test_thermo.py::test_levels_that_distortion_does_not_serve_are_counted_with_their_error",
     ),
     Mutation(
         23, "rotor/quantum/fields/field_map.py",
@@ -299,12 +299,12 @@ MUTATIONS = (
     Mutation(
         24, "rotor/alignment/align.py",
         "    return trace.step_error * 2 + ", "    return ",
-        "tests/test_stated_bounds.py::test_stated_errors_are_bounds[aligned]",
+        "tests/scenes/test_stated_bounds.py::test_stated_errors_are_bounds[aligned]",
     ),
     Mutation(
         27, "rotor/classical/exponents.py",
         "    return np.asarray(2 * np.log(", "    return np.asarray(0 * np.log(",
-        "tests/test_lyapunov.py::test_closed_forms_are_within_the_stated_errors[free_tumble]",
+        "tests/classical/test_lyapunov.py::test_closed_forms_are_within_the_stated_errors[free_tumble]",
     ),
     Mutation(
         30, "rotor/classical/free/budget.py",

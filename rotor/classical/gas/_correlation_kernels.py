@@ -1,7 +1,7 @@
 """Compiled sums behind correlation functions of a free gas: exact attitudes, one body after another, never stored.
 
 Measured (`benchmarks/bench_gas.py`): 0.09 µs for one body at one time, nearly all of it the attitude; a step of 128 bodies
-side by side 0.006 µs for each. The plain forms stand in `tests/test_ensembles.py`.
+side by side 0.006 µs for each. The plain forms stand in `tests/classical/test_ensembles.py`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The next order is c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`), a geometric series, with c = 0.3 of a
 linear top from the quartic to the sextic order, 3 of other tops there, 1 of every higher order. A harmonic diatomic molecule has 2, and
 anharmonicity takes most of it away (Dunham's H = 2D(12B² - αω)/3ω²); these values were chosen on the library, where they hold within a
-factor of 3 for 25 of 30 orders (tests/test_scene_plans.py names the others).
+factor of 3 for 25 of 30 orders (tests/scenes/test_scene_plans.py names the others).
 """
 
 from __future__ import annotations

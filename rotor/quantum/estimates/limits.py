@@ -11,8 +11,8 @@
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289). ν = 1150 cm⁻¹ (B/cm⁻¹)^0.3 was chosen on the
-library: 40 of 41 D_J or ΔJ are met within a factor of 3 (tests/test_limits.py; not that of glycolaldehyde). A group that turns without
-a barrier has the levels F m², m = 0 of A and m = ±1 of E species, F apart.
+library: 40 of 41 D_J or ΔJ are met within a factor of 3 (tests/quantum/test_limits.py; not that of glycolaldehyde). A group that
+turns without a barrier has the levels F m², m = 0 of A and m = ±1 of E species, F apart.
 """
 
 from __future__ import annotations

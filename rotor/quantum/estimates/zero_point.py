@@ -11,7 +11,7 @@ as if the bond were longer by δr. ω follows from the bond length (AIP Advances
     k = ζ²/r³ of bonds with hydrogen,    k = 10 √ζ/r⁴ of others,
 
 and F = 1.2 and 2.2 are medians over every second of 45 diatomic molecules; over the others 1.2 and 2.2 again, none beyond a factor
-of 2 (tests/test_zero_point.py). In a polyatomic molecule every bond is taken to be longer by its own δr, all angles as they were;
+of 2 (tests/molecules/test_zero_point.py). In a polyatomic molecule every bond is taken to be longer by its own δr, all angles as they were;
 atoms are displaced by the least amounts that do this (in a ring as nearly as they can). Bending, which makes A of water larger in
 the ground state, and Coriolis terms are left out: signs and axes are not to be trusted, the quadratic mean over the axes is.
 How that compares with measured constants is in docs/limitations.md.

@@ -1,0 +1,134 @@
+"""`rotor assign`: the same numbers as from Python, files, scenes, and one line for each mistake."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
+
+from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.formats.peak_files import read_peaks
+
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def peaks_csv(folder: Path) -> Path:
+    """A list of peaks as a file."""
+    path = folder / "peaks.csv"
+    columns = spectrum().columns
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.6f")
+    return path
+
+
+def test_command_scene_and_python_agree(call: Call, peaks_csv: Path) -> None:
+    code, shown, _ = call(
+        "assign", "peaks.csv", "--range", "8000:18000", "--csv", "a.csv", "--lin", "a.lin", "--json", "a.json",
+        "--plot", "a.png", "--save-scene", "a.toml",
+    )  # fmt: skip
+    assert code == 0
+    assert "species 1, certain" in shown
+    found = json.loads(Path("a.json").read_text())
+    answer = answer_assign(AssignRequest(read_peaks(peaks_csv, BAND)))
+    for key, value in json.loads(json.dumps(answer.facts())).items():
+        assert found[key] == value
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert len(Path("a.lin").read_text().splitlines()) == len(answer.species[0].lines)
+
+    before = Path("a.csv").read_text()
+    Path("a.csv").unlink()
+    code, _, error = call("run", "a.toml")
+    assert code == 0, error
+    assert Path("a.csv").read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("7000,1\n9000,abc\n", "line 2: '9000,abc': expected two or three numbers"),
+        ("7000,1\n9000\n", "line 2: 1 columns"),
+        ("7,1\n9,1\n", "if they are in GHz, multiply by 1000"),
+        ("7000,1\n9000,-3\n", "row 2: intensity is -3"),
+        ("7000,1\n", "1 peak: constants need more"),
+        ("frequency,intensity\n", "no numbers in it"),
+    ],
+)
+def test_mistakes_in_a_list_are_one_line(call: Call, text: str, message: str) -> None:
+    Path("peaks.csv").write_text(text)
+    code, _, error = call("assign", "peaks.csv")
+    assert code == 2
+    assert message in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_file_that_is_not_there(call: Call) -> None:
+    code, _, error = call("assign", "none.csv")
+    assert (code, "no such file" in error) == (2, True)
+    code, _, error = call("assign")
+    assert (code, "no spectrum" in error) == (2, True)
+
+
+def test_a_geometry_is_needed_for_isotopologues(call: Call, peaks_csv: Path) -> None:
+    code, _, error = call("assign", "peaks.csv", "--isotopologues")
+    assert code == 2
+    assert "a geometry of the first species is needed" in error
+
+
+def gridded(noise: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """Gaussian lines of 0.1 MHz full width on a grid of 25 kHz, with noise."""
+    rng = np.random.default_rng(6)
+    f, i = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
+    grid = np.arange(*BAND, 0.025)
+    x = noise * rng.normal(size=len(grid))
+    for f0, height in zip(f, i, strict=True):
+        at = slice(*np.searchsorted(grid, [f0 - 0.4, f0 + 0.4]))
+        x[at] += height * np.exp(-4 * np.log(2) * ((grid[at] - f0) / 0.1) ** 2)
+    return grid, x
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".csv"])
+def test_a_spectrum_on_a_grid(suffix: str, tmp_path: Path) -> None:
+    """Peaks are found within four of their errors, and the species from them."""
+    grid, x = gridded()
+    path = tmp_path / f"spectrum{suffix}"
+    if suffix == ".npy":
+        np.save(path, np.column_stack([grid, x]))
+    else:
+        np.savetxt(path, np.column_stack([grid, x]), delimiter=",", fmt="%.4f")
+    peaks = read_peaks(path)
+    f, _ = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
+    apart = np.array([np.abs(f - one).min() for one in peaks.frequency_mhz])
+    alone = np.array([np.sort(np.abs(f - one))[1] > 0.3 for one in peaks.frequency_mhz])
+    assert (apart[alone] < 4 * peaks.uncertainty_mhz[alone] + 0.001).mean() > 0.97
+    assert is_right(answer_assign(AssignRequest(peaks, seconds=120)), 0, TRUTH)
+
+
+def test_noise_alone_has_no_peaks() -> None:
+    """10⁶ points of noise: none is above six times the noise but by a chance of 1e-3."""
+    noise = np.random.default_rng(7).normal(size=1_000_000)
+    with pytest.raises(ValueError, match="0 peaks above 6 times the noise"):
+        peaks_of_spectrum(6000 + 0.01 * np.arange(1_000_000), noise)
+
+
+@pytest.mark.parametrize(
+    ("factor", "sign", "message"),
+    [(1e-3, 1.0, "if they are in GHz, multiply by 1000"), (1.0, -1.0, "0 peaks above 6 times the noise")],
+)
+def test_a_grid_in_ghz_and_an_inverted_one(factor: float, sign: float, message: str) -> None:
+    grid, x = gridded()
+    with pytest.raises(ValueError, match=message):
+        peaks_of_spectrum(factor * grid, sign * x)
+
+
+@pytest.mark.parametrize("array", [np.ones((5, 4)), np.ones(6), np.ones((2, 3, 2)), np.array([["a", "b"]] * 3)])
+def test_an_array_that_is_no_list_of_peaks_is_refused(call: Call, array: np.ndarray) -> None:
+    np.save("peaks.npy", array)
+    code, _, error = call("assign", "peaks.npy")
+    assert code == 2
+    assert f"an array of shape {array.shape}; two or three columns or rows of numbers are needed" in error

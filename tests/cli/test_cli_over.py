@@ -1,0 +1,113 @@
+"""Lines of known constants over a measured spectrum: temperature and dipole ratios from its peaks, pictures, mistakes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from assignment_cases import BAND, TRUTH, lines_of, spectrum
+
+import rotor
+from rotor.assignment.intensities import fit_intensities, matched, types_of
+from rotor.assignment.peaks import peak_list
+from rotor.plots.over import loomis_wood_figure
+from rotor.spectra.lines import Lines
+
+Call = Callable[..., tuple[int, str, str]]
+CONSTANTS = " ".join(f"{name}={value}" for name, value in TRUTH.items()) + " MHz"
+
+
+def known_lines(
+    temperature_k: float = 5.0, factor: float = 1.0, dipole: tuple[float, float, float] = (1.0, 1.0, 1.0)
+) -> Lines:
+    """Lines of the constants of the spectrum, at another temperature and with equal components of the dipole."""
+    constants = {name: value * (factor if name in "ABC" else 1.0) for name, value in TRUTH.items()}
+    top = rotor.Top.from_constants(
+        rotor.Constants(**constants, reduction="S", representation="Ir"), dipole_abc_debye=dipole
+    )
+    return rotor.api.line_list(top, temperature_k=temperature_k, jmax=30, range_mhz=BAND)
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_temperature_and_dipole_follow_from_the_heights(seed: int) -> None:
+    """Made at 2 K with 0 : 1 : 0.6; the lines that are compared have 5 K and 1 : 1 : 1."""
+    fit = fit_intensities(known_lines(), spectrum(seed))
+    assert abs(fit.temperature_k - 2.0) < 4 * fit.temperature_error_k
+    assert fit.temperature_error_k < 0.1
+    np.testing.assert_allclose(fit.dipole_ratio, [0.0, 1.0, 0.6], atol=0.04)
+    assert 0.1 < fit.scatter < 0.3  # the heights scatter by 20 %
+
+
+def test_heights_are_those_of_the_lines() -> None:
+    """Of a spectrum without scatter: heights of lines are those it was made with, within the approximation hν << kT."""
+    f, i = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
+    lines = known_lines()
+    fit = fit_intensities(lines, peak_list(f, i, 0.001, band_mhz=BAND))
+    heights = fit.heights(lines)
+    at = [int(np.argmin(np.abs(lines.frequency_mhz - one))) for one in f]
+    single = np.array([np.sort(np.abs(f - one))[1] > 0.3 for one in f])
+    np.testing.assert_allclose(heights[at][single], i[single], rtol=0.1)
+
+
+def test_components_that_were_given_count() -> None:
+    """With the dipole as it is the ratio stays."""
+    fit = fit_intensities(known_lines(dipole=(0.0, 2.0, 1.2)), spectrum())
+    np.testing.assert_allclose(fit.dipole_ratio, [0.0, 1.0, 0.6], atol=0.04)
+
+
+def test_a_type_with_peaks_by_chance_is_absent() -> None:
+    """A strong peak at one line of a-type, as of another molecule, does not make the type present."""
+    peaks, lines = spectrum(), known_lines()
+    a_type = np.flatnonzero(types_of(lines, np.arange(len(lines))) == 0)
+    strongest = a_type[np.argsort(-lines.intensity_nm2_mhz[a_type])[:40]]
+    rows = [row for row in strongest.tolist() if np.abs(peaks.frequency_mhz - lines.frequency_mhz[row]).min() > 1.0][:2]
+    f = np.append(peaks.frequency_mhz, lines.frequency_mhz[rows])
+    more = peak_list(f, np.append(peaks.intensity, [300.0] * len(rows)), 0.005, band_mhz=BAND)
+    np.testing.assert_allclose(fit_intensities(lines, more).dipole_ratio, [0.0, 1.0, 0.6], atol=0.04)
+
+
+def test_wrong_constants_have_few_lines_with_a_peak() -> None:
+    right, wrong = (int((matched(known_lines(factor=one), spectrum())[1] >= 0).sum()) for one in (1.0, 1.01))
+    assert right > 60
+    assert wrong < right / 6
+    with pytest.raises(ValueError, match="at least 5 are needed"):
+        fit_intensities(known_lines(), peak_list([8100.0, 9000.0], [1.0, 2.0]))
+
+
+def test_rows_of_right_constants_have_a_peak_in_the_middle() -> None:
+    """And those of wrong constants have not."""
+    peaks, shares = spectrum(), []
+    for factor in (1.0, 1.01):
+        lines = known_lines(2.0, factor, (0.0, 1.0, 0.6))
+        axes = loomis_wood_figure(lines, lines.intensity_nm2_mhz, peaks, "rows").axes[0]
+        marks = [path.vertices for collection in axes.collections for path in collection.get_paths()]
+        middle = {round(float(one[:, 1].mean())) for one in marks if abs(one[0, 0]) < 0.05}
+        shares.append(len(middle) / len(axes.get_yticks()))
+    assert shares[0] > 0.95
+    assert shares[1] < 0.2
+
+
+def test_command_with_pictures(call: Call, folder: Path) -> None:
+    columns = spectrum().columns
+    np.savetxt("peaks.csv", np.column_stack(list(columns.values())), delimiter=",", fmt="%.6f")
+    arguments = ("spectrum", "--constants", CONSTANTS, "--dipole-abc", "1,1,1", "--temperature", "2", "--jmax", "20")
+    code, shown, error = call(
+        *arguments, "--over", "peaks.csv", "--plot", "o.png", "--loomis-wood", "l.png", "--json", "o.json"
+    )
+    assert code == 0, error
+    assert "|μa| : |μb| : |μc| = 0.00 : 1.00 : 0." in shown
+    fit = json.loads(Path("o.json").read_text())["over"]["fit"]
+    assert fit["temperature_k"] == pytest.approx(2.0, abs=0.15)
+    for name in ("o.png", "l.png"):
+        assert Path(name).read_bytes().startswith(b"\x89PNG")
+    code, _, error = call(*arguments, "--loomis-wood", "l.png")
+    assert (code, "give one with --over" in error) == (2, True)
+    code, _, error = call(*arguments, "--over", "none.csv")
+    assert (code, "no such file" in error) == (2, True)
+    Path("far.csv").write_text("200000,1\n300000,2\n")
+    code, _, error = call(*arguments, "--range", "8000:18000", "--over", "far.csv")
+    assert code != 0
+    assert "no line lies in its band" in error

@@ -1,0 +1,129 @@
+"""The generated pages of docs/ say what the programs beside them find now."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from doc_scripts import DOCS, script
+
+
+@pytest.mark.oracle
+def test_the_page_of_measured_lines(shared: Path):
+    make = script("make_measured_lines")
+    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.oracle
+def test_the_page_of_published_structures(shared: Path):
+    make = script("make_published_structures")
+    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+
+
+def test_the_page_of_codes():
+    make = script("make_spcat_codes")
+    assert make.page() == make.TARGET.read_text(encoding="utf-8")
+
+
+@pytest.mark.oracle
+@pytest.mark.slow
+def test_the_page_of_reference_cases(shared: Path):
+    make = script("make_reference_cases")
+    now, then = (_same_text_apart(text) for text in (make.page(shared), make.PAGE.read_text(encoding="utf-8")))
+    assert now[0] == then[0]
+    assert np.max(np.abs(now[1] - then[1])) <= 5  # a last digit on the edge falls otherwise with another LAPACK
+
+
+def _same_text_apart(page: str) -> tuple[list[list[str]], np.ndarray]:
+    """The page as cells without its counts of lines with the same text, and these counts."""
+    rows = [row.split("|") for row in page.splitlines()]
+    place = {10: 3, 11: 4}  # the column with the count, by the number of cells
+    counted = {
+        i: place[len(row)] for i, row in enumerate(rows) if len(row) in place and row[place[len(row)]].strip().isdigit()
+    }
+    assert len(counted) == 13 + 8
+    counts = np.array([int(rows[i][column]) for i, column in counted.items()])
+    return [row[: counted[i]] + row[counted[i] + 1 :] if i in counted else row for i, row in enumerate(rows)], counts
+
+
+def test_the_pages_claim_what_they_should():
+    """Every molecule and case has its row; shares and differences are what the words around the tables say."""
+    measured = (DOCS / "validation" / "measured_lines.md").read_text(encoding="utf-8")
+    held = {
+        row.split("|")[1].strip(): float(row.split("|")[7]) for row in measured.splitlines() if "held against:" in row
+    }
+    assert {name for name, share in held.items() if share > 0.99} == {
+        "CO", "OCS", "N2O", "HCN", "HC3N", "HC5N", "CH3CN", "CH3CCH", "HDO", "D2O", "SO2",
+    }  # fmt: skip
+    assert {name for name, share in held.items() if share < 0.9} == {"H2CO", "H2S", "HNCO"}
+    assert all(f"- **{name}**" in measured for name in ("H2O", "H2CO", "SO2", "H2S", "HNCO"))
+
+    cases = (DOCS / "validation" / "reference_cases.md").read_text(encoding="utf-8").splitlines()
+    rows = [
+        [word.strip() for word in row.split("|")[1:-1]] for row in cases if row.startswith("| ") and "case" not in row
+    ]
+    coupled = [row[:1] + row[2:] for row in rows if len(row) == 9]  # with a column for what it is
+    equal = [row for row in rows if len(row) == 8] + coupled
+    assert len(equal) == 13 + 8
+    assert len(rows) == 13 + 8 + 13
+    assert all(float(row[3]) <= 1.1e-4 and float(row[4]) <= 2e-4 and float(row[5]) <= 2e-4 for row in equal)
+    assert all(float(row[7]) <= 1e-6 for row in equal)
+
+
+def results(name: str) -> dict[str, Any]:
+    return json.loads((DOCS.parent / "benchmarks" / "results" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def test_figures_in_the_text_are_those_that_the_benchmarks_wrote():
+    fluid = (DOCS / "fluid.md").read_text(encoding="utf-8").replace("\n", " ")
+    found = results("thermometers")
+    drifts = [
+        found["drifts"][name]["energy_rms_kj_per_mol"] for name in ("symmetric top and remainder", "three rotations")
+    ]
+    long = next(row["energy_rms_kj_per_mol"] for row in found["runs"] if row["step_fs"] == 2.0)
+    assert (
+        f"rms of the energy is {drifts[0]:.2f} kJ/mol with this drift and {drifts[1]:.2f} with three rotations" in fluid
+    )
+    assert f"Over 80 ps it is {long:.2f}" in fluid
+
+    cost = results("free_motion")
+    one, many, most = (cost[f"setting up {n} bodies, each"] for n in (1, 1000, 100_000))
+    for page, text in (("validation/speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
+        stated = f"{one / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
+        assert stated in (DOCS / page).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_sizes_of_dependencies_are_those_of_the_installed_files():
+    """Of the releases in constraints.txt that are installed here; others may weigh something else."""
+    root = DOCS.parent
+    pinned = dict(row.split("==") for row in (root / "constraints.txt").read_text("utf-8").split() if "==" in row)
+    rows = [row.split("|")[1:3] for row in (root / "README.md").read_text("utf-8").splitlines() if row.startswith("| ")]
+    compared = 0
+    for names, sizes in rows:
+        packages = [name for name in names.strip().split(", ") if name in pinned]
+        stated = re.findall(r"(?:^|, )(?:(\w+) )?(\d+)(?=,|$)", sizes.strip())
+        own = [float(size) for name, size in stated if not name]
+        for name, size in [*zip(packages, own, strict=False), *((n, float(s)) for n, s in stated if n in pinned)]:
+            if installed(name, pinned[name]) is not None and name not in ("rich", "pydantic"):  # with what they need
+                assert installed(name, pinned[name]) == pytest.approx(size, abs=0.6 + 0.02 * size), name  # whole MB
+                compared += 1
+    assert compared >= 8 or importlib.metadata.version("numpy") != pinned["numpy"]
+
+
+def installed(name: str, version: str) -> float | None:
+    """MB of the files of a distribution with what pip compiled; None where it is not there or is another release."""
+    try:
+        found = importlib.metadata.distribution(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    if found.version != version:
+        return None
+    files = (Path(str(found.locate_file(one))) for one in found.files or [])
+    return sum(one.stat().st_size for one in files if one.is_file()) / 1e6

@@ -1,0 +1,105 @@
+"""Errors of predicted lines are made for all parameters and blocks together: work counted in calls of functions, which no load changes."""
+
+from __future__ import annotations
+
+import cProfile
+import pstats
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import ORACLES
+
+from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
+from rotor.quantum.estimates.derivatives import level_derivatives
+
+KINDS = ORACLES / "kinds"
+SPAN = 6  # F above FBGN
+
+
+def _files(name: str, span: int = SPAN):
+    folder = KINDS / name if (KINDS / name).is_dir() else KINDS.parent / name
+    par, asked = read_par(folder / f"{name}.var"), read_int(folder / f"{name}.int")
+    first = asked.request.fbgn
+    return par, replace(asked, request=replace(asked.request, fend=min(asked.request.fend, first + span)))
+
+
+def _calls(par, asked) -> int:
+    profile = cProfile.Profile()
+    profile.enable()
+    predict(par, asked)
+    profile.disable()
+    return int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad"])
+def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
+    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block."""
+    par, asked = _files(name)
+    held = replace(par, parameters=tuple(replace(p, error=1e-37) for p in par.parameters), rest="")
+    par = replace(par, parameters=tuple(replace(p, error=max(p.error, abs(p.value) * 1e-4)) for p in par.parameters))
+    for file in (held, par):  # what is made once for a process is there
+        predict(file, asked)
+    assert _calls(par, asked) < 2.0 * _calls(held, asked)
+
+
+def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
+    """CH3CN with ¹⁴N to F = 30, in calls of functions a level; 146 where every block was solved by itself."""
+    par, asked = _files("ch3cn_quad", span=30)
+    group = groups_of(par, asked)[0]
+    group.levels((0, 60))
+    profile = cProfile.Profile()
+    profile.enable()
+    levels = group.levels((0, 60))
+    profile.disable()
+    assert pstats.Stats(profile).total_calls < 75 * len(levels)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "fso3",
+        "o2",
+        "oc33s",
+        "eighteen_states",
+        "methyl_i_tot",
+        "l_doubled_quad",
+        "phase_with_spins",
+        "ch3cn_quad",
+        "h2coh",
+    ],
+)
+def test_derivatives_are_differences(name: str):
+    """∂E/∂c of every parameter beside central differences of solved levels, for each way that a file is solved."""
+    par, asked = _files(name)
+    for group in groups_of(par, asked):
+        twice_f = (2 * SPAN + sum(group.spins) % 2,) * 2
+        levels, names = group.levels(twice_f), tuple(group.effect.parameters(group.top))
+        slopes = level_derivatives(group.top, levels, names)
+        values = group.effect.parameters(group.top)
+        for column in np.linspace(0, len(names) - 1, min(len(names), 6)).astype(int).tolist():
+            name_of, size = names[column], np.abs(slopes[:, column]).max()
+            if not size:
+                continue
+            step = min(1e-3 * abs(values[name_of]), 1.0 / size)  # levels move by 1 MHz
+            both = []
+            for sign in (1, -1):
+                lines = tuple(
+                    line._replace(value=line.value + sign * step) if line.name == name_of else line
+                    for line in group.effect.lines
+                )
+                moved = replace(group, effect=replace(group.effect, lines=lines))
+                both.append(np.sort(moved.levels(twice_f).energy_mhz))
+            difference = (both[0] - both[1]) / (2 * step)
+            order = np.argsort(levels.energy_mhz, kind="stable")
+            gaps = np.diff(levels.energy_mhz[order])
+            alone = np.concatenate([[True], gaps > 100]) & np.concatenate(
+                [gaps > 100, [True]]
+            )  # MHz: they do not cross
+            if alone.any():
+                expected = slopes[order, column][alone]
+                # second order: (1 MHz)^2/100 MHz; round-off of energies of 1e7 MHz
+                assert difference[alone] == pytest.approx(expected, abs=0.02 * size + 1e-8 / step)

@@ -1,0 +1,165 @@
+"""Cases of the reference program, by two routes, and a comparison line by line.
+
+One route reads the program's own .int and .var; the other makes top and lines from the words of case.json, with the
+published names of the constants.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from places import ORACLES
+
+from rotor.formats.spcat.model import common_weight
+from rotor.formats.spcat.predict import Prediction, predict_file
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.par import read_par
+from rotor.spectra.lines import Lines, line_list
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+from rotor.units import MHZ_PER_CM
+
+SAMPLES = ORACLES
+WORDED = ("abc_rigid_j20_all", "hard_nearsym_j150", "h2o_quartic_diag3", "abc_sred", "ocs", "hc3n", "ch3cn")
+CASES = (*WORDED, "abc_ared6", "h2co", "h2o_octic", "h2o_sextic", "pyridine_oblate_s", "so2")
+COUPLED = (
+    "asym_spinrot", "ch2cl2_2quad", "ch3cn_quad", "formamide_quad", "hcn_quad", "three_states_fermi_coriolis",
+    "tunnelling_doublet_quad", "two_state_coriolis", "vinylcl35_quad",
+)  # fmt: skip  # spins, several states
+BIG = ("abc_ared6", "abc_sred", "hard_nearsym_j150", "pyridine_oblate_s")
+_PUBLISHED = {"-DelJ": "DeltaJ", "-DelJK": "DeltaJK", "-DelK": "DeltaK", "-delJ": "deltaJ", "-delK": "deltaK"}
+_WEIGHTS = {
+    "IAX=2: 1:3": {"ee": 1, "eo": 3, "oe": 3, "oo": 1},
+    "IAX=6 (3-fold), WTPL=WTMN=2, EWT=1: K mod 3 = 0 weight 2, else weight 1 (see .egy degeneracy)": {"0": 2, "1": 1, "2": 1},
+}  # fmt: skip
+
+
+def top_of_case(case: dict[str, Any]) -> Top:
+    """Constants by their published names (a label "-D" is minus D), dipole, spin weights."""
+    given = {p["label"]: p["value"] for p in case["parameters"]}
+    values = {
+        _PUBLISHED.get(k, k.removeprefix("-")): -v if k.startswith("-") else v for k, v in given.items() if k != "A-B"
+    }
+    if "A-B" in given:
+        values = {"A": given["A-B"] + given["B"]} | values
+    reduction = case["reduction"][-1] if case["reduction"].startswith("Watson") else None
+    dipole = {d["component"]: d["value"] for d in case["dipoles_debye"]}
+    return Top.from_constants(
+        Constants(reduction=reduction, **values),
+        dipole_abc_debye=[dipole.get(axis, 0.0) for axis in "abc"],
+        spin_weights=_WEIGHTS.get(case["spin_statistics"]),
+    )
+
+
+def lines_of_case(case: dict[str, Any]) -> Lines:
+    """The case's list: its Q, limits and cut 10^STR0 + 10^STR1 (ν/300 GHz)², which counts one component of a K doublet."""
+    lines = line_list(
+        top_of_case(case),
+        temperature_k=case["temperature_K"],
+        q=case["qrot_used"],
+        jmax=case["fend"],
+        min_lgint=None,
+        range_mhz=(0.0, case["frequency_limit_GHz"] * 1e3),
+    )
+    least = 10.0 ** case["str0"] + 10.0 ** case["str1"] * (lines.frequency_mhz / 3e5) ** 2
+    return lines.where(lines.intensity_nm2_mhz / lines.levels.components[lines.lower] > least)
+
+
+@cache
+def prediction(folder: Path) -> Prediction:
+    """What the case's .int and .var predict."""
+    return predict_file(folder / f"{folder.name}.int")
+
+
+def read_case(folder: Path) -> dict[str, Any]:
+    return dict(json.loads((folder / "case.json").read_text(encoding="utf-8")))
+
+
+def compare_with_tool(shared: Path, case: str, ours: Path) -> tuple[bool, str]:
+    """What the comparison script of the reference folder says of our file: equal, and its words."""
+    folder = shared / "reference" / "spcat" / case
+    command = [sys.executable, str(shared / "tools" / "compare_cat.py"), str(folder / f"{case}.cat.gz"), str(ours)]
+    done = subprocess.run([*command, "--int", str(folder / f"{case}.int")], capture_output=True, text=True, check=False)
+    return done.returncode == 0, done.stdout + done.stderr
+
+
+def _merged(catalogue: Catalogue) -> dict[tuple[Any, ...], list[list[float]]]:
+    """Lines by label, signs of K dropped, K components of one frequency added."""
+    out: dict[tuple[Any, ...], list[list[float]]] = {}
+    columns = (catalogue.frequency_mhz, catalogue.lgint, catalogue.energy_lower_cm, catalogue.g_upper)
+    for i, (f, strength, energy, g) in enumerate(zip(*(c.tolist() for c in columns), strict=True)):
+        label = (*np.abs(catalogue.quanta_upper[i]).tolist(), *np.abs(catalogue.quanta_lower[i]).tolist())
+        twin = next((row for row in out.setdefault(label, []) if abs(row[0] - f) < 2e-4), None)
+        if twin:
+            twin[1], twin[3] = float(np.log10(10 ** twin[1] + 10**strength)), twin[3] + g
+        else:
+            out[label].append([f, strength, energy, g])
+    return out
+
+
+def disagreements(reference: Catalogue, ours: Catalogue) -> list[str]:
+    """What of a sample is missing from our list or differs: 1.1e-4 MHz, 2e-4 in LGINT and E″, degeneracy, label."""
+    index, out = _merged(ours), []
+    for label, rows in _merged(reference).items():
+        for f, strength, energy, g in rows:
+            near = min(index.get(label, []), key=lambda row: abs(row[0] - f), default=None)
+            if near is None:
+                out.append(f"missing {label} at {f}")
+            elif (
+                abs(near[0] - f) > 1.1e-4
+                or abs(near[1] - strength) > 2e-4
+                or abs(near[2] - energy) > 2e-4
+                or near[3] != g
+            ):
+                out.append(f"{label}: {near} is not {[f, strength, energy, g]}")
+    return out
+
+
+def level_disagreements(reference: LevelList, ours: Prediction, common: int) -> list[str]:
+    """Levels of an .egy file that are missing from ours or differ: 1e-6 cm⁻¹, half a digit of print with it; degeneracy.
+
+    common: the divisor taken out of the weights.
+    """
+    levels = ours.lines.levels
+    energy = (levels.energy_mhz / MHZ_PER_CM).tolist()
+    g = (levels.degeneracy * common // levels.components).tolist()
+    labels = ours.lines.quanta(np.arange(len(levels), dtype=np.int32)).tolist()
+    index = {tuple(label): row for row, label in enumerate(labels)}
+    out = []
+    for i in range(len(reference)):
+        level = reference.level(i)
+        row = index.get(tuple(np.abs(level.quanta[: len(labels[0])]).tolist()))
+        if row is None or abs(energy[row] - level.energy_cm) > 1e-6 or g[row] != level.degeneracy:
+            out.append(f"{level} is not {row is not None and (energy[row], g[row])}")
+    return out
+
+
+def coupled_level_disagreements(reference: LevelList, ours: Prediction) -> list[str]:
+    """Levels of an .egy file with all their quantum numbers that are missing from ours or differ: 5.1e-7 cm⁻¹, half a digit of print."""
+    assert ours.levels is not None
+    found: dict[tuple[int, ...], list[int]] = {}
+    for row, label in enumerate(ours.levels.quanta.tolist()):
+        found.setdefault(tuple(label), []).append(row)
+    out = []
+    for i in range(len(reference)):
+        level = reference.level(i)
+        rows = found.get(tuple(level.quanta[: ours.levels.quanta.shape[1]]), [])
+        near = min(rows, key=lambda row: abs(ours.levels.energy_cm[row] - level.energy_cm), default=None)
+        if (
+            near is None
+            or abs(ours.levels.energy_cm[near] - level.energy_cm) > 5.1e-7
+            or ours.levels.degeneracy[near] != level.degeneracy
+        ):
+            out.append(f"{level} is not {near is not None and ours.levels.energy_cm[near]}")
+    return out
+
+
+def common_of(folder: Path) -> int:
+    return common_weight(read_par(folder / f"{folder.name}.var").options[0])

@@ -1,0 +1,156 @@
+"""Internal rotation with a nuclear spin, against the direct product |J K M⟩|m⟩|I M_I⟩ written out here."""
+
+import numpy as np
+import pytest
+import qutip
+from spherical_tensors import spherical, symbol
+
+import rotor
+from rotor.quantum.contraction import contracted_elements, coupled, spin_space
+from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.model import RamModel
+from rotor.quantum.operators.algebra import half_anticommutator
+from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
+from rotor.quantum.tensors import spherical_components
+from rotor.tops.internal_rotation import InternalRotationConstants
+
+CM = rotor.units.MHZ_PER_CM
+CONSTANTS = {"A": 9000.0, "B": 4200.0, "C": 3100.0, "Dab": 700.0, "F": 5.2 * CM, "rho": 0.08, "V3": 40.0 * CM}
+CHI = np.array([[-40.0, 25.0, 0.0], [25.0, 15.0, 0.0], [0.0, 0.0, 25.0]])  # MHz, along a, b, c
+ROTATION = np.diag([30.0, -20.0, 10.0]) * 0.1  # C_gg, MHz
+JMAX, SPIN, WAVES = 2, 1, 3
+
+
+def cosines(states, rank):
+    """D^k*_pq between |J K M⟩ = ⟨J'K'M'|D^k*_pq|J K M⟩, all p and q, as (2k+1, 2k+1, n, n)."""
+    n = len(states)
+    out = np.zeros((2 * rank + 1, 2 * rank + 1, n, n))
+    for r, (jj, kk, mm) in enumerate(states):
+        for c, (j, k, m) in enumerate(states):
+            if abs(jj - j) > rank:
+                continue
+            p, q = mm - m, kk - k
+            if abs(p) <= rank and abs(q) <= rank:
+                root = (-1) ** (mm - kk) * np.sqrt((2 * jj + 1) * (2 * j + 1))
+                out[p + rank, q + rank, r, c] = root * symbol(jj, rank, j, -mm, p, m) * symbol(jj, rank, j, -kk, q, k)
+    return out
+
+
+def direct_product(sigma):
+    """Energies of all states with J ≤ 2, all M, all M_I."""
+    states = [(j, k, m) for j in range(JMAX + 1) for k in range(-j, j + 1) for m in range(-j, j + 1)]
+    n = len(states)
+    raising, along = np.zeros((n, n)), np.diag([float(k) for _, k, _ in states])
+    for c, (j, k, m) in enumerate(states):
+        if k < j:
+            raising[states.index((j, k + 1, m)), c] = np.sqrt(j * (j + 1) - k * (k + 1))
+    pa, pb, pc = along.astype(complex), (raising + raising.T) / 2, 0.5j * (raising - raising.T)
+
+    m = 3.0 * np.arange(-WAVES, WAVES + 1) + sigma
+    p, one = np.diag(m), np.eye(len(m))
+    cos3 = (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2
+    c = CONSTANTS
+    rotation = c["A"] * pa @ pa + c["B"] * pb @ pb + c["C"] * pc @ pc + c["Dab"] * (pa @ pb + pb @ pa)
+    slip = np.kron(np.eye(n), p) - c["rho"] * np.kron(pa, one)
+    free = np.kron(rotation, one) + c["F"] * slip @ slip + np.kron(np.eye(n), c["V3"] / 2 * (one - cos3))
+
+    ix, iy, iz = (qutip.jmat(SPIN, axis).full() for axis in "xyz")
+    spins = (ix, iy, iz)
+    product = [[(a @ b + b @ a) / 2 - (SPIN * (SPIN + 1) / 3 * np.eye(len(ix)) if i == k else 0) for k, b in enumerate(spins)]
+               for i, a in enumerate(spins)]  # fmt: skip
+    of_spin = [part / (2 * SPIN * (2 * SPIN - 1)) for part in spherical(product)]
+    order = [1, 2, 0]  # x, y, z = b, c, a
+    of_body = spherical(CHI[np.ix_(order, order)])
+    coupling = np.zeros((n * len(ix),) * 2, dtype=complex)
+    turned = cosines(states, 2)
+    for space in range(-2, 3):
+        tensor = sum(of_body[q + 2] * turned[space + 2, q + 2] for q in range(-2, 3))
+        coupling += (-1) ** space * np.kron(tensor, of_spin[2 - space])
+    vector = cosines(states, 1)
+    body = {"a": [0, 1, 0], "b": [1 / np.sqrt(2), 0, -1 / np.sqrt(2)], "c": [-1j / np.sqrt(2), 0, -1j / np.sqrt(2)]}
+    spin_vector = [(ix - 1j * iy) / np.sqrt(2), iz, -(ix + 1j * iy) / np.sqrt(2)]
+    for letter, component, value in zip("abc", (pa, pb, pc), np.diag(ROTATION), strict=True):
+        for space in (-1, 0, 1):
+            cosine = sum(body[letter][q + 1] * vector[space + 1, q + 1] for q in (-1, 0, 1))
+            half = (cosine @ component + component @ cosine) / 2
+            coupling += value * (-1) ** space * np.kron(half, spin_vector[1 - space])
+    whole = np.kron(free, np.eye(len(ix)))
+    lifted = np.einsum("aibk,cd->acibdk", coupling.reshape(n, len(ix), n, len(ix)), one).reshape(whole.shape)
+    return np.linalg.eigvalsh(whole + lifted)
+
+
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma):
+    ram = RamModel(CONSTANTS)
+    blocks = ram.blocks(sigma, JMAX, count=2 * WAVES + 1, waves=WAVES)
+    along = {"a": j_z(), "b": j_x(), "c": j_y()}
+    unit = dict(zip("abc", np.eye(3), strict=True))
+    vector = sum(
+        (
+            ROTATION[i, i] * half_anticommutator(body_tensor(spherical_components(unit[g], 1, "Ir")), along[g])
+            for i, g in enumerate("abc")
+        ),
+        start=0.0 * j_z(),
+    )
+    tensors = {
+        "chi": (2, blocks.functions.elements([[Product(body_tensor(spherical_components(CHI, 2, "Ir")))]], 2)),
+        "C": (1, blocks.functions.elements([[Product(vector)]], 1, time_odd=True)),
+    }
+    space = contracted_elements(blocks.linear.solve(ram.coefficients), tensors)
+    both = coupled(space, spin_space(2 * SPIN), {"chi": ("chi", "Q"), "C": ("C", "I")}, {}, range(0, 2 * JMAX + 3, 2))
+    solved = both.solve({"chi": 1.0, "C": 1.0})
+    ours = np.sort(np.concatenate([np.repeat(sector.energies, sector.twice_j + 1) for sector in solved.sectors]))
+    theirs = direct_product(sigma)
+    assert len(ours) == len(theirs)
+    assert np.abs(ours - theirs).max() < 1e-6  # MHz; rounding of energies up to 2e7 MHz is 1e-7
+
+
+# Levels and lines of a top
+
+
+SPINS = "chi_aa(14N)=-40 chi_bb-cc(14N)=-10 chi_ab(14N)=25 C_aa(14N)=0.3 C_bb(14N)=-0.2 MHz"
+
+
+def turning_top(spins=SPINS, **others):
+    values = {"F": 5.2 * CM, "rho": 0.0, "V3": 400.0 * CM}
+    internal = InternalRotationConstants(values, "RAM", vt_max=0)
+    constants = rotor.Constants(A=9000.0, B=4200.0, C=3100.0, reduction="A", representation="Ir")
+    return rotor.Top.from_constants(
+        constants, dipole_abc_debye=(1.5, 0.8, 0.0), spin_constants=spins, internal_rotation=internal
+    )
+
+
+@pytest.mark.parametrize("spins", [SPINS, SPINS.replace(" MHz", " chi_aa(35Cl)=-57 chi_bb-cc(35Cl)=-4 MHz")])
+def test_without_coupling_to_the_rotation_both_species_have_the_hyperfine_structure_of_a_rigid_top(spins):
+    """ρ = 0: torsion and rotation are apart, and every level and line of the other engine comes out in A and in E."""
+    top = turning_top(spins)
+    rigid = rotor.Top.from_constants(top.constants, dipole_abc_debye=(1.5, 0.8, 0.0), spin_constants=spins)
+    lines, expected = (
+        rotor.line_list(t, jmax=3, q=1.0, min_lgint=None, effects=rotor.effects_of(t, True)) for t in (top, rigid)
+    )
+    assert lines.levels.quanta_names == ("species", "vt", *expected.levels.quanta_names)
+    quanta = expected.levels.quanta_names
+
+    def strong(table, copies):
+        """Frequency, strength and names of both levels of lines that symmetry does not forbid, by frequency."""
+        table = table[table.strength_debye2 > 1e-6 * copies].sorted()
+        names = [
+            np.column_stack([table.levels.quanta[name][rows] for name in quanta]) for rows in (table.upper, table.lower)
+        ]
+        return table.frequency_mhz, table.strength_debye2 / copies, np.hstack(names)
+
+    known = strong(expected, 1)
+    for species, copies in (("A", 1), ("E", 2)):
+        found = strong(lines[lines.levels.quanta["species"][lines.upper] == species], copies)
+        assert len(found[0]) == len(known[0])
+        assert np.abs(found[0] - known[0]).max() < 1e-5  # rounding of 1e7 MHz
+        assert np.allclose(
+            np.sort(found[1]), np.sort(known[1]), rtol=1e-4, atol=1e-6
+        )  # levels a few Hz apart mix by rounding
+        assert sorted(map(tuple, found[2].tolist())) == sorted(map(tuple, known[2].tolist()))
+
+
+def test_what_is_not_computed_beside_internal_rotation_is_refused():
+    top = turning_top("chi_aa(14N)=-4 chi_aa_J(14N)=0.001 MHz")
+    with pytest.raises(ValueError, match="chi_aa_J"):
+        rotor.solve_levels(top, 1, effects=rotor.effects_of(top, True))

@@ -1,0 +1,157 @@
+"""The public face: a function for each verb, names that have moved, and what a result gives."""
+
+import doctest
+import inspect
+import json
+import re
+import warnings
+
+import numpy as np
+import pytest
+from places import PROJECT
+
+import rotor
+from rotor import api
+from rotor.calls import EXAMPLES
+from rotor.verbs.verb import verb_of
+
+
+def test_the_face_is_small():
+    assert len(dir(rotor)) <= 40
+    for name in set(dir(rotor)) - {"__version__"}:
+        assert getattr(rotor, name).__doc__, name
+
+
+@pytest.mark.parametrize("verb", rotor.VERBS)
+def test_each_verb_is_a_documented_function_with_an_example(verb):
+    function = getattr(rotor, verb)
+    assert function.__name__ == verb
+    assert "Parameters\n----------" in function.__doc__
+    examples = doctest.DocTestParser().get_doctest(function.__doc__, {}, verb, None, 0)
+    assert len(examples.examples) == 2
+    results = doctest.DocTestRunner(verbose=False).run(examples)
+    assert results.failed == 0
+    assert verb in EXAMPLES
+
+
+def test_every_field_is_an_argument():
+    for verb in rotor.VERBS:
+        for field in verb_of(verb).fields.values():
+            if field.key and field.name:
+                assert f"\n{field.name} : optional" in getattr(rotor, verb).__doc__
+
+
+@pytest.mark.parametrize("verb", rotor.VERBS)
+def test_editors_see_the_arguments(verb):
+    """The signature has every documented argument once."""
+    function = getattr(rotor, verb)
+    names = list(inspect.signature(function).parameters)
+    documented = re.findall(r"^(\w+) : ", function.__doc__.split("Returns")[0], re.MULTILINE)
+    assert sorted(names) == sorted(set(documented))
+    assert len(documented) == len(names)
+
+
+def test_python_gives_the_numbers_of_the_command(call):
+    code, out, _ = call("spectrum", "CO", "--temperature", "20", "--jmax", "5", "--json", "-")
+    assert code == 0
+    spectrum = rotor.spectrum("CO", temperature_k=20, jmax=5)
+    assert [line["frequency_mhz"] for line in json.loads(out)["lines"]] == spectrum.table.frequency_mhz.tolist()
+    assert spectrum.facts()["q"] == json.loads(out)["q"]
+
+
+def test_a_text_with_a_unit_is_a_number():
+    assert rotor.levels("CO", max_energy_mhz="50 cm-1").request.max_energy_mhz == pytest.approx(50 * 29979.2458)
+    field = rotor.stark("OCS", fields_kv_per_cm="0:10kV/cm:3", j_highest=0).table.fields
+    assert field.tolist() == [0.0, 5.0, 10.0]
+    given = rotor.stark("OCS", fields_kv_per_cm=[0.0, 5.0, 10.0], j_highest=0).table
+    assert (given.fields == field).all()
+
+
+def test_wrong_arguments_are_named():
+    with pytest.raises(TypeError, match=r"spectrum\(\): no argument 'temprature_k'; did you mean temperature_k"):
+        rotor.spectrum("CO", temprature_k=3)
+    with pytest.raises(ValueError, match="temperature_k: -3"):
+        rotor.spectrum("CO", temperature_k=-3)
+    with pytest.raises(ValueError, match="expected either"):
+        rotor.levels()
+
+
+def test_a_result_has_tables_files_pictures_and_its_scene(folder):
+    spectrum = rotor.spectrum("CO", temperature_k=20, jmax=5)
+    assert spectrum.to_pandas()["frequency_mhz"].tolist() == spectrum.table.frequency_mhz.tolist()
+    assert "<table>" in spectrum._repr_html_()
+    assert repr(spectrum).startswith("spectrum of CO")
+    assert spectrum.strongest(2).tolist() == spectrum.answer.strongest(2).tolist()  # attributes of the answer
+    spectrum.write("co.cat")
+    assert len((folder / "co.cat").read_text().splitlines()) == 5
+    assert "rotor.spectrum" in json.dumps(rotor.read("co.cat").provenance) or (folder / "co.cat").stat().st_size
+    with pytest.raises(ValueError, match="spectrum writes files that end in"):
+        spectrum.write("co.docx")
+    again = rotor.run_scene(spectrum.scene())
+    assert np.array_equal(again.table.frequency_mhz, spectrum.table.frequency_mhz)
+    assert list(spectrum.plan().counts.values()) == [5]
+    assert spectrum.errors.numerical < 1e-6
+    assert spectrum.plot() is not None
+
+
+@pytest.mark.parametrize("name", sorted(api.MOVED))
+def test_names_that_moved_warn_and_say_where_they_are(name):
+    assert callable(getattr(api, name))
+    if name in rotor.VERBS:
+        return
+    with pytest.warns(DeprecationWarning, match=rf"rotor\.{name} is rotor\.api\.{name} from version 0\.3 on"):
+        assert getattr(rotor, name) is getattr(api, name)
+
+
+def test_further_building_blocks_are_in_one_place():
+    assert sorted(api.modules()) == dir(api)
+    for name in set(api.modules()) - api.MOVED:
+        assert getattr(api, name) is not None
+
+
+def test_unknown_names_are_no_surprise():
+    with pytest.raises(AttributeError, match="did you mean"):
+        rotor.spektrum  # noqa: B018
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rotor.spectrum, rotor.Top, rotor.api  # noqa: B018
+
+
+def imports_of(path):
+    """The lines of a script, of the cells of a notebook, or of a page, that import from the package, as (module, names)."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        text = "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
+    pattern = r"^[ \t>]*(?:from (rotor[\w.]*) import (?:\(([^)]*)\)|([^\n(#]+))|import (rotor[\w.]*))"
+    for found in re.finditer(pattern, text, re.MULTILINE):
+        listed = re.sub("#.*", "", found[2] or found[3] or "")
+        names = [name.split(" as ")[0].strip() for name in listed.split(",")]
+        yield found[1] or found[4], [name for name in names if name]
+
+
+def documents(root):
+    pages = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
+    return [*pages, *root.glob("examples/**/*.py"), *root.glob("examples/**/*.ipynb")]
+
+
+def test_no_example_imports_from_inside(root):
+    """README, pages, scripts and notebooks import from `rotor` or `rotor.api` alone, and what they name is there."""
+    seen = 0
+    for path in documents(root):
+        for module, names in imports_of(path):
+            assert module in ("rotor", "rotor.api"), f"{path.name}: {module} {names}"
+            where = rotor if module == "rotor" else api
+            assert not [name for name in names if name not in dir(where)], path.name
+            seen += len(names)
+    assert seen > 300
+
+
+def test_an_import_from_inside_is_seen(tmp_path):
+    (tmp_path / "a.py").write_text("from rotor.quantum.solve import (\n    solve_levels,\n)\nimport rotor.units\n")
+    assert list(imports_of(tmp_path / "a.py")) == [("rotor.quantum.solve", ["solve_levels"]), ("rotor.units", [])]
+
+
+@pytest.fixture
+def root():
+
+    return PROJECT

@@ -1,0 +1,350 @@
+"""The page of `rotor view` in Chromium: open, zoom, assign three lines, refit, undo, export; the exported page without a network; keys.
+
+Skipped where Playwright or Chromium is not installed (`apt-get install chromium`, extra `test`).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from places import PROJECT
+from view_cases import KELVIN, NAME, SERIES, TRUE, write_case
+
+from rotor.viewer.opening import open_session
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra test)")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+ARGUMENTS = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+READY = "[data-ready=yes]"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """One browser for all tests."""
+    with playwright.sync_playwright() as started:
+        try:
+            opened = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        except playwright.Error as error:  # an installed browser that this machine does not let run
+            pytest.skip(f"Chromium does not start: {str(error).splitlines()[0]}")
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The case's files."""
+    made = tmp_path_factory.mktemp("browser")
+    write_case(made)
+    return made
+
+
+@pytest.fixture
+def served(folder, tmp_path):
+    """A served session of its own."""
+    from rotor.viewer.server import ViewServer
+
+    name = tmp_path / "case.view.json"
+    service = open_session(folder / "spectrum.csv", [str(folder / NAME)], session=name, temperature_k=KELVIN)
+    server = ViewServer(service)
+    thread = server.run_in_thread()
+    yield server, service
+    server.stop()
+    thread.join(10)
+    service.session.release()
+
+
+@pytest.fixture
+def page(browser, served):
+    """The page, ready; an error of its script fails the test."""
+    context = browser.new_context(viewport={"width": 1200, "height": 800}, accept_downloads=True)
+    opened = context.new_page()
+    wrong = []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    opened.goto(served[0].address)
+    opened.wait_for_selector(READY, timeout=30_000)
+    yield opened
+    context.close()
+    assert not wrong
+
+
+def settled(page, expression):
+    """Wait until an expression of the page is true."""
+    for _ in range(300):  # in Python: the page's policy forbids strings as scripts, which wait_for_function would use
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"not reached: {expression}; {page.inner_text('.status')}")
+
+
+def assign(page, service, upper, lower):
+    """Assign a line by dragging over its peak with Shift; the line that is nearest is marked."""
+    candidates = service.answer({"do": "pick", "species": 1, "level": upper})["ok"]["candidates"]
+    f = next(one for one in candidates if one["upper"] == upper and one["lower"] == lower)["frequency_mhz"]
+    count = len(service.session.state.lines)
+    page.evaluate(f"rotorView.show({f}, null, 6)")
+    settled(page, "!rotorView.windows[0].busy && rotorView.windows[0].lines.length > 0")
+    box = page.locator(".window").bounding_box()
+    frame = page.evaluate("(({left, top, width, height}) => [left, top, width, height])(rotorView.windows[0].box)")
+    middle = box["x"] + frame[0] + frame[2] / 2
+    height = box["y"] + frame[1] + frame[3] / 4
+    page.keyboard.down("Shift")
+    page.mouse.move(middle - 60, height)
+    page.mouse.down()
+    page.mouse.move(middle, height)
+    page.mouse.move(middle + 60, height)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    settled(page, "rotorView.offered !== null")
+    page.keyboard.press("Enter")
+    settled(page, f"Object.keys(rotorView.lines).length === {count + 1}")
+
+
+def test_open_zoom_assign_refit_undo_export(page, served, tmp_path):
+    service = served[1]
+    first = page.evaluate("[rotorView.active.first, rotorView.active.last]")
+    box = page.locator(".window").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 3)
+    page.mouse.wheel(0, -400)
+    settled(page, f"rotorView.active.last - rotorView.active.first < {0.7 * (first[1] - first[0])}")
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 3, box["y"] + box["height"] / 3, steps=4)
+    page.mouse.up()
+    page.keyboard.press("0")
+    for upper, lower in SERIES[:4]:
+        assign(page, service, upper, lower)
+    found = {(line.upper, line.lower) for line in service.session.state.lines.values()}
+    assert found == {(tuple(upper), tuple(lower)) for upper, lower in SERIES[:4]}
+    page.keyboard.press("r")
+    settled(page, "rotorView.species[1].fit !== null && rotorView.species[1].fit !== undefined")
+    record = service.session.state.species[1]
+    for name in "BC":
+        assert abs(record.constants[name] - TRUE[name]) < 6 * record.errors[name]
+    page.keyboard.press("u")
+    settled(page, "rotorView.species[1].fit == null")
+    page.keyboard.press("u")
+    settled(page, "Object.keys(rotorView.lines).length === 3")
+    page.keyboard.press("y")
+    page.keyboard.press("y")
+    settled(page, "rotorView.species[1].fit != null && Object.keys(rotorView.lines).length === 4")
+    with page.expect_download() as waiting:
+        page.select_option("select[aria-label=Export]", "lin")
+    text = Path(waiting.value.path()).read_text()
+    assert len(text.strip().split("\n")) == 4
+    with page.expect_download() as waiting:
+        page.select_option("select[aria-label=Export]", "png")
+    assert Path(waiting.value.path()).read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.slow
+def test_everything_by_keyboard(page, served):
+    service = served[1]
+    page.evaluate("rotorView.show(16027, null, 20)")
+    settled(page, "!rotorView.windows[0].busy")
+    page.keyboard.press("n")
+    page.keyboard.press("f")
+    settled(page, "rotorView.offered !== null && rotorView.offered.peak !== null")
+    page.keyboard.press("Enter")
+    settled(page, "Object.keys(rotorView.lines).length === 1")
+    assert [line.upper for line in service.session.state.lines.values()] == [(3, 0, 3)]
+    page.keyboard.press("]")
+    page.keyboard.press("[")
+    page.keyboard.press("x")
+    settled(page, "rotorView.lines[1]?.rejected === true")
+    page.keyboard.press("Delete")
+    settled(page, "Object.keys(rotorView.lines).length === 0")
+    page.keyboard.press("Control+z")
+    settled(page, "Object.keys(rotorView.lines).length === 1")
+    for key, name in zip("12345", ("Assign", "Lines", "Constants", "Series", "Levels"), strict=True):
+        page.keyboard.press(key)
+        assert page.get_attribute(f"#tab-{name}", "aria-selected") == "true"
+    page.keyboard.press("w")
+    settled(page, "rotorView.windows.length === 2")
+    page.keyboard.press("w")
+    page.keyboard.press("m")
+    settled(page, "rotorView.settings.overlaid === true")
+    page.keyboard.press("t")
+    assert page.get_attribute("body", "data-theme") == "dark"
+    page.keyboard.press("?")
+    assert page.locator("dialog[open]").count() == 1
+    page.keyboard.press("Escape")
+    reached = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.add(
+            page.evaluate("document.activeElement.textContent.slice(0, 12) || document.activeElement.ariaLabel || ''")
+        )
+    assert {"Refit", "Undo", "Lines", "Windows", "Keys"} <= reached
+
+
+@pytest.mark.slow
+def test_loomis_wood_rows_and_sliders(page, served):
+    service = served[1]
+    page.keyboard.press("4")
+    page.fill('[data-field="series.upper"]', "3 0 3")
+    page.fill('[data-field="series.lower"]', "2 0 2")
+    page.click("text=Show rows >> nth=0")
+    settled(page, "rotorView.wood.rows.length === 2 && rotorView.pane === 'wood'")
+    page.click("text=Assign all rows")
+    settled(page, "Object.keys(rotorView.lines).length === 2")
+    page.keyboard.press("l")  # residuals: a click on one shows its line
+    settled(page, "rotorView.pane === 'residuals' && rotorView.residuals.rows.length === 2")
+    at = page.evaluate(
+        """() => {
+        const r = rotorView.residuals, { x_range: X, y_range: Y } = r.figure, { left, top, width, height } = r.box;
+        const place = r.place.getBoundingClientRect(), p = r.rows[1];
+        const across = (p.x - X.start) / (X.end - X.start), down = (Y.end - p.y) / (Y.end - Y.start);
+        return [place.left + left + width * across, place.top + top + height * down, p.number]; }"""
+    )
+    page.mouse.click(at[0], at[1])
+    settled(page, f"rotorView.line === {at[2]} && rotorView.tab === 'Lines'")
+    page.keyboard.press("3")
+    before = service.session.state
+    page.evaluate(
+        """() => { const s = document.querySelector('[data-field="1.B.s"]'); s.value = 0.5; s.dispatchEvent(new Event('input')); }"""
+    )
+    settled(page, "rotorView.preview !== null && !rotorView.windows[0].busy")
+    assert service.session.state == before  # the prediction moves, the session does not
+    page.evaluate("""() => document.querySelector('[data-field="1.B.s"]').dispatchEvent(new Event('change'))""")
+    settled(page, f"Math.abs(rotorView.species[1].constants.B - {1.0005 * before.species[1].constants['B']}) < 0.01")
+
+
+def test_a_second_page_follows(page, served, browser):
+    other = browser.new_context().new_page()
+    other.goto(served[0].address)
+    other.wait_for_selector(READY, timeout=30_000)
+    page.evaluate("rotorView.do({do: 'species', species: 1, scale: 2})")
+    settled(other, "rotorView.species[1].scale === 2")
+    assert other.evaluate("JSON.stringify(rotorView.session)") == page.evaluate("JSON.stringify(rotorView.session)")
+    other.context.close()
+
+
+def test_an_exported_page_opens_without_server_and_network(served, browser, tmp_path):
+    from rotor.viewer.export_page import export_page
+
+    service = served[1]
+    f = 16030.188
+    target = [{"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2]}]
+    service.answer({"do": "assign", "frequency_mhz": f, "error_mhz": 0.002, "to": target})
+    (tmp_path / "page.html").write_text(export_page(service), encoding="utf-8")
+    context = browser.new_context(offline=True)
+    opened = context.new_page()
+    wrong, asked = [], []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.goto((tmp_path / "page.html").as_uri())
+    opened.wait_for_selector(READY, timeout=30_000)
+    opened.evaluate(f"rotorView.show({f}, null, 3)")
+    settled(opened, "rotorView.windows[0].trace.data.x.length > 100")
+    high = opened.evaluate("Math.max(...rotorView.windows[0].trace.data.y)")
+    assert high == pytest.approx(service.spectrum.intensity.max(), rel=1e-3)
+    assert opened.evaluate("Object.keys(rotorView.lines).length") == 1
+    opened.keyboard.press("u")
+    settled(opened, "document.querySelector('.status').textContent.includes('shows what was saved')")
+    assert not wrong
+    assert all(address.startswith(("file:", "data:", "blob:")) for address in asked)
+    context.close()
+
+
+@pytest.mark.slow
+def test_the_widget_of_a_notebook_is_the_same_page(served, browser, tmp_path):
+    """The module that anywidget loads, with a model that carries messages as the channel of a notebook does."""
+    from rotor.viewer.widget import widget_class
+
+    service = served[1]
+    widget = widget_class()(service, 500)
+    (tmp_path / "widget.mjs").write_text(str(widget._esm), encoding="utf-8")
+    (tmp_path / "widget.html").write_text(
+        f"<!doctype html><style>{widget._css}</style><div id=cell style='width:1000px'></div>"
+    )
+    context = browser.new_context(viewport={"width": 1050, "height": 700})
+    opened = context.new_page()
+    wrong = []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.expose_function("toPython", lambda content: said(widget, content))
+    opened.goto((tmp_path / "widget.html").as_uri())
+    opened.evaluate(
+        """async (text) => {
+        const module = await import(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+        const listeners = [];
+        const model = { get: () => 500, on: (name, call) => listeners.push(call),
+          send: (content) => toPython(content).then((answers) => answers.forEach((one) => listeners.forEach((call) => call(one)))) };
+        await module.default.render({ model, el: document.querySelector("#cell") });
+        }""",
+        (tmp_path / "widget.mjs").read_text(encoding="utf-8"),
+    )
+    opened.wait_for_selector(READY, timeout=30_000)
+    opened.click("#tab-Constants")
+    assert opened.locator("details.species").count() == 1
+    opened.click("details.species >> text=Remove")
+    for _ in range(100):
+        if not service.session.state.species:
+            break
+        opened.wait_for_timeout(50)
+    assert service.session.state.species == {}
+    opened.click("text=Undo")
+    for _ in range(100):
+        if opened.locator("details.species").count() == 1:
+            break
+        opened.wait_for_timeout(50)
+    assert opened.locator("details.species").count() == 1
+    assert not wrong
+    context.close()
+
+
+def said(widget, content):
+    """What the widget sends back for a message, in order."""
+    sent = []
+    widget.send = sent.append
+    widget._received(widget, content, None)
+    return sent
+
+
+def luminance(rgb):
+    """Relative luminance of WCAG 2.2."""
+    parts = [value / 255 / 12.92 if value / 255 <= 0.04045 else ((value / 255 + 0.055) / 1.055) ** 2.4 for value in rgb]
+    return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_text_and_species_have_contrast(page, theme):
+    if page.get_attribute("body", "data-theme") != theme:
+        page.keyboard.press("t")
+    colours = page.evaluate(
+        """(theme) => { const style = getComputedStyle(document.body), out = {};
+        for (const name of ['ink', 'quiet', 'wrong', 'accent', 'on-accent']) out[name] = style.getPropertyValue('--' + name).trim();
+        return [out, ['paper', 'raised'].map((name) => style.getPropertyValue('--' + name).trim())]; }""",
+        theme,
+    )
+    module = (PROJECT / "rotor" / "viewer" / "page.js").read_text()
+    line = next(one for one in module.split("\n") if one.strip().startswith(f"{theme}: ["))
+    species = [word.strip('" ') for word in line.split("[")[1].split("]")[0].split(",")]
+
+    def ratio(one, other):
+        a, b = sorted((luminance([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in (one, other)), reverse=True)
+        return (a + 0.05) / (b + 0.05)
+
+    text, papers = colours
+    for paper in papers:
+        for name in ("ink", "quiet", "wrong"):
+            assert ratio(text[name], paper) >= 4.5, (name, paper)
+        for colour in species:
+            assert ratio(colour, papers[0]) >= 4.5, colour
+    assert ratio(text["accent"], text["on-accent"]) >= 4.5
+
+
+@pytest.mark.slow
+def test_small_and_dark_the_page_has_no_sideways_scroll(browser, served):
+    context = browser.new_context(viewport={"width": 420, "height": 800}, color_scheme="dark")
+    opened = context.new_page()
+    opened.goto(served[0].address)
+    opened.wait_for_selector(READY, timeout=30_000)
+    for key in "12345":
+        opened.keyboard.press(key)
+        assert opened.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), key
+    assert opened.get_attribute("body", "data-theme") == "dark"
+    context.close()
