@@ -7,7 +7,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
 PAGE = (TESTS.parent / "docs" / "hard_cases.md").read_text(encoding="utf-8")
-NAMED = re.findall(r"`((?:hard/)?test_\w+\.py)::(test_\w+)`", PAGE)
+NAMED = re.findall(r"`((?:\w+/)*test_\w+\.py)::(test_\w+)`", PAGE)
 
 
 def test_every_case_has_its_row():
