@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +39,7 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "rotor",  # the same picture is the same file
     "pdf.fonttype": 42,
 }
+_USERS: ContextVar[dict[Any, Any] | None] = ContextVar("settings of the user's style", default=None)
 SIZE_INCHES = (7.2, 3.8)
 DPI = 200
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -52,20 +55,73 @@ def checked_suffix(path: str | os.PathLike[str]) -> str:
 
 
 def new_figure(size: tuple[float, float] = SIZE_INCHES) -> Any:
-    """An empty matplotlib figure with a canvas of its own, in inches; draw on it inside `styled()`."""
+    """An empty matplotlib figure with a canvas of its own, in inches; draw on it inside `styled()`.
+
+    A style of the user may set the size and the resolution (figure.figsize, figure.dpi).
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    users = _USERS.get() or {}
+    figure = Figure(figsize=users.get("figure.figsize", size), dpi=users.get("figure.dpi", DPI), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def styled() -> Any:
-    """A context in which matplotlib has the style of the package."""
+    """A context in which matplotlib has the style of the package, and over it that of the user."""
     import matplotlib as mpl
 
-    return mpl.rc_context(STYLE)
+    return mpl.rc_context({**STYLE, **(_USERS.get() or {})})
+
+
+def style_settings(style: str | os.PathLike[str]) -> dict[Any, Any]:
+    """The settings of a matplotlib style by its name, or of an .mplstyle file; ValueError for another name or a faulty file.
+
+    >>> style_settings("ggplot")["axes.facecolor"]
+    '#E5E5E5'
+    """
+    from matplotlib import style as styles
+
+    name = os.fspath(style)
+    if name in styles.library:
+        return dict(styles.library[name])
+    if not name.endswith(".mplstyle") or not Path(name).is_file():
+        known = ", ".join(name for name in styles.available if not name.startswith(("_", "seaborn")))
+        raise ValueError(f"style {name!r}: expected an .mplstyle file, or a style of matplotlib, such as {known}")
+    return _read_style(name)
+
+
+def _read_style(path: str) -> dict[Any, Any]:
+    """The settings of an .mplstyle file; matplotlib writes what is wrong with it to its log alone."""
+    import logging
+
+    import matplotlib as mpl
+
+    faults: list[str] = []
+    listener = logging.Handler(logging.WARNING)
+    listener.emit = lambda record: faults.append(record.getMessage())  # type: ignore[method-assign]
+    log = logging.getLogger("matplotlib")
+    log.addHandler(listener)
+    try:
+        settings: dict[Any, Any] = dict(mpl.rc_params_from_file(path, use_default_template=False))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(f"style {path}: {error}") from None
+    finally:
+        log.removeHandler(listener)
+    if faults:
+        raise ValueError(f"style {path}: {' '.join(faults[0].split(chr(10), 2)[:2]).strip()}")
+    return settings
+
+
+@contextmanager
+def users_style(style: str | os.PathLike[str] | None) -> Iterator[None]:
+    """Inside, pictures have a style of the user over that of the package: a name of matplotlib or an .mplstyle file; None for none."""
+    token = _USERS.set(None if style is None else style_settings(style))
+    try:
+        yield
+    finally:
+        _USERS.reset(token)
 
 
 def use_style() -> None:
@@ -148,7 +204,7 @@ def save_described(figure: Any, path: str | os.PathLike[str], title: str, descri
     else:
         metadata = {"Creator": program, "Title": plain, "Description": description, "Date": None}
     with styled():
-        figure.savefig(path, dpi=DPI, metadata=metadata)
+        figure.savefig(path, dpi=figure.dpi, metadata=metadata)
 
 
 def joined(*facts: Mapping[str, Any] | None) -> str:

@@ -17,7 +17,7 @@ from rotor.classical.tumble import PERIODS, TumbleAnswer
 from rotor.fluids.request import FluidAnswer
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import save
+from rotor.plots.picture import save, users_style
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer
@@ -48,7 +48,14 @@ ONE_PANEL = (
 )
 
 
-def plot(thing: Any, path: str | os.PathLike[str] | None = None, *, ax: Any = None, **options: Any) -> Any:
+def plot(
+    thing: Any,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    ax: Any = None,
+    style: str | os.PathLike[str] | None = None,
+    **options: Any,
+) -> Any:
     """A matplotlib figure of lines, spectra, levels, motions, thermodynamic functions and gases, or of an answer with them.
 
     Parameters
@@ -59,6 +66,9 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, *, ax: Any = No
         A .png, .pdf or .svg file to write.
     ax : matplotlib.axes.Axes, optional
         Axes of yours to draw on, for lines, spectra, Raman lines, levels, emission and catalogues; other pictures have several panels.
+    style : str or path, optional
+        A style of matplotlib ("ggplot") or an .mplstyle file over the style of the package: letters, lines, grid, size, background.
+        Colours that have a meaning stay.
     options :
         Of the picture: those of `spectrum_figure`, `raman_figure`, `levels_figure`, `polhode_figure`, ...
 
@@ -87,9 +97,10 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, *, ax: Any = No
                 f"ax: the picture of a {type(thing).__name__} is a figure of its own; axes are taken for {known}"
             )
         options["axes"] = ax
-    figure = _figure(thing, **options)
-    if path is not None:
-        save(figure, path, type(thing).__name__, {})
+    with users_style(style):
+        figure = _figure(thing, **options)
+        if path is not None:
+            save(figure, path, type(thing).__name__, {})
     return figure
 
 

@@ -50,7 +50,7 @@ def parameters_of(verb: Verb) -> list[Parameter]:
         parameters.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     if verb.has_scenes:
         parameters.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
-    if any(output.name == "plot" for output in verb.outputs) and verb.drawn is not None:
+    if any(output.name == "plot" for output in verb.outputs):
         parameters += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
     if verb.workers:
         parameters.append(
@@ -60,6 +60,8 @@ def parameters_of(verb: Verb) -> list[Parameter]:
 
 
 def _left_out(verb: Verb) -> set[str]:
+    if verb.drawn is None:
+        return {words[0] for words in _PICTURE} - {"style"}
     return ({"plot_unit"} if not verb.spectral else set()) | (set() if verb.scaled else {"plot_scale"})
 
 
@@ -69,6 +71,7 @@ _PICTURE = (
     ("plot_range", "--plot-range", "Range of the horizontal axis, in its unit", "A:B"),
     ("plot_vertical", "--plot-vertical", "Range of the vertical axis, in its unit", "A:B"),
     ("plot_scale", "--plot-scale", "Vertical axis: linear or log", "NAME"),
+    ("style", "--style", "Style of the picture: a name of matplotlib's, or an .mplstyle file", "STYLE"),
 )
 
 

@@ -1,8 +1,9 @@
-"""Options of the picture of --plot: title, unit, range and scale of its axes."""
+"""Options of the picture of --plot: title, unit, range and scale of its axes, style."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_one_of
@@ -16,8 +17,7 @@ UNITS = ("MHz", "GHz", "THz", "cm-1")
 PLOT_NAMES = ("plot_unit", "plot_title", "plot_range", "plot_vertical", "plot_scale")
 
 
-def _refuse_without_plot(texts: Mapping[str, Any], drawn: bool) -> None:
-    named = [name for name, text in texts.items() if text is not None]
+def _refuse_without_plot(named: Sequence[str], drawn: bool) -> None:
     if named and not drawn:
         raise ValueError(f"--{named[0].replace('_', '-')}: expected with --plot, the file of the picture")
 
@@ -33,8 +33,8 @@ def _limits(name: str, text: str, unit: str) -> Limits:
 
 def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
     """The view of a verb's picture from what was typed; drawn: whether there is a picture. Settings by name of a spectrum."""
-    texts = {name: text for name, text in typed.items() if name in PLOT_NAMES}
-    _refuse_without_plot(texts, drawn)
+    texts = {name: text for name, text in typed.items() if name in PLOT_NAMES and text is not None}
+    _refuse_without_plot([name for name in (*texts, "style") if name in typed], drawn)
     unit, range_ = ("MHz", "range_mhz") if verb.spectral else (verb.drawn or "", "horizontal")
     readers: dict[str, tuple[str, Callable[[str], Any]]] = {
         "plot_unit": ("unit", lambda text: require_one_of("--plot-unit", text, UNITS)),
@@ -45,3 +45,17 @@ def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
     }
     settings = {readers[name][0]: readers[name][1](text) for name, text in texts.items()}
     return settings if verb.spectral else View(**settings)
+
+
+@contextmanager
+def picture_style(typed: Mapping[str, Any]) -> Iterator[None]:
+    """Inside, pictures have the style that --style names; ValueError where there is none of that name. Without it, no matplotlib."""
+    with ExitStack() as stack:
+        if "style" in typed:
+            from rotor.plots.picture import users_style
+
+            try:
+                stack.enter_context(users_style(typed["style"]))
+            except ValueError as error:
+                raise ValueError(f"--{error}") from None
+        yield

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
 from rotor.cli.shared.output import Files, answering, at_end, deliver, note
-from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings
+from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
 from rotor.reports.progress import elapsed_time
 from rotor.requests.fill import Given, renaming
 from rotor.verbs.molecule import is_file
@@ -49,7 +49,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         process.leave_compiler_out()
     process.begin_work()
     head = {"command": str(context.obj), "input": subject.text}
-    with working(verb, there.get("workers", 1)) as executor:
+    with picture_style(there), working(verb, there.get("workers", 1)) as executor:
         with answering() if verb.sound else naming(verb):
             work = Work(executor, shown, outputs, note, True, head, view, at_end)
             with nullcontext() if verb.stepwise else elapsed_time("computing"):
@@ -85,7 +85,7 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 def places_of(verb: Verb) -> set[str]:
     """The options that say where results go, not what is computed: files, pictures, processes."""
     files = {each.name for each in verb.outputs} | {each.option for each in verb.extras if each.files is not None}
-    return files | {"json", "save_scene", "workers", *PLOT_NAMES}
+    return files | {"json", "save_scene", "workers", "style", *PLOT_NAMES}
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
