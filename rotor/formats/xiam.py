@@ -7,6 +7,13 @@ XIAM has z, x, y = a, b, c and gigahertz (H. Hartwig and H. Dreizler, Z. Naturfo
 F0, delta and epsil (radians) of a top; mu_x, mu_y, mu_z in debye. Watson's reduction is A where `reduc` is 0 and S where it is 1. A
 constant with an index in brackets belongs to one set of constants B; the first is read, and those of one top of two end in _1 and _2.
 Lines that begin with a backslash print what XIAM derives; of these delta is read, F, rho and beta follow here anew.
+
+Quadrupole coupling in the manual's elements, with one factor e1,
+
+    chi_zz (3K² - J(J+1)),    chi_- ½ √... (K to K+2),    chi_xz (1 + 2K) √... (K to K+1),
+
+is e1 [chi_zz (3Pz² - P²) + chi_- (Px² - Py²) + 2 chi_xz {Px Pz} ...]: chi_aa = chi_zz, chi_bb - chi_cc = chi_-, chi_ab = chi_xz,
+chi_ac = chi_yz, chi_bc = chi_xy. `spin` is 2I; the nucleus has no name in the file and is called I1, that of `spin2` is not read.
 """
 
 from __future__ import annotations
@@ -23,6 +30,7 @@ import numpy as np
 from rotor.formats.packed import load
 from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 MHZ_PER_GHZ = 1e3
@@ -35,11 +43,16 @@ ROTATION = ("BJ", "BK", "B-")
 DIPOLE = ("mu_z", "mu_x", "mu_y")  # along a, b, c
 OF_TOP = {"F0": "F0", "delta": "delta", "epsil": "epsilon", "V1n": "V3", "V2n": "V6"}
 DERIVED = ("F", "rho", "beta", "gamma")
-QUADRUPOLE = ("chi_zz", "chi_-", "chi_xy", "chi_xz", "chi_yz")
+SPIN = "I1"  # the file does not name its nucleus
+QUADRUPOLE = {
+    "chi_zz": "chi_aa", "chi_z": "chi_aa", "chi_-": "chi_bb-cc", "chi-": "chi_bb-cc", "chi_xz": "chi_ab", "chi_yz": "chi_ac",
+    "chi_xy": "chi_bc",
+}  # fmt: skip
+SPIN_ROTATION = ("C+", "C_z", "C-")
 _CONSTANT = re.compile(
-    r"\s*\\?(?P<name>[A-Za-z][\w\-]*)(?:\((?P<set>\d+)\))?\s+(?P<value>[-+]?[\d.]+(?:[EDed][-+]?\d+)?)(?=\s|$)"
+    r"\s*\\?(?P<name>[A-Za-z][\w\-+]*)(?:\((?P<set>\d+)\))?\s+(?P<value>[-+]?[\d.]+(?:[EDed][-+]?\d+)?)(?=\s|$)"
 )
-_SETTING = {"reduc": "reduc", "reduct": "reduc", "ntop": "ntop", "nfold": "nfold"}
+_SETTING = {"reduc": "reduc", "reduct": "reduc", "ntop": "ntop", "nfold": "nfold", "spin": "spin", "spin2": "spin2"}
 
 
 def read_xiam(path: str | os.PathLike[str]) -> Top:
@@ -53,7 +66,7 @@ def read_xiam(path: str | os.PathLike[str]) -> Top:
     Returns
     -------
     Top
-        With constants of internal rotation in the frame PAM, and a note of quadrupole constants, which are not read.
+        With constants of internal rotation in the frame PAM, and of one nucleus called I1.
 
     Raises
     ------
@@ -74,7 +87,7 @@ def _content(text: str) -> tuple[dict[str, int], dict[str, float]]:
     values: dict[str, float] = {}
     if "Using Watson S Reduction" in text:
         settings["reduc"] = 1
-    known = {*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE}
+    known = {*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE, *SPIN_ROTATION}
     for line in text.split("-- B ")[0].splitlines():
         words = line.split()
         for name, number in pairwise(words):
@@ -104,7 +117,10 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
         if value and re.sub(r"_[12]$", "", key) not in (*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE)
     ]  # fmt: skip
     if strange:
-        raise ValueError(f"{', '.join(strange)}: such terms are not computed here; leave them out and fit anew")
+        squares = "; XIAM multiplies Dpi2 by ⟨p - ρ·P⟩², which no term here does" if "Dpi2" in "".join(strange) else ""
+        raise ValueError(
+            f"{', '.join(strange)}: such terms are not computed here; leave them out and fit anew{squares}"
+        )
     bj, bk, minus = (values[key] * MHZ_PER_GHZ for key in ROTATION)
     numbers: dict[str, Any] = {"A": bj + bk, "B": bj + minus, "C": bj - minus}
     numbers |= {
@@ -117,12 +133,28 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
         _one_top(values) if tops == 1 else _two_tops(values), "PAM", vt_max=0, source="file of XIAM"
     )
     dipole = tuple(values.get(key, 0.0) for key in DIPOLE)
-    top = Top.from_constants(constants, dipole_abc_debye=dipole, internal_rotation=internal)
-    notes = tuple(
-        f"{name}: quadrupole constants of XIAM are not read, its file does not name the nucleus: give --spin-constants"
-        for _ in range(any(values.get(key) for key in QUADRUPOLE))
+    top = Top.from_constants(
+        constants, dipole_abc_debye=dipole, internal_rotation=internal, spin_constants=_spin(settings, values)
     )
-    return replace(top, name=name, notes=(*top.notes, *notes))
+    return replace(top, name=name)
+
+
+def _spin(settings: dict[str, int], values: dict[str, float]) -> SpinConstants | None:
+    """Quadrupole coupling of the nucleus, MHz; None without a spin or constants."""
+    coupling = {ours: values[theirs] * MHZ_PER_GHZ for theirs, ours in QUADRUPOLE.items() if values.get(theirs)}
+    if settings.get("spin2"):
+        raise ValueError(
+            f"spin2 {settings['spin2']}: read is one nucleus; leave the second out and give --spin-constants"
+        )
+    if coupling and settings.get("spin", 0) < 2:
+        raise ValueError(
+            f"{', '.join(coupling)} beside spin {settings.get('spin', 0)}: expected spin 2 (twice I) or more"
+        )
+    if not coupling:
+        return None
+    return SpinConstants(
+        {f"{key}({SPIN})": value for key, value in coupling.items()}, {SPIN: settings["spin"]}, "file of XIAM"
+    )
 
 
 def _one_top(values: dict[str, float]) -> dict[str, float]:

@@ -4,8 +4,11 @@ import gzip
 
 import numpy as np
 import pytest
+from places import ORACLES
 
 import rotor
+from rotor.fitting.top_constants import TopConstants
+from rotor.fitting.top_levels import model_of
 
 # constants of kncrabtree/blackchirp @71a1a6e, tests/testdata/test_aprint32_small.xi (MTBE), its layout
 INPUT = """mtbe
@@ -83,7 +86,10 @@ def test_two_tops(tmp_path):
         ("reduc 1", "reduc 2", "reduc 2"),
         ("ntop 1", "ntop 3", "3 tops"),
         ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the plane"),
-        ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J"),
+        ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J.*which no term here does"),
+        ("\\F(1) ", " chi_z 1E-3\n\\F(1) ", "chi_aa beside spin 0: expected spin 2"),
+        ("reduc 1", "reduc 1\nspin 2\nspin2 2", "spin2 2: read is one nucleus"),
+        ("\\F(1) ", " C+ 1E-6\n\\F(1) ", r"C\+: such terms"),
     ],
 )
 def test_what_is_not_read_is_named_with_the_file(mtbe, old, new, text):
@@ -91,6 +97,54 @@ def test_what_is_not_read_is_named_with_the_file(mtbe, old, new, text):
     with pytest.raises(ValueError, match=text) as error:
         rotor.read(mtbe)
     assert "mtbe.xi" in str(error.value)
+
+
+IODOTOLUENE = """2-Iodotoluene, its layout as in SvenHerbers/XIAM-2NQ_Examples @2036b69, without Dpi2J
+
+ntop    1
+reduc   1
+spin    5
+
+ BJ            0.660902142
+ BK            2.072056049
+ B-            0.077507617
+ DJ           15.897561E-9
+ DJK           0.145458E-6
+ DK            0.269793E-6
+ dj           -3.710560E-9
+ dk           -0.887974E-9
+ chi_z        -1.864606686
+ chi_-         0.133941184
+ chi_xz       -0.027292289
+ V1n          15889.173406
+ F0          160.0
+ delta         1.195063954
+"""
+
+
+def test_quadrupole_constants_give_the_components_that_xiam_calculates(tmp_path):
+    """127I, 1.9 GHz: components about the centre of their line, within 0.3 kHz of a spread of 10 to 140 MHz."""
+    path = tmp_path / "iodotoluene.xi"
+    path.write_text(IODOTOLUENE)
+    top = rotor.read(path)
+    assert top.spin_constants.values == pytest.approx(
+        {"chi_aa(I1)": -1864.606686, "chi_bb-cc(I1)": 133.941184, "chi_ab(I1)": -27.292289}
+    )
+    constants, rows = TopConstants(top, hyperfine=True), np.loadtxt(ORACLES / "iodotoluene.txt")
+    labels = []
+    for side in (0, 1):
+        n, ka, kc, f, species = rows[:, [3 * side, 3 * side + 1, 3 * side + 2, 6 + side, 8]].astype(int).T
+        columns = {"n": n, "ka": ka, "kc": kc, "species": species, "vt": 0 * n, "f": f}
+        labels.append(np.column_stack([columns[name] for name in constants.quanta]))
+    energies = model_of(constants, np.vstack(labels)).levels(np.array(list(constants.values.values())))[0]
+    difference = energies[: len(rows)] - energies[len(rows) :] - rows[:, 9]
+    _, line = np.unique(rows[:, [0, 1, 2, 3, 4, 5, 8]], axis=0, return_inverse=True)
+    counts = np.bincount(line.ravel())
+    centred = difference - (np.bincount(line.ravel(), difference) / counts)[line.ravel()]
+    assert (counts > 1).sum() >= 10
+    assert np.median(np.abs(centred)) * 1e3 < 0.05
+    assert np.abs(centred).max() * 1e3 < 0.3  # of F = 13/2, which is near another level
+    assert np.abs(difference).max() * 1e3 < 16  # its single torsional state and Dpi2J are not in ours
 
 
 @pytest.mark.oracle
