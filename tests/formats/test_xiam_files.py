@@ -144,7 +144,7 @@ def test_quadrupole_constants_give_the_components_that_xiam_calculates(tmp_path)
     assert (counts > 1).sum() >= 10
     assert np.median(np.abs(centred)) * 1e3 < 0.05
     assert np.abs(centred).max() * 1e3 < 0.3  # of F = 13/2, which is near another level
-    assert np.abs(difference).max() * 1e3 < 16  # its single torsional state and Dpi2J are not in ours
+    assert np.abs(difference).max() * 1e3 < 17  # its single torsional state and Dpi2J are not in ours
 
 
 @pytest.mark.oracle
