@@ -6,7 +6,7 @@ An action has no side effects; `rotor.viewer.service` carries it out as one step
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,8 @@ import numpy as np
 from rotor.assignment.peaks import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.table import counted
-from rotor.viewer.fits import lines_from, refitted
+from rotor.viewer.fits import lines_from
+from rotor.viewer.joint_fits import refits
 from rotor.viewer.loomis_wood import centres_of
 from rotor.viewer.peak_fit import Peak, fit_peak
 from rotor.viewer.prediction import MOST_J, Predictions, changed, species_of_source, with_hyperfine
@@ -115,7 +116,7 @@ def assign(state: State, message: Message, context: Context) -> tuple[str, dict[
             lower=lower,
             frequency_mhz=frequency,
             error_mhz=error,
-            blend=blend + _places(targets, number),
+            blend=blend,
             weight=number_of(target, "weight", above=0, default=1.0),
             width_mhz=width,
             comment=str(message.get("comment", ""))[:200],
@@ -125,12 +126,6 @@ def assign(state: State, message: Message, context: Context) -> tuple[str, dict[
         changes[line_key(first + place)] = line
         texts.append(" ".join(map(str, upper)))
     return f"assign {frequency:.4f} MHz ({', '.join(texts)})", changes
-
-
-def _places(targets: Sequence[Message], species: int) -> int:
-    """Which blend among the targets is that of a species: lines of different species are fitted apart."""
-    order = list(dict.fromkeys(target.get("species") for target in targets))
-    return order.index(species)
 
 
 def _refuse_label(model: Any, upper: tuple[int, ...], lower: tuple[int, ...]) -> None:
@@ -369,10 +364,19 @@ def remove_species(state: State, message: Message, context: Context) -> tuple[st
 
 
 def refit(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:
-    """The constants of a species fitted to its lines."""
-    number, record = species_of(state, message)
-    made = refitted(context.predictions.model(record), state.lines_of(number))
-    return f"refit {record.name}", {species_key(number): made}
+    """The constants of a species fitted to its lines, or of all that have lines; species that share a blend are fitted together."""
+    if "species" in message:
+        numbers = {species_of(state, message)[0]}
+    else:
+        numbers = {line.species for line in state.lines.values()}
+    if not numbers:
+        raise ValueError("refit: no line is assigned; assign lines first")
+    records, failures = refits(state, numbers, context.predictions.model)
+    if not records:
+        raise ValueError("; ".join(failures))
+    context.notes.extend(f"not refitted: {text}" for text in failures)
+    names = ", ".join(record.name for record in records.values())
+    return f"refit {names}", {species_key(number): record for number, record in records.items()}
 
 
 def series(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:

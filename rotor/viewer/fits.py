@@ -1,4 +1,4 @@
-"""Assigned lines of a session as the fit takes them, the fit, and what the page shows of it: residuals, levels, combination differences."""
+"""Assigned lines of a session as the fit takes them, the fit, and what the page shows of it: levels, combination differences."""
 
 from __future__ import annotations
 
@@ -104,31 +104,6 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
     )
     errors = {name: error for name, error in fitted.uncertainties.items() if math.isfinite(error)}
     return msgspec.structs.replace(record, constants=dict(fitted.values), errors=errors, fit=summary)
-
-
-def residuals_of(model: Model, lines: Mapping[int, Line]) -> dict[int, dict[str, Any]]:
-    """For each line its label, what is calculated (MHz; of a blend the mean), and observed minus calculated."""
-    if not lines:
-        return {}
-    assigned = assignments_of(model, lines)
-    calculated = model.calculated_mhz(assigned.upper, assigned.lower)
-    totals = np.bincount(assigned.blend, weights=np.maximum(assigned.weight, 0.0))
-    counts = np.bincount(assigned.blend)
-    share = np.where(
-        totals[assigned.blend] > 0,
-        assigned.weight / np.where(totals[assigned.blend] > 0, totals[assigned.blend], 1.0),
-        1.0 / counts[assigned.blend],
-    )
-    mean = np.bincount(assigned.blend, weights=np.nan_to_num(calculated * share, nan=np.inf))[assigned.blend]
-    out = {}
-    for i, number in enumerate(lines):
-        there = math.isfinite(mean[i])
-        out[number] = {
-            "label": assigned.text(i),
-            "calculated_mhz": float(mean[i]) if there else None,
-            "difference_mhz": float(assigned.frequency_mhz[i] - mean[i]) if there else None,
-        }
-    return out
 
 
 def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str, Any]:

@@ -751,14 +751,12 @@ export class App {
   reject() { const lines = this.numbers(); if (lines.length) this.do({ do: "reject", lines, rejected: !this.lines[lines[0]].rejected });
     else this.say("Select a line first", true); }
   remove() { const lines = this.numbers(); if (lines.length) this.do({ do: "remove", lines }); else this.say("Select a line first", true); }
-  async refit() {
-    const numbers = Object.keys(this.species).filter((number) => Object.values(this.lines).some((line) => line.species === Number(number)));
-    if (!numbers.length) this.say("Assign lines first", true);
-    for (const number of numbers) {
-      const answer = await this.do({ do: "refit", species: Number(number) });
-      if (answer) { await frame(); const fit = this.species[number]?.fit;
-        if (fit) this.say(`${this.species[number].name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`); }
-    }
+  async refit() { // every species that has lines, as one step
+    const answer = await this.do({ do: "refit" });
+    if (!answer) return;
+    await frame();
+    const fitted = Object.values(this.species).filter((one) => one.fit);
+    this.say(fitted.map(({ name, fit }) => `${name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`).join("; "));
   }
   async export(what) {
     if (!what) return;

@@ -29,9 +29,10 @@ from rotor.viewer.actions import (
     species_of,
 )
 from rotor.viewer.exports import exported
-from rotor.viewer.fits import levels_of, refitted, residuals_of
+from rotor.viewer.fits import levels_of
+from rotor.viewer.joint_fits import lines_alone, refits, residuals_of, shared_blends
 from rotor.viewer.loomis_wood import centres_of, rows_of, rows_of_labels
-from rotor.viewer.prediction import Predicted, Predictions, changed
+from rotor.viewer.prediction import Model, Predicted, Predictions, changed
 from rotor.viewer.pyramid import pyramid
 from rotor.viewer.records import Line, Record, Species, species_key
 from rotor.viewer.session import Session, facts
@@ -123,15 +124,9 @@ class Service:
                     touched.add(revision.species)
             if key.startswith("species/"):
                 touched.add(int(key.partition("/")[2]))
-        made: dict[str, Record | None] = {}
-        for number in sorted(touched & after.species.keys()):
-            try:
-                made[species_key(number)] = refitted(
-                    self.predictions.model(after.species[number]), after.lines_of(number)
-                )
-            except ValueError as error:
-                context.notes.append(f"not refitted: {error}")
-        return made
+        records, failures = refits(after, touched & after.species.keys(), self.predictions.model)
+        context.notes.extend(f"not refitted: {text}" for text in failures)
+        return {species_key(number): record for number, record in records.items()}
 
     def read_lines(self, path: str, species: int) -> list[str]:
         """Put the assigned lines of a file into the session; remarks of the reader."""
@@ -156,11 +151,12 @@ class Service:
     def _line_facts(self) -> dict[int, dict[str, Any]]:
         """Residuals of all lines, once a revision."""
         if self._residuals is None or self._residuals[0] != self.session.revision:
-            state, rows = self.session.state, dict[int, dict[str, Any]]()
-            for number, record in state.species.items():
-                rows |= residuals_of(self.predictions.model(record), state.lines_of(number))
-            self._residuals = (self.session.revision, rows)
+            self._residuals = (self.session.revision, residuals_of(self._models(), self.session.state))
         return self._residuals[1]
+
+    def _models(self) -> dict[int, Model]:
+        """The models of all species."""
+        return {number: self.predictions.model(record) for number, record in self.session.state.species.items()}
 
     def _hello(self, message: Mapping[str, Any]) -> Answer:
         y = self.spectrum.intensity
@@ -343,12 +339,16 @@ class Service:
 
     def _levels(self, message: Mapping[str, Any]) -> Answer:
         number, record = species_of(self.session.state, message)
-        predicted = self.predictions.lines(record)
-        return levels_of(predicted.model, self.session.state.lines_of(number), predicted.lines.levels)
+        predicted, shared = self.predictions.lines(record), shared_blends(self.session.state)
+        lines = {
+            n: msgspec.structs.replace(line, rejected=line.rejected or line.blend in shared)  # measures no difference
+            for n, line in self.session.state.lines_of(number).items()
+        }
+        return levels_of(predicted.model, lines, predicted.lines.levels)
 
     def _export(self, message: Mapping[str, Any]) -> Answer:
         number, record = species_of(self.session.state, message)
-        lines = self.session.state.lines_of(number)
+        lines = lines_alone(number, self._models(), self.session.state)
         name, text = exported(str(message.get("what")), self.predictions.model(record), lines)
         return {"name": name, "text": text}
 
