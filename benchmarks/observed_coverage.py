@@ -4,13 +4,17 @@ Each spectrum has 1 to 5 species of artificial lines, blended, with noise so tha
 more species that is not there is fitted with them. A parameter counts where its component is needed and its stated error is below the
 bound of `IDENTIFIABLE`. Printed: fraction of intervals that cover, and the mean deviation in standard errors, with their own errors.
 
-    python benchmarks/observed_coverage.py 1000
+    python benchmarks/observed_coverage.py 1000 coverage.jsonl
+
+The file takes one line for each spectrum, whose random numbers depend on its number alone: a run that was cut off goes on, and only what
+is missing is computed. A last argument bounds the spectra of one run.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-import time
+from pathlib import Path
 
 import numpy as np
 
@@ -65,7 +69,7 @@ def one_case(rng: np.random.Generator, noise: float = 0.05) -> dict[str, list]:
         start_components(spectrum, species, velocity_km_s=velocity + rng.normal(0, 0.3), fwhm_km_s=width * 1.2),
     )
     needed = contributions(fit)
-    out: dict[str, list] = {"wrong": [needed[-1].needed], "missed": [], "failed": [not fit.minimum.converged]}
+    out: dict[str, list] = {"wrong": [int(needed[-1].needed)], "missed": [], "failed": [int(not fit.minimum.converged)]}
     for row in fit.parameters:
         k = row["components"][0]
         if k == count:
@@ -73,30 +77,51 @@ def one_case(rng: np.random.Generator, noise: float = 0.05) -> dict[str, list]:
         exact, variable = getattr(true[k], row["parameter"]), fit.variables.items[fit.parameters.index(row)]
         error = float(fit.statistics.errors[fit.parameters.index(row)]) * fit.scale
         if row["parameter"] == "column_per_cm2":
-            out["missed"].append(not needed[k].needed)
+            out["missed"].append(int(not needed[k].needed))
         if not needed[k].needed or not row["determined"] or (variable.logarithmic and error > IDENTIFIABLE):
             continue
-        out.setdefault(row["parameter"], []).append((variable.forward(row["value"]) - variable.forward(exact)) / error)
+        pull = (variable.forward(row["value"]) - variable.forward(exact)) / error
+        out.setdefault(row["parameter"], []).append(round(float(pull), 4))
     return out
 
 
-def main(count: int, seed: int = 20) -> None:
-    rng, total, begin = np.random.default_rng(seed), {}, time.process_time()
-    for _ in range(count):
-        for key, values in one_case(rng).items():
-            total.setdefault(key, []).extend(values)
-    print(f"{count} spectra, {time.process_time() - begin:.0f} s of processor time")
+def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """Interval of 95 % of a proportion (E. B. Wilson, J. Am. Stat. Assoc. 22, 209 (1927))."""
+    p, n = successes / trials, trials
+    middle, half = p + z**2 / (2 * n), z * (p * (1 - p) / n + z**2 / (4 * n**2)) ** 0.5
+    return (middle - half) / (1 + z**2 / n), (middle + half) / (1 + z**2 / n)
+
+
+def records(count: int, path: Path, seed: int, case, most: int) -> list[dict]:  # type: ignore[no-untyped-def]
+    """One record for each case, of the file where it has them, else computed and appended."""
+    there = {one["case"]: one for one in map(json.loads, path.read_text().splitlines())} if path.exists() else {}
+    with path.open("a") as handle:
+        for number in [number for number in range(count) if number not in there][:most]:
+            there[number] = {"case": number, **case(np.random.default_rng([seed, number]))}
+            handle.write(json.dumps(there[number]) + "\n")
+            handle.flush()
+    return [one for number, one in sorted(there.items()) if number < count]
+
+
+def main(count: int, path: Path, most: int = 1 << 30, seed: int = 20) -> None:
+    total: dict[str, list] = {}
+    cases = records(count, path, seed, one_case, most)
+    for case in cases:
+        for key in case.keys() - {"case"}:
+            total.setdefault(key, []).extend(case[key])
+    print(f"{len(cases)} of {count} spectra")
     for key in ("wrong", "missed", "failed"):
         print(f"{key}: {sum(total[key])} of {len(total[key])}")
     for key in ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s"):
         pulls = np.array(total[key])
-        n = len(pulls)
+        n, inside = len(pulls), int(np.sum(np.abs(pulls) < 1))
+        low, high = wilson(inside, n)
         print(
-            f"{key:16s} {n:5d}  covered {np.mean(np.abs(pulls) < 1):.3f} ± {0.47 / n**0.5:.3f}  bias {pulls.mean():+.3f}"
+            f"{key:16s} {n:5d}  covered {inside / n:.3f} ({low:.3f} to {high:.3f})  bias {pulls.mean():+.3f}"
             f" ± {pulls.std() / n**0.5:.3f}"
             f"  median {np.median(pulls):+.3f}  beyond 4: {np.sum(np.abs(pulls) > 4)}"
         )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    main(int(sys.argv[1]), Path(sys.argv[2]), *map(int, sys.argv[3:4]))

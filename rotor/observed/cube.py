@@ -1,34 +1,44 @@
 """Cubes: the same fit in every pixel, from neighbour to neighbour, with a mask, spread over an executor by rows.
 
-A row begins at its brightest pixel and goes outwards; a pixel begins where its neighbour ended if that converged, else with the start
-of all.
+First a chain of one pixel in each row is fitted: it begins at the brightest pixel of the cube, and goes up and down from row to row to the
+pixel that is nearest to the one before, so that a velocity field is followed. Then each row goes outwards from its pixel of the chain,
+independently of the others. A pixel begins where its neighbour ended. Where that leads to nothing (not converged, or parameters without
+an error and a χ² that noise alone does not have) it begins anew with the start of its row, with that of all, and at the velocity that
+correlation with the species finds in the pixel itself; the least χ² counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.observed.fit import FitChoices, fit_source
+from rotor.observed.fit import FitChoices, SourceFit, fit_source
 from rotor.observed.model import Component, Sight
 from rotor.observed.spectrum import ObservedSpectrum
+from rotor.observed.start import velocity_and_width
 from rotor.observed.variables import variables
+
+_CHANCE = 4.0  # standard deviations of χ²/ν, up to which it is that of noise
 
 
 @dataclass(frozen=True)
 class CubeFit:
     """Maps of parameters.
 
-    names: of the parameters (m). values, errors: (m, y, x), nan where a pixel was not fitted; errors are nan where they are not determined.
-    reduced_chi_squared: (y, x). fitted: (y, x) pixels whose search converged.
+    names: of the parameters (m), such as `CO excitation_k`, and parameters, such as `excitation_k`. values, errors: (m, y, x), nan where a
+    pixel was not fitted; errors are nan where they are not determined. reduced_chi_squared: (y, x). fitted: (y, x) pixels whose search
+    converged.
     """
 
     names: tuple[str, ...]
+    parameters: tuple[str, ...]
     values: Floats
     errors: Floats
     reduced_chi_squared: Floats
@@ -37,13 +47,15 @@ class CubeFit:
 
 @dataclass(frozen=True)
 class _Row:
-    """What a worker needs for one row of pixels."""
+    """What a worker needs for one row. first: the pixel that is fitted first, with `components`. start: that of all pixels."""
 
     frequency_mhz: Floats
-    intensity: Floats  # (channels, x)
+    intensity: NDArray[Any]  # (channels, x)
     noise: Floats  # (x,)
     mask: NDArray[np.bool_]
+    first: int
     components: tuple[Component, ...]
+    start: tuple[Component, ...]
     sight: Sight
     choices: FitChoices
 
@@ -91,15 +103,81 @@ def fit_cube(
     if len(frequency_mhz) != n:
         raise ValueError(f"{len(frequency_mhz)} frequencies for a cube of {n} channels")
     sigma = np.broadcast_to(np.asarray(noise, dtype=np.float64), (height, width))
-    chosen = np.nanmax(intensity, axis=0) > 5 * sigma if mask is None else np.asarray(mask, dtype=np.bool_)
+    chosen = _peak(intensity) > 5 * sigma if mask is None else np.asarray(mask, dtype=np.bool_)
     if chosen.shape != (height, width):
         raise ValueError(f"a mask of shape {chosen.shape} for a cube of {height} by {width} pixels")
-    settings = (tuple(components), sight or Sight(), choices or FitChoices())
-    rows = [_Row(frequency_mhz, intensity[:, y], sigma[y], chosen[y], *settings) for y in range(height)]
+    begin, settings = tuple(components), (sight or Sight(), choices or FitChoices())
+    rows = [
+        _Row(frequency_mhz, intensity[:, y], sigma[y], chosen[y] & _fit_to_use(intensity[:, y], sigma[y]), 0, begin, begin, *settings)
+        for y in range(height)
+    ]  # fmt: skip
+    rows = _chained(rows)
     results = list(map(_fit_row, rows) if executor is None else executor.map(_fit_row, rows))
-    free = variables(components, settings[2].free, settings[2].shared, settings[2].fixed)
+    free = variables(components, settings[1].free, settings[1].shared, settings[1].fixed)
     values, errors, chi, fitted = (np.stack([result[i] for result in results], axis=-2) for i in range(4))
-    return CubeFit(free.names(components), values, errors, chi, fitted.astype(np.bool_))
+    parameters = tuple(variable.name for variable in free.items)
+    return CubeFit(free.names(components), parameters, values, errors, chi, fitted.astype(np.bool_))
+
+
+def _fit_to_use(intensity: NDArray[Any], noise: Floats) -> NDArray[np.bool_]:
+    """Pixels (x,) with noise and at least half of their channels."""
+    return np.asarray((np.isfinite(intensity).mean(axis=0) >= 0.5) & (noise > 0))
+
+
+def _chained(rows: list[_Row]) -> list[_Row]:
+    """The rows with their first pixels and the components with which these begin, followed from the brightest pixel of all."""
+    peaks = [np.where(row.mask, _peak(row.intensity), -np.inf) for row in rows]
+    brightest = int(np.argmax([peak.max(initial=-np.inf) for peak in peaks]))
+    out = list(rows)
+    for order in (range(brightest, len(rows)), range(brightest - 1, -1, -1)):
+        at, start = int(np.argmax(peaks[brightest])), out[brightest].components
+        for y in order:
+            pixels = np.flatnonzero(rows[y].mask)
+            if not len(pixels):
+                continue
+            at = int(pixels[np.argmin(np.abs(pixels - at))])
+            out[y] = replace(rows[y], first=at, components=start)
+            if (fit := _fit_pixel(out[y], at, start)) is not None and fit.minimum.converged:
+                start = fit.components
+                out[y] = replace(out[y], components=start)
+    return out
+
+
+def _peak(intensity: NDArray[Any]) -> Floats:
+    """The brightest channel of every pixel (x,); -inf where none is finite."""
+    return np.asarray(np.max(np.where(np.isfinite(intensity), intensity, -np.inf), axis=0))
+
+
+def _fit_pixel(row: _Row, x: int, neighbour: tuple[Component, ...]) -> SourceFit | None:
+    """The fit of least χ² among those that converged; further starts are tried until there is one to trust. None where none can be made."""
+    spectrum, best = _pixel(row, x), None
+    for start in _starts(row, spectrum, neighbour):
+        try:
+            fit = fit_source(spectrum, start, row.sight, row.choices)
+        except (
+            ValueError
+        ):  # the search left the range of doubles, or the pixel has too few channels: not fitted, as the map says
+            continue
+        if best is None or (fit.minimum.converged, -fit.chi_squared) > (best.minimum.converged, -best.chi_squared):
+            best = fit
+        if _is_trusted(best):
+            break
+    return best
+
+
+def _starts(row: _Row, spectrum: ObservedSpectrum, neighbour: tuple[Component, ...]) -> Iterator[tuple[Component, ...]]:
+    """The neighbour, the start of the row, that of all, and that at the velocity and width of the pixel's own correlation."""
+    yield from {id(each): each for each in (neighbour, row.components, row.start)}.values()
+    known = [component.species for component in row.start]
+    velocity, width = velocity_and_width(spectrum, known, None, None, row.sight)
+    yield tuple(replace(component, velocity_km_s=velocity, fwhm_km_s=width) for component in row.start)
+
+
+def _is_trusted(fit: SourceFit) -> bool:
+    """Whether a search has ended at lines: a start off every line ends with nothing determined and a χ² that noise does not have."""
+    noise_alone = 1 + _CHANCE * math.sqrt(2 / max(fit.degrees_of_freedom, 1))
+    determined = all(parameter["determined"] for parameter in fit.parameters)
+    return fit.minimum.converged and (determined or fit.reduced_chi_squared < noise_alone)
 
 
 def _fit_row(row: _Row) -> tuple[Floats, Floats, Floats, Floats]:
@@ -108,18 +186,12 @@ def _fit_row(row: _Row) -> tuple[Floats, Floats, Floats, Floats]:
     count = len(variables(row.components, row.choices.free, row.choices.shared, row.choices.fixed))
     values, errors = np.full((count, width), np.nan), np.full((count, width), np.nan)
     chi, converged = np.full(width, np.nan), np.zeros(width)
-    peak = np.where(row.mask, np.nanmax(row.intensity, axis=0), -np.inf)
-    first = int(np.argmax(peak))
-    for order in (range(first, width), range(first - 1, -1, -1)):
+    for order in (range(row.first, width), range(row.first - 1, -1, -1)):
         start = row.components
         for x in order:
-            spectrum = _pixel(row, x) if row.mask[x] else None
-            if spectrum is None:
-                start = row.components
+            fit = _fit_pixel(row, x, start) if row.mask[x] else None
+            if fit is None:
                 continue
-            fit = fit_source(spectrum, start, row.sight, row.choices)
-            if not fit.minimum.converged and start is not row.components:
-                fit = fit_source(spectrum, row.components, row.sight, row.choices)
             values[:, x] = [parameter["value"] for parameter in fit.parameters]
             errors[:, x] = [parameter["error"] if parameter["determined"] else np.nan for parameter in fit.parameters]
             chi[x], converged[x] = fit.reduced_chi_squared, float(fit.minimum.converged)
@@ -127,12 +199,8 @@ def _fit_row(row: _Row) -> tuple[Floats, Floats, Floats, Floats]:
     return values, errors, chi, converged
 
 
-def _pixel(row: _Row, x: int) -> ObservedSpectrum | None:
-    """The spectrum of a pixel without channels that are not finite; None with fewer than half of them."""
+def _pixel(row: _Row, x: int) -> ObservedSpectrum:
+    """The spectrum of a pixel without channels that are not finite."""
     finite = np.isfinite(row.intensity[:, x])
-    if finite.mean() < 0.5 or not row.noise[x] > 0:
-        return None
-    whole = ObservedSpectrum(
-        row.frequency_mhz, np.asarray(row.intensity[:, x], dtype=np.float64), np.full(len(finite), row.noise[x])
-    )
-    return replace(whole.where(finite))
+    values = np.asarray(row.intensity[:, x], dtype=np.float64)
+    return ObservedSpectrum(row.frequency_mhz, values, np.full(len(finite), row.noise[x])).where(finite)

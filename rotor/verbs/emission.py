@@ -47,7 +47,8 @@ Examples:
   rotor emission CO HCN --band ALMA3 --column 1e18,1e15 --excitation 40,10 --width 300 --redshift 2.3
   rotor emission c028503.cat --partition catdir.cat --band ALMA6 --column 1e16
   rotor emission CH3OH HCN --over spectrum.fits --column 1e16,1e14 --velocity 4 --plot pages.pdf
-  rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width"""
+  rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width
+  rotor emission --fit cube.fits CH3CN --catalogue lines.rotorcat --maps maps.fits --workers 2"""
 _OF_ONE = ("isotopes", "spin_constants", "spins", *STATES)  # what belongs to a single molecule
 _OWN = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
 

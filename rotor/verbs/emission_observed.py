@@ -8,18 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, show_facts, show_table
-from rotor.requests.field import all_fields, check_fields, declared, identical, own_fields, part
-from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
-from rotor.spectra.emission_request import LayerInput, WindowInput
-from rotor.verbs.observed_file import (
-    PANEL,
-    SeveralInput,
-    SpectrumFile,
-    json_of,
-    padded,
-    species_of,
-    spectrum_facts,
-)
+from rotor.verbs import emission_cube
+from rotor.verbs.emission_cube import Mapped
+from rotor.verbs.observed_file import json_of, spectrum_facts
+from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, Output, Report, Work
 
@@ -28,86 +20,6 @@ if TYPE_CHECKING:
     from rotor.observed.model import Component, Sight
     from rotor.observed.spectrum import ObservedSpectrum
     from rotor.table import Table as Columns
-
-FREE = {
-    "column": "column_per_cm2",
-    "excitation": "excitation_k",
-    "velocity": "velocity_km_s",
-    "width": "fwhm_km_s",
-    "size": "size_arcsec",
-}
-
-
-OF_FIT = ("free", "shared", "sample", "calibration", "reject")
-
-
-def of_layer(name: str) -> Any:
-    """A field of the gas of a source, None where it is not typed: a fit estimates it."""
-    field = own_fields(LayerInput)[name]
-    return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
-
-
-@dataclass(frozen=True)
-class ObservedRequest:
-    """What is laid over a spectrum or fitted to it."""
-
-    sources: SeveralInput = part(SeveralInput, identical, identical, SeveralInput())
-    over: str | None = declared(
-        None, Text(metavar="FILE"), "Observed spectrum (FITS, text) under the model", panel=PANEL
-    )
-    fit: str | None = declared(
-        None, Text(metavar="FILE"), "Observed spectrum to which the source is fitted", panel=PANEL
-    )
-    catalogue: str | None = declared(
-        None, Text(metavar="FILE"), "Local catalogue that SOURCE names species of", panel=PANEL
-    )
-    free: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Fitted of column, excitation, velocity, width, size", panel=PANEL
-    )
-    shared: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Fitted alike for all species: velocity,width", panel=PANEL
-    )
-    calibration: float = declared(
-        0.0, Quantity(least=0, most=1), "Error of the intensity scale, a fraction", panel=PANEL
-    )
-    reject: float | None = declared(
-        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL
-    )
-    sample: int = declared(0, Whole(0), "Steps of emcee after the fit (extra sampling)", panel=PANEL)
-    spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
-    column_per_cm2: tuple[float, ...] | None = of_layer("column_per_cm2")
-    excitation_k: tuple[float, ...] | None = of_layer("excitation_k")
-    velocity_km_s: tuple[float, ...] | None = of_layer("velocity_km_s")
-    fwhm_km_s: tuple[float, ...] | None = of_layer("fwhm_km_s")
-    background_k: float | None = of_layer("background_k")
-    redshift: float | None = of_layer("redshift")
-    range_mhz: tuple[float, float] = part(
-        WindowInput, lambda value, _: value.range_mhz or value.band, lambda value, _: WindowInput(value), INFINITE,
-        single=True, why="give one of them",
-    )  # fmt: skip
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The molecules, as they are named."""
-        return self.sources.names
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.over is not None and self.fit is not None:
-            raise ValueError(
-                "--over, --fit: both name a spectrum; expected one of them (a fit is laid over its spectrum)"
-            )
-        declared_here, file = own_fields(ObservedRequest), all_fields(SpectrumFile).values()
-        named = [declared_here[name].flag for name in OF_FIT if getattr(self, name) != declared_here[name].default]
-        if named and self.fit is None:
-            raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
-        named = [field.flag for field in file if getattr(self.spectrum, field.name) != field.default]
-        if self.over is None and self.fit is None:
-            raise ValueError(
-                f"{(named or ['--catalogue'])[0]}: belongs to an observed spectrum; expected with --over or --fit"
-            )
-        if not self.names:
-            raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
 
 
 @dataclass(frozen=True)
@@ -121,6 +33,7 @@ class Observed:
     fit: SourceFit | None = None
     needed: Sequence[Contribution] = ()
     chain: Any = None
+    diagrams: Any = None
 
     @property
     def table(self) -> Columns:
@@ -146,23 +59,17 @@ class Observed:
         content["contributions"] = [
             {name: getattr(contribution, name) for name in names} for contribution in self.needed
         ]
-        return content if self.chain is None else content | {"sample": self.chain.facts()}
+        further = {"sample": self.chain, "diagrams": self.diagrams}
+        return content | {name: each.facts() for name, each in further.items() if each is not None}
 
 
-def answer(request: ObservedRequest, work: Work) -> Observed:
-    """Read the spectrum, then model or fit it."""
+def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
+    """Read the spectrum, then model or fit it; with maps the same in every pixel of a cube."""
+    if "maps" in work.files:
+        return emission_cube.answer(request, work)
     spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz)
-    redshift = request.redshift or 0.0
-    background = (
-        own_fields(LayerInput)["background_k"].default if request.background_k is None else request.background_k
-    )
-    sight = request.spectrum.sight(spectrum, background, redshift)
-    reach, partition = padded(spectrum, redshift), request.sources.partition
-    species = species_of(request.names, request.catalogue, reach, partition, work.note)
-    for each in species:
-        if "note" in each.identity:
-            work.note(f"{each.name}: {each.identity['note']}")
-    components = _components(spectrum, species, sight, request)
+    sight = sight_of(spectrum, request)
+    components = components_of(spectrum, species_in(spectrum, request, work.note), sight, request)
     if request.fit is None:
         return Observed(request, spectrum, sight, components)
     from rotor.observed.fit import contributions
@@ -173,49 +80,29 @@ def answer(request: ObservedRequest, work: Work) -> Observed:
         from rotor.observed.sampling import sample_source
 
         chain = sample_source(fit, request.sample)
-    return Observed(request, spectrum, sight, list(fit.components), fit, contributions(fit), chain)
+    diagrams = _diagrams(spectrum, fit, work) if "diagram" in work.files else None
+    return Observed(request, spectrum, sight, list(fit.components), fit, contributions(fit), chain, diagrams)
 
 
-def _components(
-    spectrum: ObservedSpectrum, species: Sequence[Any], sight: Sight, request: ObservedRequest
-) -> list[Component]:
-    """Of the options, where they were typed; of a fit the rest is estimated from the spectrum."""
-    from dataclasses import replace
+def _diagrams(spectrum: ObservedSpectrum, fit: SourceFit, work: Work) -> Any:
+    """Rotational diagrams of the fitted species; a note for each that has none, NoAnswerError where none has."""
+    from rotor.checks import NoAnswerError
+    from rotor.observed.diagrams import species_diagrams
 
-    from rotor.observed.model import Component
-    from rotor.observed.start import start_components
-
-    count, size = len(species), request.spectrum.size_arcsec
-    typed = {name: _each(name, request, count) for name in FREE.values() if name != "size_arcsec"}
-    if request.fit is None:
-        defaults = {name: own_fields(LayerInput)[name].default * count for name in typed}
-        values = {name: each or defaults[name] for name, each in typed.items()}
-        rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
-        return [Component(each, **row, size_arcsec=size) for each, row in zip(species, rows, strict=True)]
-    first = {name: (values[0] if values else None) for name, values in typed.items()}
-    del first["column_per_cm2"]
-    start = start_components(spectrum, species, sight, **first, size_arcsec=size)
-    changes = [{name: values[k] for name, values in typed.items() if values} for k in range(count)]
-    return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
-
-
-def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
-    """One number for each species, or one for all."""
-    values: tuple[float, ...] | None = getattr(request, name)
-    if values is not None and len(values) not in (1, count):
-        flag, text = own_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
-        raise ValueError(f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each")
-    return values * count if values is not None and len(values) == 1 else values
+    diagrams = species_diagrams(spectrum, fit.components, fit.sight)
+    for text in diagrams.notes:
+        work.note(f"no rotational diagram of {text}")
+    if not diagrams.names:
+        raise NoAnswerError("--diagram: no species has a rotational diagram")
+    return diagrams
 
 
 def _fitted(
     spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight, request: ObservedRequest
 ) -> SourceFit:
-    from rotor.observed.fit import FitChoices, fit_source
-    from rotor.observed.variables import DEFAULT_FREE
+    from rotor.observed.fit import fit_source
 
-    free, shared = (tuple(FREE[word] for word in words) for words in (request.free, request.shared))
-    choices = FitChoices(free=free or DEFAULT_FREE, shared=shared, calibration=request.calibration)
+    choices = fit_choices(request)
     if request.reject is None:
         return fit_source(spectrum, components, sight, choices)
     from rotor.observed.channels import fit_rejecting
@@ -240,8 +127,30 @@ def profile(answer: Observed) -> Columns:
 LEFT = frozenset({"species", "parameter"})
 
 
-def show(answer: Observed, _: Report) -> None:
+def draw_diagrams(answer: Observed, path: Path, report: Report) -> None:
+    """The points of all species as CSV, or a picture."""
+    if path.suffix.lower() == ".csv":
+        from rotor.formats import write
+
+        write(answer.diagrams, path, settings=dict(report.provenance))
+        return
+    from rotor.plots.diagrams import plot_diagrams
+
+    plot_diagrams(answer.diagrams, path, report.command)
+
+
+def draw_corner(answer: Observed, path: Path, _: Report) -> None:
+    """The draws of every two parameters."""
+    from rotor.observed.sampling import plot_corner
+
+    plot_corner(answer.chain, path)
+
+
+def show(answer: Observed | Mapped, _: Report) -> None:
     """Print the spectrum and the model, or the fit."""
+    if not isinstance(answer, Observed):
+        answer.show()
+        return
     show_facts(spectrum_facts(answer.spectrum))
     print()
     if answer.fit is None:
@@ -249,6 +158,19 @@ def show(answer: Observed, _: Report) -> None:
         show_table(Table("model", columns, [_component_cells(component) for component in answer.components], LEFT))
     else:
         _show_fit(answer.fit, answer.needed, answer.chain)
+    if answer.diagrams is not None:
+        print()
+        show_table(_diagram_table(answer.diagrams.facts()))
+
+
+def _diagram_table(rows: Sequence[Any]) -> Table:
+    cells = [
+        (row["species"], str(row["lines"]), f"{row['excitation_k']:.4g} ± {row['excitation_error_k']:.2g}",
+         f"{row['column_per_cm2']:.4g} ± {row['column_error_per_cm2']:.2g}", f"{row['chi_squared']:.3g}")
+        for row in rows
+    ]  # fmt: skip
+    columns = ("species", "lines", "T (K)", "N (1/cm²)", "χ²")
+    return Table("rotational diagrams, corrected for optical depth", columns, cells, LEFT)
 
 
 def _component_cells(component: Component) -> tuple[str, ...]:
@@ -300,6 +222,13 @@ OBSERVED = Tool(
         Output("parquet", (".parquet",), "Write them as Parquet"),
         Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", of=profile),
         Output("plot", PICTURES, "Draw pages of panels", draw),
+        Output(
+            "diagram", (".csv", *PICTURES), "Rotational diagrams of the fitted species as CSV or picture", draw_diagrams
+        ),
+        Output("corner", PICTURES, "Draw the sample of every two parameters (extra sampling)", draw_corner),
+        Output("maps", (".fits",), "Fit every pixel of a cube and write maps of the parameters", emission_cube.write),
     ),
-    instead="--over and --fit",
+    check=emission_cube.refuse,
+    workers="rows of a cube",
+    instead="--over, --fit and their options",
 )

@@ -75,24 +75,21 @@ class SpectrumFile:
         """Both widths of the beam."""
         return None if self.beam_arcsec is None else (self.beam_arcsec[0], self.beam_arcsec[-1])
 
+    @property
+    def choices(self) -> Any:
+        """What a reader of spectra is told."""
+        from rotor.formats.spectra.axis import ReadChoices
+
+        pixel = None if self.pixel is None else (int(self.pixel[0]), int(self.pixel[1]))
+        names = ("axis_unit", "unit", "rest_mhz", "frame", "noise", "row")
+        return ReadChoices(**{name: getattr(self, name) for name in names}, beam_arcsec=self.beam, pixel=pixel)
+
     def read(self, file: str, range_mhz: tuple[float, float] = INFINITE) -> ObservedSpectrum:
         """The spectrum in K, its baseline subtracted, and cut to a range."""
-        from rotor.formats.spectra.axis import ReadChoices
         from rotor.formats.spectra.read import read_spectrum
         from rotor.observed.spectrum import in_kelvin, without_baseline
 
-        pixel = None if self.pixel is None else (int(self.pixel[0]), int(self.pixel[1]))
-        choices = ReadChoices(
-            axis_unit=self.axis_unit,
-            unit=self.unit,
-            rest_mhz=self.rest_mhz,
-            frame=self.frame,
-            noise=self.noise,
-            beam_arcsec=self.beam,
-            row=self.row,
-            pixel=pixel,
-        )
-        spectrum = in_kelvin(read_spectrum(file, choices), self.beam)
+        spectrum = in_kelvin(read_spectrum(file, self.choices), self.beam)
         if range_mhz != INFINITE:
             spectrum = spectrum.between(*range_mhz)
         return spectrum if self.baseline is None else without_baseline(spectrum, self.baseline)

@@ -282,13 +282,29 @@ class Verb:
         """The inputs of the command line: the options, and those of the verb that may take the place."""
         return self.options if self.other is None else {**self.other.options, **self.options}
 
+    @cached_property
+    def every_output(self) -> tuple[Output, ...]:
+        """The files of the command line: its own, and those of the verb that may take the place."""
+        names = {output.name for output in self.outputs}
+        others = () if self.other is None else self.other.outputs
+        return (*self.outputs, *(output for output in others if output.name not in names))
+
+    @property
+    def spread(self) -> str:
+        """What --workers spreads, here or in the verb that may take the place."""
+        return self.workers or ("" if self.other is None else self.other.workers)
+
     def by_what(self, typed: Collection[str]) -> Verb:
         """The verb for what was typed, by identity: the other one where an option that it alone has is typed.
 
         Raises ValueError for what that has not.
         """
         other = self.other
-        if other is None or not any(name in typed for name in other.options.keys() - self.options.keys()):
+        if other is None:
+            return self
+        names = {output.name for output in self.every_output} - {output.name for output in self.outputs}
+        alone = names | (other.options.keys() - self.options.keys()) | (set() if self.workers else {"workers"})
+        if alone.isdisjoint(typed):
             return self
         for name, one in self.options.items():
             if name in typed and name not in other.options:

@@ -45,16 +45,16 @@ def parameters_of(verb: Verb) -> list[Parameter]:
     """Every option of a verb; those of a tool are few, and --help shows all."""
     parameters = [_input(field) for field in verb.parameters.values()]
     parameters += [_extra(extra) for extra in verb.extras]
-    parameters += [_file(output) for output in verb.outputs]
+    parameters += [_file(output) for output in verb.every_output]
     if verb.has_json:
         parameters.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     if verb.has_scenes:
         parameters.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
     if any(output.name == "plot" for output in verb.outputs):
         parameters += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
-    if verb.workers:
+    if verb.spread:
         parameters.append(
-            Parameter("workers", "--workers", f"Processes over which {verb.workers} are spread", "N", NUMERICS)
+            Parameter("workers", "--workers", f"Processes over which {verb.spread} are spread", "N", NUMERICS)
         )
     return parameters if verb.has_scenes else [replace(parameter, common=True) for parameter in parameters]
 

@@ -115,7 +115,9 @@ def _one_spectrum(data: Floats, axis: int, name: str, choices: ReadChoices) -> F
     if moved[..., 0].size == 1:
         return moved.reshape(-1)
     if choices.pixel is None:
-        raise ValueError(f"{name}: a cube of {data.shape[::-1]} pixels; state which spectrum, such as --pixel 32,32")
+        raise ValueError(
+            f"{name}: a cube of {data.shape[::-1]} pixels; state which spectrum, such as --pixel 32,32 (all of them: emission --maps)"
+        )
     x, y = choices.pixel
     plane = moved.reshape(-1, *moved.shape[-3:]) if moved.ndim > 3 else moved[None]
     if not (1 <= x <= plane.shape[2] and 1 <= y <= plane.shape[1]):
@@ -258,18 +260,13 @@ def _spectrum(
 ) -> ObservedSpectrum:
     """The spectrum with what the header states of frame, beam and object."""
     chosen, factor = intensity_unit(choices.unit or (None if unit is None else str(unit)), name)
-    beam = choices.beam_arcsec or (
-        tuple(float(header[key]) * 3600 for key in ("BMAJ", "BMIN"))
-        if header.get("BMAJ") and header.get("BMIN")
-        else None
-    )
     selected = {
         key: _plain(header[key])
         for key in ("OBJECT", "TELESCOP", "LINE", "VELO-LSR", "VLSR", "VELDEF", "DATE-OBS")
         if key in header
     }
     notes = []
-    frame = choices.frame or _frame(header)
+    frame = choices.frame or frame_of(header)
     if frame == "TOPOCENT":
         notes.append("frequencies are topocentric: the motion of the Earth is in the velocities")
     if choices.noise is not None:
@@ -282,13 +279,20 @@ def _spectrum(
         unit=chosen,
         rest_mhz=rest,
         frame=frame,
-        beam_arcsec=beam,
+        beam_arcsec=beam_of(header, choices),
         notes=notes,
         header={key.lower().replace("-", "_"): value for key, value in selected.items()},
     )
 
 
-def _frame(header: Mapping[str, Any]) -> str:
+def beam_of(header: Mapping[str, Any], choices: ReadChoices) -> tuple[float, float] | None:
+    """Full widths of the beam as stated by the user, else by the header."""
+    if choices.beam_arcsec is not None or not (header.get("BMAJ") and header.get("BMIN")):
+        return choices.beam_arcsec
+    return float(header["BMAJ"]) * 3600, float(header["BMIN"]) * 3600
+
+
+def frame_of(header: Mapping[str, Any]) -> str:
     """SPECSYS, else the end of CTYPE, else that of CLASS, which moves with the source."""
     if header.get("SPECSYS"):
         return str(header["SPECSYS"]).strip()

@@ -1,0 +1,150 @@
+"""`rotor emission --fit cube.fits --maps maps.fits`: the fit of a source in every pixel of a cube."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.reports.screen import Table, show_facts, show_table
+from rotor.requests.readers import INFINITE
+from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
+from rotor.verbs.verb import Report, Work
+
+if TYPE_CHECKING:
+    from rotor.formats.spectra.cube_file import Cube
+    from rotor.observed.cube import CubeFit
+
+_OF_A_SPECTRUM = ("csv", "parquet", "profile_csv", "plot", "diagram", "corner")
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A cube with the maps of its fit."""
+
+    request: ObservedRequest
+    cube: Cube
+    fit: CubeFit
+    pixels: int
+
+    table = None
+
+    def facts(self) -> dict[str, Any]:
+        """Cube and maps, by the keys of docs/verbs."""
+        cube = self.cube
+        return {
+            "cube": {
+                "source": cube.source,
+                "pixels": list(cube.noise_k.shape[::-1]),
+                "channels": len(cube.frequency_mhz),
+                "range_mhz": [float(cube.frequency_mhz[0]), float(cube.frequency_mhz[-1])],
+                "frame": cube.frame,
+                "beam_arcsec": None if cube.beam_arcsec is None else list(cube.beam_arcsec),
+                "noise_k": float(np.nanmedian(cube.noise_k)),
+            },
+            "pixels": self.pixels,
+            "converged": int(self.fit.fitted.sum()),
+            "reduced_chi_squared": _quantiles(self.fit.reduced_chi_squared)[1],
+            "maps": [
+                {"name": name, "low": low, "median": middle, "high": high, "determined": count}
+                for name, (low, middle, high), count in self._rows()
+            ],
+        }
+
+    def _rows(self) -> list[tuple[str, tuple[float | None, ...], int]]:
+        return [
+            (name, _quantiles(value), int(np.isfinite(error).sum()))
+            for name, value, error in zip(self.fit.names, self.fit.values, self.fit.errors, strict=True)
+        ]
+
+    def show(self) -> None:
+        """Print the cube, and the range of each map."""
+        cube = self.cube
+        width, height = cube.noise_k.shape[::-1]
+        first, last = cube.frequency_mhz[0], cube.frequency_mhz[-1]
+        size = f"{width} by {height} pixels, {len(cube.frequency_mhz)} channels from {first:.6f} to {last:.6f} MHz"
+        show_facts(
+            [
+                ("cube", f"{cube.source}: {size}, frame {cube.frame}"),
+                ("noise", f"{float(np.nanmedian(cube.noise_k)):.4g} K a channel, median of the pixels"),
+                ("fitted", f"{self.pixels} pixels, {int(self.fit.fitted.sum())} of them converged"),
+                ("χ²/ν", f"{_quantiles(self.fit.reduced_chi_squared)[1]:.4g}, median"),
+            ]
+        )
+        print()
+        rows = [(name, *(f"{end:.5g}" for end in ends), str(count)) for name, ends, count in self._rows()]
+        columns = ("parameter", "16 %", "median", "84 %", "determined")
+        show_table(Table("pixels of each map", columns, rows, frozenset({"parameter"})))
+
+
+def _quantiles(values: Any) -> tuple[float | None, ...]:
+    """Values below which 16, 50 and 84 % of the finite ones are."""
+    finite = values[np.isfinite(values)]
+    return tuple(np.quantile(finite, (0.16, 0.5, 0.84)).tolist()) if len(finite) else (None, None, None)
+
+
+def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None:
+    """ValueError for what belongs to a single spectrum beside maps, for a mask without maps, and for pictures without what they show."""
+    if "maps" in outputs:
+        if request.fit is None:
+            raise ValueError("--maps: belongs to a fit of a cube; expected with --fit CUBE")
+        if other := next((name for name in _OF_A_SPECTRUM if name in outputs), None):
+            raise ValueError(
+                f"--{other.replace('_', '-')}: of a single spectrum; expected without --maps, with --pixel X,Y"
+            )
+        file = request.spectrum
+        for flag, typed in (("--pixel", file.pixel), ("--row", file.row), ("--baseline", file.baseline), ("--reject", request.reject),
+                            ("--sample", request.sample or None)):  # fmt: skip
+            if typed is not None:
+                raise ValueError(f"{flag}: of a single spectrum; expected without --maps")
+        return
+    if request.mask is not None:
+        raise ValueError("--mask: belongs to maps of a cube; expected with --maps FILE")
+    if "corner" in outputs and not request.sample:
+        raise ValueError("--corner: a picture of draws; expected with --sample N")
+    if "diagram" in outputs and request.fit is None:
+        raise ValueError("--diagram: rotational diagrams of a fit; expected with --fit FILE")
+
+
+def answer(request: ObservedRequest, work: Work) -> Mapped:
+    """Read the cube, estimate a start from its brightest pixel, and fit every pixel."""
+    from rotor.formats.spectra.cube_file import read_cube, read_mask
+    from rotor.observed.cube import fit_cube
+    from rotor.observed.spectrum import observed_spectrum
+
+    cube = read_cube(Path(request.fit or ""), request.spectrum.choices)
+    if request.range_mhz != INFINITE:
+        cube = cube.between(*request.range_mhz)
+    peak = np.max(np.where(np.isfinite(cube.intensity_k), cube.intensity_k, -np.inf), axis=0)
+    shape = cube.noise_k.shape
+    chosen = peak > 5 * cube.noise_k if request.mask is None else read_mask(Path(request.mask), shape)  # type: ignore[arg-type]
+    chosen = chosen & np.isfinite(cube.noise_k)
+    if not chosen.any():
+        where = (
+            "inside the mask with noise and half of its channels" if request.mask else "above five standard deviations"
+        )
+        raise ValueError(f"{cube.source}: no pixel {where}, so that there is nothing to fit")
+    y, x = np.unravel_index(np.argmax(np.where(chosen, peak, -np.inf)), shape)
+    brightest = observed_spectrum(
+        cube.frequency_mhz, cube.intensity_k[:, y, x], noise=float(cube.noise_k[y, x]), beam_arcsec=cube.beam_arcsec,
+        source=f"{cube.source}, pixel {x + 1},{y + 1}", rest_mhz=cube.rest_mhz, frame=cube.frame,
+    )  # fmt: skip
+    sight = sight_of(brightest, request)
+    start = components_of(brightest, species_in(brightest, request, work.note), sight, request)
+    work.note(f"the search begins at the brightest pixel, {x + 1},{y + 1}")
+    choices = fit_choices(request)
+    noise = np.where(chosen, cube.noise_k, 1.0)
+    fit = fit_cube(
+        cube.frequency_mhz, cube.intensity_k, noise, start, sight, choices, mask=chosen, executor=work.executor
+    )
+    return Mapped(request, cube, fit, int(chosen.sum()))
+
+
+def write(mapped: Mapped, path: Path, report: Report) -> None:
+    """Every map with the coordinates of the cube."""
+    from rotor.formats.spectra.cube_file import write_maps
+
+    write_maps(mapped.fit, mapped.cube, path, str(report.content["command"]))

@@ -1,0 +1,162 @@
+"""What `rotor emission --over` and `--fit` are told, and what a model or a fit begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.requests.field import all_fields, check_fields, declared, identical, own_fields, part
+from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
+from rotor.spectra.emission_request import LayerInput, WindowInput
+from rotor.verbs.observed_file import PANEL, SeveralInput, SpectrumFile, padded, species_of
+from rotor.verbs.verb import Note
+
+if TYPE_CHECKING:
+    from rotor.observed.fit import FitChoices
+    from rotor.observed.model import Component, Sight
+    from rotor.observed.species import SpeciesLines
+    from rotor.observed.spectrum import ObservedSpectrum
+
+FREE = {
+    "column": "column_per_cm2",
+    "excitation": "excitation_k",
+    "velocity": "velocity_km_s",
+    "width": "fwhm_km_s",
+    "size": "size_arcsec",
+}
+
+
+OF_FIT = ("free", "shared", "sample", "calibration", "reject")
+
+
+def of_layer(name: str) -> Any:
+    """A field of the gas of a source, None where it is not typed: a fit estimates it."""
+    field = own_fields(LayerInput)[name]
+    return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
+
+
+@dataclass(frozen=True)
+class ObservedRequest:
+    """What is laid over a spectrum or fitted to it."""
+
+    sources: SeveralInput = part(SeveralInput, identical, identical, SeveralInput())
+    over: str | None = declared(
+        None, Text(metavar="FILE"), "Observed spectrum (FITS, text) under the model", panel=PANEL
+    )
+    fit: str | None = declared(
+        None, Text(metavar="FILE"), "Observed spectrum to which the source is fitted", panel=PANEL
+    )
+    catalogue: str | None = declared(
+        None, Text(metavar="FILE"), "Local catalogue that SOURCE names species of", panel=PANEL
+    )
+    free: tuple[str, ...] = declared(
+        (), NameList(tuple(FREE)), "Fitted of column, excitation, velocity, width, size", panel=PANEL
+    )
+    shared: tuple[str, ...] = declared(
+        (), NameList(tuple(FREE)), "Fitted alike for all species: velocity,width", panel=PANEL
+    )
+    calibration: float = declared(
+        0.0, Quantity(least=0, most=1), "Error of the intensity scale, a fraction", panel=PANEL
+    )
+    reject: float | None = declared(
+        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL
+    )
+    mask: str | None = declared(
+        None, Text(metavar="FILE"), "Pixels of --maps: FITS, not 0; without, those with a channel above 5 standard deviations",
+        panel=PANEL,
+    )  # fmt: skip
+    sample: int = declared(0, Whole(0), "Steps of emcee after the fit (extra sampling)", panel=PANEL)
+    spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
+    column_per_cm2: tuple[float, ...] | None = of_layer("column_per_cm2")
+    excitation_k: tuple[float, ...] | None = of_layer("excitation_k")
+    velocity_km_s: tuple[float, ...] | None = of_layer("velocity_km_s")
+    fwhm_km_s: tuple[float, ...] | None = of_layer("fwhm_km_s")
+    background_k: float | None = of_layer("background_k")
+    redshift: float | None = of_layer("redshift")
+    range_mhz: tuple[float, float] = part(
+        WindowInput, lambda value, _: value.range_mhz or value.band, lambda value, _: WindowInput(value), INFINITE,
+        single=True, why="give one of them",
+    )  # fmt: skip
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The molecules, as they are named."""
+        return self.sources.names
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.over is not None and self.fit is not None:
+            raise ValueError(
+                "--over, --fit: both name a spectrum; expected one of them (a fit is laid over its spectrum)"
+            )
+        declared_here, file = own_fields(ObservedRequest), all_fields(SpectrumFile).values()
+        named = [declared_here[name].flag for name in OF_FIT if getattr(self, name) != declared_here[name].default]
+        if named and self.fit is None:
+            raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
+        named = [field.flag for field in file if getattr(self.spectrum, field.name) != field.default]
+        if self.over is None and self.fit is None:
+            named += [declared_here[name].flag for name in ("catalogue", "mask") if getattr(self, name) is not None]
+            what = named[0] if named else "--maps, --diagram, --corner, --workers"
+            raise ValueError(f"{what}: belongs to an observed spectrum; expected with --over or --fit")
+        if not self.names:
+            raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
+
+
+def sight_of(spectrum: ObservedSpectrum, request: ObservedRequest) -> Sight:
+    """Beam, background and redshift."""
+    background = request.background_k
+    if background is None:
+        background = own_fields(LayerInput)["background_k"].default
+    return request.spectrum.sight(spectrum, background, request.redshift or 0.0)
+
+
+def species_in(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -> list[SpeciesLines]:
+    """The species that are named, with their lines in a range."""
+    reach = padded(spectrum, request.redshift or 0.0)
+    species = species_of(request.names, request.catalogue, reach, request.sources.partition, note)
+    for each in species:
+        if "note" in each.identity:
+            note(f"{each.name}: {each.identity['note']}")
+    return species
+
+
+def components_of(
+    spectrum: ObservedSpectrum, species: Sequence[SpeciesLines], sight: Sight, request: ObservedRequest
+) -> list[Component]:
+    """Of the options, where they were typed; of a fit the rest is estimated from the spectrum."""
+    from dataclasses import replace
+
+    from rotor.observed.model import Component
+    from rotor.observed.start import start_components
+
+    count, size = len(species), request.spectrum.size_arcsec
+    typed = {name: _each(name, request, count) for name in FREE.values() if name != "size_arcsec"}
+    if request.fit is None:
+        defaults = {name: own_fields(LayerInput)[name].default * count for name in typed}
+        values = {name: each or defaults[name] for name, each in typed.items()}
+        rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
+        return [Component(each, **row, size_arcsec=size) for each, row in zip(species, rows, strict=True)]
+    first = {name: (values[0] if values else None) for name, values in typed.items()}
+    del first["column_per_cm2"]
+    start = start_components(spectrum, species, sight, **first, size_arcsec=size)
+    changes = [{name: values[k] for name, values in typed.items() if values} for k in range(count)]
+    return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
+
+
+def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
+    """One number for each species, or one for all."""
+    values: tuple[float, ...] | None = getattr(request, name)
+    if values is not None and len(values) not in (1, count):
+        flag, text = own_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
+        raise ValueError(f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each")
+    return values * count if values is not None and len(values) == 1 else values
+
+
+def fit_choices(request: ObservedRequest) -> FitChoices:
+    """What is fitted."""
+    from rotor.observed.fit import FitChoices
+    from rotor.observed.variables import DEFAULT_FREE
+
+    free, shared = (tuple(FREE[word] for word in words) for words in (request.free, request.shared))
+    return FitChoices(free=free or DEFAULT_FREE, shared=shared, calibration=request.calibration)
