@@ -29,8 +29,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins
-from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
-from rotor.quantum.spins.three_equivalent import labels_of_functions
+from rotor.quantum.spins.parts import SpinPart, assigned, labels_by_shares, labels_of, names_of_parts
 from rotor.quantum.spins.three_spins import Allowed
 
 if TYPE_CHECKING:
@@ -183,7 +182,7 @@ def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
 
 def _namer_of_allowed(allowed: Allowed) -> Namer:
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return labels_of_functions(vectors, allowed.sub_block, allowed.names, allowed.sizes)[0]
+        return labels_by_shares(allowed.names[None], allowed.sizes[None], vectors[None])[0][0]
 
     return namer
 

@@ -10,12 +10,11 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, whole_of_lower
 from rotor.quantum.basis.state_elements import StateTerms
-from rotor.quantum.spins.axial import Exist, operators_of_axial_stacks, powers_of_axial
-from rotor.quantum.spins.blocks import Plan, SpinBlock, parts_of_f
+from rotor.quantum.spins.axial import operators_of_axial_stacks, powers_of_axial
+from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, diagonalised
 from rotor.quantum.spins.contraction import Contracted
-from rotor.quantum.spins.many_f_levels import Member, existing_blocks
-from rotor.quantum.spins.parts import SpinPart, labels_of_alike
-from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
+from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Channel, RotorPart, parameter_channels
 from rotor.quantum.spins.scheme import Scheme
 
@@ -78,38 +77,18 @@ class AxialTables:
         return np.tril(of_functions * elements)
 
 
-def solve_axial(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock] | None:
-    """The blocks of all F as `blocks.solve_f` gives them one by one; None where that is the way to solve them.
-
-    every_f: doubled, rising by 2. exist: see `levels.levels_of_f`.
-    """
-    shared = plan.shared
-    table = pattern_table(shared.scheme, every_f[0], every_f[-1])
-    members: list[Member] = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
-    if not members or len(table.every) > _MOST:
-        return None
-    members, names, sizes = existing_blocks(members, table.patterns, exist)
-    shared.cache["patterns"] = table.patterns
-    tables = AxialTables([block.parts[0] for block in plan.blocks], shared.scheme, (every_f[0], every_f[-1]))
+def axial_states(plan: Plan, members: Sequence[Member], table: PatternTable) -> Iterator[States]:
+    """The states of blocks of |N K⟩ times patterns."""
+    bounds = min(table.patterns), max(table.patterns)
+    tables = AxialTables([block.parts[0] for block in plan.blocks], plan.shared.scheme, bounds)
     rotation = np.array([block.energies_mhz[0] for block in plan.blocks])
-    out: list[SpinBlock] = [None] * len(members)  # type: ignore[list-item]
-    starts = list(accumulate((parts[-1].place.stop for _, parts in members), initial=0))
-    for which, functions in by_size(members, table.places):
+    for which, functions in by_size([member[:2] for member in members], table.places):
         diagonal = rotation[functions.numbers]
-        zeros = diagonal[:, :1].copy()  # taken out of the matrices for the sake of digits
-        matrices = (diagonal - zeros)[:, :, None] * np.eye(diagonal.shape[1])
+        zeros = diagonal[:, 0]  # taken out of the matrices for the sake of digits
+        matrices = (diagonal - zeros[:, None])[:, :, None] * np.eye(diagonal.shape[1])
         for found, channels in plan.contracted:
             matrices += tables.matrices(found, channels, functions)
-        if not np.isfinite(matrices).all():
-            raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
-        energies, vectors = np.linalg.eigh(matrices)  # reads the lower triangles
-        of_names, of_sizes = (np.stack([own[i] for i in which]) for own in (names, sizes))
-        labels, mixing = labels_of_alike([members[i][1] for i in which], of_names, of_sizes, vectors)
-        results = zip(energies + zeros, vectors, labels, mixing, strict=True)
-        for i, result in zip(which, results, strict=True):
-            f, parts = members[i]
-            out[i] = SpinBlock(f, table.patterns[f], parts, *result, shared, starts[i])
-    return out
+        yield diagonalised(which, matrices, zeros)
 
 
 def axial_derivatives(

@@ -10,11 +10,12 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stack
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
-from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
+from rotor.quantum.spins.parts import SpinPart, named_states
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-_FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
+FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 Operators = dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]
 """Matrices between two blocks of the rotation, each with the channels that share it."""
 InStacks = list[tuple[list[Contracted], list[Channel]]]
@@ -61,6 +62,11 @@ class Shared:
     stacks: list[Stack] = field(repr=False, compare=False)
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     used: Used | None = None
+
+    @property
+    def state_by_state(self) -> bool:
+        """Whether spins mix no states of the rotation."""
+        return self.used is not None and self.used.method == FIRST_ORDER
 
     @property
     def axial(self) -> bool:
@@ -118,6 +124,36 @@ class SpinBlock(Block):
         for part in self.parts:
             found.setdefault(part.number, []).append(part)
         return found
+
+
+class Member(NamedTuple):
+    """A block before it is solved: doubled F, parts, v, Ka, Kc and pattern of the levels that its sub-blocks name one after another, how
+    many each names, and the functions that are there."""
+
+    twice_f: int
+    parts: tuple[SpinPart, ...]
+    names: Ints
+    sizes: Ints
+    allowed: Allowed | None = None
+
+
+class States(NamedTuple):
+    """Solved blocks of one size: their numbers, energies (blocks, n), rising, vectors (blocks, functions, n), groups by number."""
+
+    numbers: Sequence[int]
+    energies_mhz: Floats
+    vectors: Floats
+    groups: Mapping[int, Group] = MappingProxyType({})
+
+
+def diagonalised(
+    numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats, groups: Mapping[int, Group] = MappingProxyType({})
+) -> States:
+    """States of blocks of one size, given by the lower triangles (blocks, n, n) with `zeros_mhz` taken off their diagonals."""
+    if not np.isfinite(matrices).all():
+        raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+    energies, vectors = np.linalg.eigh(matrices)  # reads the lower triangles
+    return States(numbers, energies + zeros_mhz[:, None], vectors, groups)
 
 
 @dataclass(frozen=True)
@@ -218,24 +254,6 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
     return firsts
 
 
-def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
-    """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
-    every = plan.shared.scheme.patterns(twice_f)
-    known = plan.shared.cache.pop(("coupling", twice_f), None) or couplings(plan, {twice_f: every})[twice_f]
-    blocks = list(parts_of_f(plan, every))
-    if not blocks:  # N of the first K (KNMIN) is above every N of this F
-        return []
-    names, sizes = names_of_parts([part for parts in blocks for part in parts], every)
-    there = np.ones(len(names), dtype=bool) if exist is None else exist(names)
-    out, start, first = [], 0, 0
-    for parts in blocks:
-        stop, last = start + parts[-1].place.stop, first + sum(part.sub_blocks for part in parts)
-        if there[start:stop].any():
-            out.append(_solved(plan, twice_f, every, parts, known, (names[start:stop], sizes[first:last])))
-        start, first = stop, last
-    return out
-
-
 def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
     """The parts of every block of an F whose patterns these are; none of an F that N and the spins do not make."""
     if not len(every):
@@ -248,17 +266,19 @@ def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
         yield _parts(plan, [(i, own) for _, i, own in sorted(members, key=lambda member: member[0])])
 
 
-def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
-    """The functions of the blocks of one F, each named after its state of the rotation, with the energy of that; no vectors."""
-    every = plan.shared.scheme.patterns(twice_f)
-    if ("coupling", twice_f) not in plan.shared.cache:
-        plan.shared.cache["coupling", twice_f] = couplings(plan, {twice_f: every})[twice_f]
+def functions_of_blocks(plan: Plan, every_f: Iterable[int]) -> list[SpinBlock]:
+    """The functions of the blocks of all F, each named after its state of the rotation, with the energy of that; no vectors."""
+    cache, tables = plan.shared.cache, {f: plan.shared.scheme.patterns(f) for f in every_f}
+    cache["patterns"] = tables
+    known = couplings_of_all(plan, tables)
     out = []
-    for parts in parts_of_f(plan, every):
-        energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
-        labels = np.concatenate([_labels_of_functions(part, every[part.patterns]) for part in parts])
-        ones = np.ones(len(energies))
-        out.append(SpinBlock(twice_f, every, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
+    for twice_f, every in tables.items():
+        cache["coupling", twice_f] = known[twice_f] if known else couplings(plan, {twice_f: every})[twice_f]
+        for parts in parts_of_f(plan, every):
+            energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
+            labels = np.concatenate([_labels_of_functions(part, every[part.patterns]) for part in parts])
+            ones = np.ones(len(energies))
+            out.append(SpinBlock(twice_f, every, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
     return out
 
 
@@ -267,16 +287,10 @@ def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
     return np.concatenate([np.column_stack([names, np.tile(one, (len(names), 1))]) for one in own_patterns])
 
 
-def prepare(plan: Plan, every_f: Iterable[int]) -> None:
-    """Coefficients of all channels for many F at once, by F; those of patterns with a total spin are made F by F."""
-    scheme = plan.shared.scheme
-    if scheme.equivalent:
-        return
-    tables = {f: scheme.patterns(f) for f in every_f}
-    plan.shared.cache["patterns"] = tables
-    if max(map(len, plan.shared.cache["patterns"].values()), default=0) <= _FEW:
-        found = couplings(plan, tables)
-        plan.shared.cache.update({("coupling", f): own for f, own in found.items()})
+def couplings_of_all(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
+    """Coefficients of all channels for many F at once, by F; none where they are too many, or have a total spin: made F by F."""
+    few = not plan.shared.scheme.equivalent and max(map(len, tables.values()), default=0) <= FEW
+    return couplings(plan, tables) if few and tables else {}
 
 
 def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
@@ -310,65 +324,6 @@ def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]
         parts.append(SpinPart(i, block, rows, slice(start, stop)))
         start = stop
     return tuple(parts)
-
-
-def _solved(
-    plan: Plan,
-    twice_f: int,
-    every: Ints,
-    parts: tuple[SpinPart, ...],
-    known: dict[Channel, Floats],
-    names: tuple[Ints, Ints],
-) -> SpinBlock:
-    if plan.shared.used is not None and plan.shared.used.method == FIRST_ORDER and len(parts) == 1:
-        energies, vectors = _state_by_state(plan, parts[0], known)
-        labels, mixing = labels_of(parts, names, vectors)
-        return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
-    zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
-    matrix = _matrix(plan, parts, known, zero)
-    if not np.isfinite(matrix).all():
-        raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
-    energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
-    labels, mixing = labels_of(parts, names, vectors)
-    return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
-
-
-def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
-    """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
-    size = parts[-1].place.stop
-    matrix = np.zeros((size, size))
-    matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
-    single = all(part.repeats == 1 for part in parts)
-    of_single = {channel: table.tolist() for channel, table in known.items()} if single else {}
-    for a, up in enumerate(parts):
-        for low in parts[: a + 1]:
-            for operator, of_it in plan.operators.get((up.number, low.number), ()):
-                if single:
-                    one = [of_single[channel][up.patterns.start][low.patterns.start] for channel in of_it]
-                    element = operator * sum(one)
-                else:
-                    factors = known[of_it[0]][up.patterns, low.patterns]
-                    for channel in of_it[1:]:
-                        factors = factors + known[channel][up.patterns, low.patterns]
-                    element = product(factors, operator)
-                matrix[up.place, low.place] += element
-    return matrix
-
-
-def _state_by_state(plan: Plan, part: SpinPart, known: dict[Channel, Floats]) -> tuple[Floats, Floats]:
-    """Energies, rising, and vectors where every rotational state has only its own patterns: one small matrix each, all at once."""
-    states, repeats = len(part.rotor.energies_mhz), part.repeats
-    matrices = np.zeros((states, repeats, repeats))
-    for operator, channels in plan.operators.get((part.number, part.number), ()):
-        for channel in channels:
-            matrices += np.diag(operator)[:, None, None] * known[channel][part.patterns, part.patterns]
-    shifts, own = np.linalg.eigh(matrices)
-    energies = (part.rotor.energies_mhz[:, None] + shifts).ravel()
-    vectors = np.zeros((repeats, states, states, repeats))
-    every = np.arange(states)
-    vectors[:, every, every, :] = own.transpose(1, 0, 2)
-    order = np.argsort(energies, kind="stable")
-    return energies[order], vectors.reshape(repeats * states, -1)[:, order]
 
 
 def product(left: Floats, right: Floats) -> Floats:

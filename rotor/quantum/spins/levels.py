@@ -12,12 +12,11 @@ from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_by_state
 from rotor.quantum.spins.axial import Exist
-from rotor.quantum.spins.axial_levels import solve_axial
-from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
-from rotor.quantum.spins.many_f_levels import solve_many_f
+from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_blocks, plan_of
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
+from rotor.quantum.spins.solve import solved_blocks
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -87,15 +86,7 @@ def levels_of_f(
     hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = simplified(plan_of(top, effects, lowest, highest, executor, exist), effects, every_f)
-    solve = solve_f
-    if plan.shared.scheme.equivalent == 3:
-        from rotor.quantum.spins.three_equivalent import in_wang_functions, solve_three
-
-        plan, solve = in_wang_functions(plan), solve_three
-    solved = solve_axial(plan, every_f, exist) if plan.shared.axial else solve_many_f(plan, every_f, exist)
-    if solved is None:
-        prepare(plan, every_f)
-        solved = [block for f in every_f for block in solve(plan, f, exist)]
+    solved = solved_blocks(plan, every_f, exist)
     if n_range:
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(_placed(solved))
@@ -127,8 +118,7 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
         raise ValueError(
             "functions of three equivalent nuclei are no products of a state of the rotation and a pattern"
         )
-    prepare(plan, every_f)
-    blocks = tuple(_placed(block for f in every_f for block in functions_of_f(plan, f)))
+    blocks = tuple(_placed(functions_of_blocks(plan, every_f)))
     return _table(top, effects, plan.shared, blocks, highest), plan
 
 

@@ -50,25 +50,21 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
 def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     names, sizes = named
-    labels, mixing = labels_of_alike([parts], names[None], sizes[None], vectors[None])
+    labels, mixing = labels_by_shares(names[None], sizes[None], over_functions([parts], vectors[None]))
     return labels[0], mixing[0]
 
 
-def labels_of_alike(
-    every: Sequence[tuple[SpinPart, ...]], names: Ints, sizes: Ints, vectors: Floats
-) -> tuple[Ints, Floats]:
-    """The same of blocks of n states each with as many sub-blocks.
+def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, Floats]:
+    """Names of the states of blocks of n states each with as many sub-blocks.
 
     Parameters
     ----------
-    every : sequence of tuple of SpinPart
-        The parts of each block.
     names : (blocks, n, 3 + pattern) array
         Of the levels that the sub-blocks name, see `names_of_tables`.
     sizes : (blocks, sub-blocks) array
         How many each names.
     vectors : (blocks, n, n) array
-        Eigenvectors in columns.
+        Eigenvectors in columns, over functions sub-block by sub-block.
 
     Returns
     -------
@@ -78,25 +74,25 @@ def labels_of_alike(
         Shares of the sub-blocks that name them.
     """
     (count, subs), n = sizes.shape, names.shape[1]
-    inside = vectors
-    if any(len(part.rotor.parts) > 1 for parts in every for part in parts):
-        inside = np.stack(
-            [
-                np.concatenate([_over_functions(part, own) for part in parts])
-                for parts, own in zip(every, vectors, strict=True)
-            ]
-        )
     block = np.arange(count)[:, None]
     starts = np.cumsum(sizes, axis=1) - sizes + n * block
-    shares = np.add.reduceat((inside * inside).reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
+    shares = np.add.reduceat((vectors * vectors).reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
     of_state = assigned_alike(shares, sizes)
     labels = np.empty_like(names)
     labels[block, np.argsort(of_state, axis=1, kind="stable")] = names
     return labels, np.asarray(shares[block, of_state, np.arange(n)])
 
 
+def over_functions(every: Sequence[tuple[SpinPart, ...]], vectors: Floats) -> Floats:
+    """Vectors (blocks, n, n) of blocks with these parts over functions of the rotation instead of its states, where these are many."""
+    if all(len(part.rotor.parts) == 1 for parts in every for part in parts):
+        return vectors
+    pairs = zip(every, vectors, strict=True)
+    return np.stack([np.concatenate([_over_functions(part, own) for part in parts]) for parts, own in pairs])
+
+
 def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
-    """Vectors over the functions of the rotation, by Wang blocks, then patterns; of one Wang block the states serve as well."""
+    """The same of one part: by Wang blocks, then patterns; of one Wang block the states serve as well."""
     rows = vectors[part.place]
     if len(part.rotor.parts) == 1:
         return rows

@@ -13,6 +13,7 @@ and third nuclei. What is odd under all half turns across the axis may mix A1 wi
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
@@ -22,9 +23,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.spins.axial import Exist
-from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_of
+from rotor.quantum.spins.blocks import Member, Plan, States, coefficients_of, diagonalised
 from rotor.quantum.spins.contraction import stacks_of
-from rotor.quantum.spins.parts import SpinPart, assigned
+from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import ALONE, Channel, RotorBlock, RotorPart
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import WangBlock
@@ -93,21 +94,30 @@ def _check_axis(block: RotorBlock, matrix: Floats) -> None:
         )
 
 
-def solve_three(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
-    """The blocks of one F, those left out in which no level exists by `exist` (see `levels.levels_of_f`)."""
-    every = plan.shared.scheme.patterns(twice_f)
-    parts = _parts(plan, every)
-    rows = _rows(parts)
-    functions = _functions(plan, every, parts, rows)
-    if not len(functions.sub_block):
-        return []
-    matrix = _matrix(plan, every, parts, rows, functions)
-    out = []
-    for members in _connected(matrix, functions.sub_block):
-        names = _names(functions, members)
-        if exist is None or exist(names[0]).any():
-            out.append(_solved(plan, twice_f, every, parts, rows, functions, members, matrix, names))
-    return out
+def allowed_states(
+    plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None
+) -> tuple[list[Member], Iterator[States]]:
+    """The blocks of all F over allowed functions, those left out in which no level exists by `exist`, and their states."""
+    members, matrices = list[Member](), list[Floats]()
+    for f, every in patterns.items():
+        parts = _parts(plan, every)
+        rows = _rows(parts)
+        functions = _functions(plan, every, parts, rows)
+        if not len(functions.sub_block):
+            continue
+        matrix = _matrix(plan, every, parts, rows, functions)
+        for chosen in _connected(matrix, functions.sub_block):
+            names, sizes = _names(functions, chosen)
+            if exist is None or exist(names).any():
+                used, products = _in_products(parts, rows, functions, chosen)
+                sub_block = np.unique(functions.sub_block[chosen], return_inverse=True)[1]
+                members.append(Member(f, used, names, sizes, Allowed(products, sub_block, names, sizes)))
+                matrices.append(matrix[np.ix_(chosen, chosen)])
+    every_states = (
+        diagonalised([number], (matrix - matrix[0, 0] * np.eye(len(matrix)))[None], matrix[:1, 0])
+        for number, matrix in enumerate(matrices)
+    )
+    return members, every_states
 
 
 def _parts(plan: Plan, every: Ints) -> list[SpinPart]:
@@ -241,60 +251,6 @@ def _names(functions: Functions, members: Ints) -> tuple[Ints, Ints]:
     stops = np.cumsum(functions.sizes)
     names = [functions.names[stops[sub] - functions.sizes[sub] : stops[sub]] for sub in subs]
     return np.concatenate(names), functions.sizes[subs]
-
-
-def _solved(
-    plan: Plan,
-    twice_f: int,
-    every: Ints,
-    parts: list[SpinPart],
-    rows: list[Row],
-    functions: Functions,
-    members: Ints,
-    matrix: Floats,
-    named: tuple[Ints, Ints],
-) -> SpinBlock:
-    own = matrix[np.ix_(members, members)]
-    if not np.isfinite(own).all():
-        raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
-    zero = own[0, 0]  # taken out of the matrix for the sake of digits
-    energies, vectors = np.linalg.eigh(own - zero * np.eye(len(own)))
-    sub = np.unique(functions.sub_block[members], return_inverse=True)[1]
-    labels, mixing = labels_of_functions(vectors, sub, *named)
-    used, products = _in_products(parts, rows, functions, members)
-    allowed = Allowed(products, sub, *named)
-    return SpinBlock(
-        twice_f, every, used, energies + zero, products @ vectors, labels, mixing, plan.shared, allowed=allowed
-    )
-
-
-def labels_of_functions(vectors: Floats, sub_block: Ints, names: Ints, sizes: Ints) -> tuple[Ints, Floats]:
-    """What states are called, and the shares of the sub-blocks that give the names.
-
-    Parameters
-    ----------
-    vectors : (functions, n) array
-        Of states with rising energies.
-    sub_block : (functions,) array of int
-        Numbers of the sub-blocks, from 0.
-    names : (functions, columns) array of int
-        v, Ka, Kc and pattern of the levels that the sub-blocks name, one after another.
-    sizes : (sub-blocks,) array of int
-        How many each names.
-
-    Returns
-    -------
-    labels : (n, columns) array of int
-        Names of the states.
-    mixing : (n,) array
-        Shares, pure numbers.
-    """
-    shares = np.zeros((len(sizes), vectors.shape[1]))
-    np.add.at(shares, sub_block, vectors**2)
-    of_state = assigned(shares, sizes)
-    labels = np.empty_like(names)
-    labels[np.argsort(of_state, kind="stable")] = names
-    return labels, np.asarray(shares[of_state, np.arange(len(of_state))])
 
 
 def _in_products(
