@@ -25,7 +25,7 @@ from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.nuclei import BY_ANGLE, Nuclei
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
-from rotor.quantum.quanta import SPECIES_NUMBERS
+from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 
 MOVED = 0.01  # relative change of a torsional constant from which the torsional functions are made anew
@@ -165,21 +165,43 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     nuclei = Nuclei.of(constants.top, constants.effects) if constants.hyperfine else None
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j" if nuclei is None else "n", "vt", "ka", "kc")])
-    numbers = {SPECIES_NUMBERS[name]: name for name in SPECIES[internal.tops]}
-    strange = ~np.isin(columns["species"], list(numbers))
-    wrong = strange | ~_exist(keys) | (keys[:, 1] > internal.functions - 2)
-    if wrong.any():
-        places = np.flatnonzero(wrong)
-        text = ", ".join(f"{name} = {columns[name][places[0]]}" for name in constants.quanta)
-        meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
-        raise MissingLevelsError(f"there is no level with {text} (species {meaning}) in this model", places)
     sums = _doubled_sums(columns, nuclei, constants.halves)
+    numbers = {SPECIES_NUMBERS[name]: name for name in SPECIES[internal.tops]}
+    meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
+    rules = [
+        (f"species: {meaning}", np.isin(columns["species"], list(numbers))),
+        (f"Ka + Kc is {'J' if nuclei is None else 'N'} or one more", _exist(keys)),
+        (f"v_t is at most {internal.functions - 2}", keys[:, 1] <= internal.functions - 2),
+        (
+            "each sum of angular momenta goes from their difference to their sum, |N - I| to N + I",
+            _coupled(keys[:, 0], sums, nuclei),
+        ),
+    ]
+    for rule, right in rules:
+        if not right.all():
+            places = np.flatnonzero(~right)
+            first = {name: int(column[places[0]]) for name, column in columns.items()}
+            text = ", ".join(f"{name} = {value_text(value, name in constants.halves)}" for name, value in first.items())
+            raise MissingLevelsError(f"there is no level with {text}: {rule}", places)
     parts = [
         LabelledSpecies(name, here, keys[here], sums[here])
         for number, name in numbers.items()
         if len(here := np.flatnonzero(columns["species"] == number))
     ]
     return TorsionLevels(tuple(constants.values), len(labels), internal, nuclei, tuple(parts))
+
+
+def _coupled(n: Ints, sums: Ints, nuclei: Nuclei | None) -> NDArray[np.bool_]:
+    """Whether twice each sum (labels, sums) follows from the sum before, first from N, and its spin."""
+    right, before = np.ones(len(n), dtype=bool), 2 * n
+    for spin, total in zip(nuclei.spins if nuclei else (), sums.T, strict=True):
+        right &= (
+            (total >= np.abs(before - spin.twice))
+            & (total <= before + spin.twice)
+            & ((total - before - spin.twice) % 2 == 0)
+        )
+        before = total
+    return right
 
 
 def _doubled_sums(columns: Mapping[str, Ints], nuclei: Nuclei | None, halves: frozenset[str]) -> Ints:
@@ -193,9 +215,10 @@ def _rows_of(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpe
     """Places of the labelled levels among those of a species; MissingLevelsError for labels that no level has."""
     rows = _rows(np.column_stack([quanta[name] for name in names]), keys)
     if (rows < 0).any():
-        missing = rows < 0
+        missing = np.flatnonzero(rows < 0)
+        label = ", ".join(f"{name} = {value}" for name, value in zip(names, keys[missing[0]].tolist(), strict=True))
         raise MissingLevelsError(
-            f"there is no level of {names[0].upper()} = {keys[missing][0, 0]} with this label", part.places[missing]
+            f"there is no level {part.name} with {label} (sums twice) in this model", part.places[missing]
         )
     return rows
 

@@ -6,7 +6,9 @@ the value, 5), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
 needed, `weight`, `blend` (one text or number for the lines of one measured frequency; without this column lines of one frequency and
 error behind each other are a blend, as in a .lin), `excluded` (yes for a line that does not count), `width_mhz` (how far the
-components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Lines in an electric field have `m_upper`,
+components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Capitals in names of columns do not matter. Of a
+molecule with internal rotation `species` and `vt` of both states may stand in one column, without `vt` all lines are of v_t = 0, J may
+stand for N, and species of one top may be A1, A2, E1, E2 or the numbers of a column `sigma`. Lines in an electric field have `m_upper`,
 `m_lower` and `field_kv_per_cm` (or `field_v_per_cm`). Of a catalogue the lines measured in a
 laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of spins, where the
 file has them, are put together at their mean by intensity. A .lne is a line list of westerfit.
@@ -41,8 +43,9 @@ from rotor.formats.spcat.text.lin import (
     without_zeros_behind,
     write_lin,
 )
+from rotor.formats.species_columns import species_number, with_species
 from rotor.formats.westerfit import read_line_table
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, SPECIES_NUMBERS, value_text
+from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, value_text
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
@@ -186,6 +189,9 @@ def _from_csv(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
 ) -> tuple[Assignments, list[str]]:
     columns, rows = _table_of(path)
+    notes: list[str] = []
+    if "species" in names:
+        columns, rows, notes = with_species(columns, rows, names)
     if "field" in names:
         rows = [_with_field(path, columns, i, row) for i, row in enumerate(rows, 1)]
         columns = [name for name in columns if name not in _FIELD] + ["field_upper", "field_lower"]
@@ -220,7 +226,7 @@ def _from_csv(
     )  # fmt: skip
     if "excluded" in columns:
         made = replace(made, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
-    return made, [] if named else _note_of_blends(made)
+    return made, notes + ([] if named else _note_of_blends(made))
 
 
 def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, str]) -> dict[str, str]:
@@ -275,7 +281,7 @@ def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, s
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: a .csv file is UTF-8 text: {error}") from None
     reader = csv.DictReader(row for row in io.StringIO(text) if row.strip() and not row.lstrip().startswith("#"))
-    columns = [name.strip() for name in reader.fieldnames or ()]
+    columns = [name.strip().lower() for name in reader.fieldnames or ()]
     reader.fieldnames = columns
     return columns, list(reader)
 
@@ -361,8 +367,8 @@ def _size(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     text = (row.get(name) or "").strip()
-    if name.startswith("species_") and text in SPECIES_NUMBERS:
-        return SPECIES_NUMBERS[text]
+    if name.startswith("species_"):
+        return species_number(path, line, name, text)
     if text.partition("/")[2] == "2":
         raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is whole here")
     value = _real(path, line, name, row)

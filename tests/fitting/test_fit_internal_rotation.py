@@ -100,8 +100,13 @@ def test_constants_are_found_again_from_lines_of_two_torsional_states():
 def test_a_label_that_no_level_has_is_named():
     constants, lines = butynoic_acid()
     labels, _, _ = levels_in(lines)
-    with pytest.raises(MissingLevelsError, match="species = 2"):
-        model_of(constants, np.vstack([labels, [[1, 0, 1, 2, 0]]]))
+    for label, text in (
+        ([1, 0, 1, 2, 0], "species = 2, .*species: 0 is A, 1 is E"),
+        ([2, 1, 3, 0, 0], "j = 2, ka = 1, kc = 3, .*Ka [+] Kc is J or one more"),
+        ([2, 1, 2, 0, 8], "vt = 8: v_t is at most 7"),
+    ):
+        with pytest.raises(MissingLevelsError, match=text):
+            model_of(constants, np.vstack([labels, [label]]))
 
 
 def principal_axes(**changes):

@@ -204,6 +204,18 @@ def test_lines_with_spins_are_fitted_from_a_table(tmp_path, call):
     )
     assert code == 0, error
     assert "chi_ab(14N)" in output
+    rows = (tmp_path / "lines.csv").read_text().splitlines()
+    place = rows[0].split(",").index("f_upper")
+    first = rows[1].split(",")
+    (tmp_path / "wrong.csv").write_text(
+        "\n".join([rows[0], ",".join([*first[:place], "9", *first[place + 1 :]]), *rows[2:]])
+    )
+    code, output, error = call(
+        "fit", str(tmp_path / "wrong.csv"), "--start", str(tmp_path / "top.toml"), "--free", free
+    )
+    assert code == 2
+    assert "wrong.csv: line 1, " in error
+    assert "f = 9: each sum of angular momenta goes from their difference to their sum" in error
 
 
 def test_a_tensor_component_across_the_mirror_plane_is_refused():

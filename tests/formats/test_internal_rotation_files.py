@@ -9,6 +9,7 @@ import pytest
 from places import ORACLES
 
 import rotor
+from rotor.formats.assigned_lines import read_assigned_lines
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
@@ -245,3 +246,32 @@ def test_raman_lines_of_both_species_have_the_strengths_of_a_rigid_top(call, tmp
     far = [row for row in turning if abs(int(row["j_initial"]) - int(row["j_final"])) == 2]  # none is elastic
     total = {name: sum(float(row[strength]) for row in far if row["species_initial"] == name) for name in "AE"}
     assert total["E"] == pytest.approx(2 * total["A"], rel=0.01)
+
+
+COLUMNS = ("n", "ka", "kc", "species", "vt", "f")
+SPELLINGS = {
+    "as spectra have them": "frequency_mhz,error_mhz,n_upper,ka_upper,kc_upper,species_upper,vt_upper,f_upper,"
+    "n_lower,ka_lower,kc_lower,species_lower,vt_lower,f_lower\n8600.1,0.01,7,1,7,E,0,13/2,6,1,6,E,0,11/2\n",
+    "J, capitals, one column of species, no v_t": "Frequency_MHz,error_khz,J_upper,Ka_upper,Kc_upper,F_upper,"
+    "J_lower,Ka_lower,Kc_lower,F_lower,sym\n8600.1,10,7,1,7,6.5,6,1,6,5.5,E1\n",
+    "sigma": "frequency_mhz,error_khz,n_upper,ka_upper,kc_upper,f_upper,n_lower,ka_lower,kc_lower,f_lower,sigma,vt\n"
+    "8600.1,10,7,1,7,13,6,1,6,11,-1,0\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", SPELLINGS.values(), ids=list(SPELLINGS))
+def test_lines_in_the_columns_that_users_write(tmp_path, text):
+    path = tmp_path / "lines.csv"
+    path.write_text(text)
+    lines, notes = read_assigned_lines(path, COLUMNS, {"f"})
+    assert lines.upper.tolist() == [[7, 1, 7, 1, 0, 13]]
+    assert lines.lower.tolist() == [[6, 1, 6, 1, 0, 11]]
+    assert lines.error_mhz.tolist() == [0.01]
+    assert [note for note in notes if "v_t = 0" in note] == ([] if "vt" in text else notes)
+
+
+def test_a_species_that_is_none_is_named_with_its_line(tmp_path):
+    path = tmp_path / "lines.csv"
+    path.write_text(SPELLINGS["sigma"].replace(",-1,", ",X,"))
+    with pytest.raises(ValueError, match="line 1 of the table: species_upper reads 'X'; expected A or E"):
+        read_assigned_lines(path, COLUMNS, {"f"})
