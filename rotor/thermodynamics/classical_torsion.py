@@ -8,6 +8,11 @@ Gaussian with the variance kT/I_red at every α, so that a molecule passes the m
 the flux of transition-state theory; here returns count as passages. ⟨p ∂H/∂p⟩ = kT and ⟨L·ω⟩ = 3kT hold at any barrier (equipartition of
 momenta); ⟨V⟩ is ½kT in a harmonic well alone, and otherwise the quadrature ∮ V exp(-V/kT) dα / ∮ exp(-V/kT) dα. Computed are tops whose
 turning leaves the moments as they are (threefold and more). Energies are in u Å²/ps², times in ps.
+
+The step is symplectic and conserves an energy H' near H. With R the largest |H(t) - H(0)| of a molecule in kT, exp(-H/kT) and exp(-H'/kT)
+differ by factors within exp(±R), and so does each rate from that of H' at both ends: the step changes k by less than k (exp(2R) - 1).
+Quantum mechanics changes it by κ = 1 + (ħω*/kT)²/24 + ..., ω*² = -V''(α*)/I_red (E. Wigner, 1932, as in the documentation of RMG-Py,
+rmgpy.kinetics.Wigner).
 """
 
 from __future__ import annotations
@@ -26,10 +31,12 @@ from rotor.classical.internal_rotor import TurningTop, turning_motion
 from rotor.geometry.rotations import IDENTITY
 from rotor.molecules.bond_rotation import BondRotation
 from rotor.quantum.bond_torsion import FourierSeries
+from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.table import Table
 
 ENERGY_PER_MHZ = units.PLANCK_J_S * 1e6 / (units.ATOMIC_MASS_KG * 1e4)  # u Å²/ps²
 ENERGY_PER_K = units.BOLTZMANN_J_PER_K / (units.ATOMIC_MASS_KG * 1e4)
+HBAR = ENERGY_PER_MHZ * 1e6 / (2 * math.pi)  # u Å²/ps
 ROWS = 50  # times of the table
 STEP = 0.15  # of the fastest angular frequency, radian
 SYMMETRIC = 0.02  # largest change of the kinetic energy with the angle, of the moment of the top: hydrogens off a threefold axis make 0.01
@@ -49,6 +56,7 @@ class ClassicalTorsion(Table):
 
     rate: passages a molecule and ps; its error is that of the mean over molecules, as one above the barrier passes it often. expected_rate:
     of the equilibrium flux. equipartition: means in kT. momentum_error: largest change of L in space, in units of its root mean square.
+    largest_energy_error_kt: largest change of the energy of a molecule. tunnelling: κ - 1.
     """
 
     temperature_k: float
@@ -63,6 +71,24 @@ class ClassicalTorsion(Table):
     expected_potential: float
     equipartition: Mapping[str, Mean]
     momentum_error: float
+    largest_energy_error_kt: float
+    tunnelling: float
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """How far the rate of passages can be trusted."""
+        rate = self.expected_rate
+        return ErrorBudget(
+            "passages",
+            "a molecule and ps",
+            ErrorTerm(rate * self.momentum_error, "largest change of L in space"),
+            ErrorTerm(
+                rate * math.expm1(2 * self.largest_energy_error_kt), "largest change of the energy of a molecule"
+            ),
+            ErrorTerm(rate * self.tunnelling, "tunnelling to first order, (ħω/kT)²/24 (Wigner)"),
+            ErrorTerm(None, "the potential has no stated error"),
+            ErrorTerm(self.rate.error, f"{self.molecules} molecules"),
+        )
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -83,7 +109,7 @@ class ClassicalTorsion(Table):
             "step_ps": self.step_ps, "passages_per_ps": self.rate.value, "passages_error_per_ps": self.rate.error,
             "passages_expected_per_ps": self.expected_rate, "energy_error_kt": self.energy_error,
             "momentum_error": self.momentum_error, "equipartition_kt": means,
-            "potential_expected_kt": self.expected_potential,
+            "potential_expected_kt": self.expected_potential, "errors": self.errors.as_json(),
         }  # fmt: skip
 
 
@@ -126,6 +152,16 @@ def _maxima(body: TurningTop) -> Floats:
     """Angles of the maxima of V in a turn; to the grid, which changes V there by 1e-6 of itself."""
     values = body.potential(ANGLES)
     return ANGLES[(values > np.roll(values, 1)) & (values >= np.roll(values, -1))]
+
+
+def _tunnelling(body: TurningTop, kt: float) -> float:
+    """κ - 1 = (ħω*/kT)²/24, the mean over the maxima of V by their share of the flux."""
+    angles = _maxima(body)
+    curvature = (body.torque(angles + 1e-4) - body.torque(angles - 1e-4)) / 2e-4  # -V'': to 1e-7 of itself
+    return float(
+        np.average(HBAR**2 * curvature / body.reduced_moment, weights=np.exp(-body.potential(angles) / kt))
+        / (24 * kt**2)
+    )
 
 
 def _mean_potential(body: TurningTop, kt: float) -> float:
@@ -203,6 +239,8 @@ def classical_torsion(
             for (name, f), m, e in zip(factors.items(), means, errors, strict=True)
         },
         moved / float(np.sqrt(np.mean(start**2))),
+        float(np.abs(samples[:, 0] - samples[0, 0]).max()) / kt,
+        _tunnelling(body, kt),
     )
 
 

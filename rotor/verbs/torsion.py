@@ -100,6 +100,7 @@ def _classical_facts(gas: ClassicalTorsion) -> list[tuple[str, str]]:
         ("equipartition", f"p ∂H/∂p {torsion.value:.3f} ± {torsion.error:.3f} kT; L·ω/3 {rotation.value:.3f} ± {rotation.error:.3f} kT"),
         ("mean V", f"{potential.value:.3f} ± {potential.error:.3f} kT; {gas.expected_potential:.3f} by quadrature, 0.5 of a harmonic well"),
         ("conserved", f"{conserved}; steps of {gas.step_ps * 1e3:.2g} fs"),
+        *top_facts.error_facts(gas.errors.as_json()),
     ]  # fmt: skip
 
 

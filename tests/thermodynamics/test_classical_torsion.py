@@ -10,6 +10,7 @@ from scipy.integrate import quad
 import rotor
 from rotor import units
 from rotor.formats import read
+from rotor.thermodynamics import classical_torsion as classical_torsion_module
 from rotor.thermodynamics.classical_torsion import ENERGY_PER_K, classical_torsion, passage_rate, turning_top
 from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
 
@@ -53,6 +54,21 @@ def test_a_gas_that_is_not_in_equilibrium_is_seen(ethane):
     assert abs(gas.equipartition["torsion"].value - 400 / 1500) > 4 * gas.equipartition["torsion"].error
 
 
+def test_errors_of_passages(ethane, monkeypatch):
+    """Tunnelling from the harmonic quantum of the well, whose curvature is that of the maximum; the step by half of it."""
+    gas = classical_torsion(ethane, 800.0, 1.0, 200, seed=4)
+    terms = gas.errors.terms
+    facts = answer_torsion(TorsionRequest(read("C2H6"), "1-2", "V3=1013 cm-1", vmax=0)).facts()
+    quantum = facts["wells"][0]["harmonic_cm"] * units.MHZ_PER_CM / (800.0 * units.MHZ_PER_K)  # ħω/kT
+    assert terms["model"].value == pytest.approx(gas.expected_rate * quantum**2 / 24, rel=1e-4)
+    assert terms["statistics"].value == gas.rate.error
+    assert 0 < terms["truncation"].value < 0.1 * gas.expected_rate
+    monkeypatch.setattr(classical_torsion_module, "STEP", classical_torsion_module.STEP / 2)
+    finer = classical_torsion(ethane, 800.0, 1.0, 200, seed=4)
+    assert finer.errors.terms["truncation"].value < 0.5 * terms["truncation"].value  # the step is of order 2
+    assert abs(finer.rate.value - gas.rate.value) <= terms["truncation"].value
+
+
 def test_the_command_prints_and_writes_the_gas(call):
     options = (
         "torsion",
@@ -69,6 +85,10 @@ def test_the_command_prints_and_writes_the_gas(call):
     code, out, err = call(*options, "--molecules", "100", "--classical-csv", "gas.csv")
     assert code == 0, err
     assert "by the equilibrium flux" in out
+    errors = [line for line in out.splitlines() if line.startswith("errors")]
+    assert len(errors) == 2
+    assert "of passages: statistics" in errors[0]
+    assert "of torsional levels: " in errors[1]
     with open("gas.csv", encoding="utf-8") as handle:
         rows = list(csv.DictReader(handle))
     assert [float(rows[i]["time_ps"]) for i in (0, -1)] == [0.0, 1.0]
