@@ -24,13 +24,13 @@ ROOT = DOCS.parent
 sys.path.insert(0, str(DOCS / "site"))
 
 CONTENTS = {
-    "Start": ["quick_start", "coming_from", "limitations", "conventions"],
-    "Notebooks": ["notebooks/*"],
-    "Command line": ["command_line", "options", "verbs/*"],
-    "Subjects": [],  # all pages of docs/ that no other part names
-    "Data": ["library", "spcat_codes", "spin_weights"],
+    "Tutorials": ["quick_start", "coming_from", "notebooks/*"],
+    "How-to": ["how_to/*"],
+    "Explanation": [],  # all pages of docs/ that no other part names
+    "Reference: command line": ["command_line", "options", "scenes", "verbs/*"],
+    "Reference: data and conventions": ["conventions", "library", "spcat_codes", "spin_weights", "migration"],
+    "Reference: API": ["api/index", "api/rotor*"],
     "Validation": ["validation/*"],
-    "API": ["api/index", "api/rotor*"],
 }
 
 
@@ -41,9 +41,10 @@ def prepare(folder: Path) -> None:
     for page in sorted(DOCS.glob("*.md")):
         text = page.read_text(encoding="utf-8")
         (folder / page.name).write_text(on_the_site(text), encoding="utf-8")
-    (folder / "validation").mkdir()
-    for page in sorted((DOCS / "validation").glob("*.md")):
-        (folder / "validation" / page.name).write_text(one_level_down(page.read_text("utf-8")), encoding="utf-8")
+    for part in ("how_to", "validation"):
+        (folder / part).mkdir()
+        for page in sorted((DOCS / part).glob("*.md")):
+            (folder / part / page.name).write_text(one_level_down(page.read_text("utf-8")), encoding="utf-8")
     (folder / "verbs").mkdir()
     for verb in verbs():
         (folder / "verbs" / f"{verb}.md").write_text(one_level_down(verb_page(verb)), encoding="utf-8")
@@ -67,7 +68,7 @@ def on_the_site(text: str) -> str:
 
 
 def one_level_down(text: str) -> str:
-    """Links of a page of docs/validation or docs/verbs: to pages and pictures of the site, elsewhere the name of the file alone."""
+    """Links of a page in a folder of docs: to pages and pictures of the site, elsewhere the name of the file alone."""
     text = re.sub(r"\]\(\.\./\.\./CONVENTIONS\.md\)", "](../conventions.md)", text)
     text = text.replace("```mermaid", "```text")  # Sphinx has no drawing of it
     return re.sub(r"\[([^\]]+)\]\(\.\./\.\./[^)]*\)", r"\1", text)

@@ -76,7 +76,7 @@ def test_links_stay_on_the_site(pages):
     assert SITE.on_the_site("[a](../examples/04_free_rotation.py)") == "[a](notebooks/04_free_rotation.ipynb)"
     assert SITE.one_level_down("[a](../../CONVENTIONS.md)") == "[a](../conventions.md)"
     assert SITE.on_the_site("see [`data/levels/`](../data/levels).") == "see `data/levels/`."
-    for page in [*pages.glob("*.md"), *pages.glob("verbs/*.md")]:
+    for page in [*pages.glob("*.md"), *pages.glob("verbs/*.md"), *pages.glob("how_to/*.md")]:
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
             assert target.startswith("http") or (page.parent / target).exists(), f"{page.name}: {target}"
 
