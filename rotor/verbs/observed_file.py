@@ -77,7 +77,7 @@ class SpectrumFile:
 
     @property
     def choices(self) -> Any:
-        """What a reader of spectra is told."""
+        """The settings with which a file of spectra is read."""
         from rotor.formats.spectra.axis import ReadChoices
 
         pixel = None if self.pixel is None else (int(self.pixel[0]), int(self.pixel[1]))

@@ -1,4 +1,4 @@
-"""What `rotor emission --over` and `--fit` are told, and what a model or a fit begins with."""
+"""The inputs of `rotor emission --over` and `--fit`, and the start of a model or a fit."""
 
 from __future__ import annotations
 
