@@ -99,9 +99,10 @@ def are_trusted(top: Top, levels: Levels, ground_mhz: float | None = None) -> ND
 def _above_the_ground(levels: Levels, ground_mhz: float | None) -> NDArray[np.bool_]:
     """Levels of every J but those that have one below all of low J, or below the ground given for levels without low J."""
     low = levels.rotational <= GROUND_J
-    if not low.any() and ground_mhz is None:
+    ground = levels.energy_mhz[low].min() if low.any() else ground_mhz
+    if ground is None:
         return np.ones(len(levels), dtype=np.bool_)
-    fallen = levels.energy_mhz < (levels.energy_mhz[low].min() if low.any() else ground_mhz)
+    fallen = levels.energy_mhz < ground
     return ~np.isin(levels.rotational, levels.rotational[fallen])
 
 

@@ -120,7 +120,7 @@ def answer(request: ObservedRequest, work: Work) -> Mapped:
         cube = cube.between(*request.range_mhz)
     peak = np.max(np.where(np.isfinite(cube.intensity_k), cube.intensity_k, -np.inf), axis=0)
     shape = cube.noise_k.shape
-    chosen = peak > 5 * cube.noise_k if request.mask is None else read_mask(Path(request.mask), shape)  # type: ignore[arg-type]
+    chosen = peak > 5 * cube.noise_k if request.mask is None else read_mask(Path(request.mask), shape)
     chosen = chosen & np.isfinite(cube.noise_k)
     if not chosen.any():
         where = (

@@ -182,7 +182,7 @@ def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
 
 def _namer_of_allowed(allowed: Allowed) -> Namer:
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return labels_by_shares(allowed.names[None], allowed.sizes[None], vectors[None])[0][0]
+        return np.asarray(labels_by_shares(allowed.names[None], allowed.sizes[None], vectors[None])[0][0])
 
     return namer
 
