@@ -242,7 +242,8 @@ def _magnetic(file: MoleculeFile) -> MagneticTensors | None:
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
     """Write lines, a catalogue, or any table of the package; the suffix of `path` names the format.
 
-    Lines: .cat, .cat.gz, .hitran, .csv, .parquet, .json; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; these and every
+    Lines: .cat, .cat.gz, .hitran, .csv, .parquet, .json, and .states, ExoMol's, with .trans and .pf beside; catalogue: .cat, .cat.gz;
+    HITRAN's lines: .hitran; these and every
     other table (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of
     equipartition, runs of a fluid): .csv, .parquet, .json; levels that were selected (`answer_levels`): .egy too. An existing
     file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,

@@ -206,3 +206,27 @@ def test_every_catalogue_of_the_reference_is_parsed(tmp_path: Path) -> None:
     assert (len(report), [one for one in report if one.fault], sum(one.lines for one in report)) == (105, [], 3496)
     with LineCatalogue(tmp_path / "a.rotorcat") as catalogue:
         assert not any(catalogue.species().facts["note"])
+
+
+def test_a_fault_leaves_what_the_source_gave_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces are stored as they come; a fault in the last one takes them out again."""
+    from rotor.formats.catalogue import build, exomol
+
+    monkeypatch.setattr(exomol, "PIECE_BYTES", 10)
+    monkeypatch.setattr(build, "_CHECKPOINT_LINES", 1)
+    path, states = tmp_path / "a.rotorcat", "1 0.0 1 0\n2 3.8 3 1\n3 11.5 5 2\n"
+    source = exomol_source(tmp_path, states, "2 1 1e-7\n3 2 1e-6\n")
+    assert [one.lines for one in add_sources(path, [source])] == [2]
+    (report,) = add_sources(path, [exomol_source(tmp_path, states, "3 2 2e-6\n2 1 2e-7\n9 1 1e-7\n")])
+    assert "state 9 is not in" in str(report.fault)
+    with LineCatalogue(path) as catalogue:
+        assert len(catalogue) == 2
+        (species,) = catalogue.species_between(0.0, 1e9)
+        assert species.einstein_a_per_s == pytest.approx([1e-7, 1e-6], rel=1e-12)
+    add_sources(path, [exomol_source(tmp_path, states, "3 2 2e-6\n")])
+    with LineCatalogue(path) as catalogue:
+        assert (len(catalogue), catalogue.species().facts["lines"].tolist()) == (1, [1])
+
+
+def exomol_source(folder: Path, states: str, trans: str) -> str:
+    return str(exomol(folder, states, trans))

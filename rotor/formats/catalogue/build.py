@@ -32,6 +32,7 @@ LIBRARY = "library"
 _LIBRARY_K = 300.0
 _LIBRARY_CUT = -9.0  # LGINT at 300 K
 _LIBRARY_MHZ = 3e6
+_CHECKPOINT_LINES = 1_000_000  # after which what is in the log of the database goes into its file
 Progress = Callable[[str], None]
 
 
@@ -190,24 +191,27 @@ def _library_batch(name: str) -> Batch:
 
 
 def _add(engine: DuckDBPyConnection, name: str, read: Callable[[], Batch], facts: SourceFacts) -> Added:
-    """One source; all of it or, with a fault, nothing."""
-    engine.execute("BEGIN")
+    """One source; all of it or, with a fault, nothing.
+
+    Pieces are stored as they come, since a transaction of all of them would stand in memory: what a source gave before is removed when
+    all is entered, and what was entered when there is a fault.
+    """
+    first = int(scalar(engine, "SELECT coalesce(max(number), 0) + 1 FROM species"))
     try:
         batch = read()
-        species = _entered(engine, batch, facts)
-        engine.execute("COMMIT")
-        return species
+        added = _entered(engine, batch, facts)
     except (ValueError, OSError) as error:
-        engine.execute("ROLLBACK")
+        _remove(engine, "number >= ?", first)
         return Added(name, fault=str(error))
+    _remove(engine, f"number < {first} AND source = ?", batch.source)
+    return added
 
 
 def _entered(engine: DuckDBPyConnection, batch: Batch, facts: SourceFacts) -> Added:
-    _remove(engine, batch.source)
     numbers: dict[str, int] = {}
     texts: dict[str, int] = {}
     first = None if batch.states is None else _new_states(engine, batch.states)
-    total = 0
+    total = stored = 0
     for piece in batch.pieces:
         if piece.name not in numbers:
             numbers[piece.name] = _species(engine, piece, batch.source, facts)
@@ -218,6 +222,10 @@ def _entered(engine: DuckDBPyConnection, batch: Batch, facts: SourceFacts) -> Ad
         )
         _insert(engine, piece, numbers[piece.name], upper, lower)
         total += len(piece)
+        stored += len(piece)
+        if stored >= _CHECKPOINT_LINES:
+            engine.execute("CHECKPOINT")
+            stored = 0
     if not numbers:
         raise ValueError(f"{batch.source}: no lines")
     for number in numbers.values():
@@ -228,9 +236,9 @@ def _entered(engine: DuckDBPyConnection, batch: Batch, facts: SourceFacts) -> Ad
     return Added(batch.source, ", ".join(numbers), total)
 
 
-def _remove(engine: DuckDBPyConnection, source: str) -> None:
-    """The lines that a source gave before."""
-    for (number,) in engine.execute("SELECT number FROM species WHERE source = ?", [source]).fetchall():
+def _remove(engine: DuckDBPyConnection, condition: str, value: Any) -> None:
+    """Species that a condition means, with their lines."""
+    for (number,) in engine.execute(f"SELECT number FROM species WHERE {condition}", [value]).fetchall():
         for table in ("lines", "partition"):
             engine.execute(f"DELETE FROM {table} WHERE species = ?", [number])
         engine.execute("DELETE FROM species WHERE number = ?", [number])
