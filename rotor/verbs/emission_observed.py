@@ -85,16 +85,19 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
 
 
 def _diagrams(spectrum: ObservedSpectrum, fit: SourceFit, work: Work) -> Any:
-    """Rotational diagrams of the fitted species; a note for each that has none, NoAnswerError where none has."""
-    from rotor.checks import NoAnswerError
+    """Rotational diagrams of the fitted species; a note for each that has none."""
     from rotor.observed.diagrams import species_diagrams
 
     diagrams = species_diagrams(spectrum, fit.components, fit.sight)
     for text in diagrams.notes:
         work.note(f"no rotational diagram of {text}")
-    if not diagrams.names:
-        raise NoAnswerError("--diagram: no species has a rotational diagram")
     return diagrams
+
+
+def withheld(answer: Observed | Mapped, names: Sequence[str]) -> dict[str, str]:
+    """Why there is no picture of diagrams: the fit is printed all the same."""
+    empty = isinstance(answer, Observed) and answer.diagrams is not None and not answer.diagrams.names
+    return {"diagram": "no species has a rotational diagram"} if empty and "diagram" in names else {}
 
 
 def _fitted(
@@ -158,7 +161,7 @@ def show(answer: Observed | Mapped, _: Report) -> None:
         show_table(Table("model", columns, [_component_cells(component) for component in answer.components], LEFT))
     else:
         _show_fit(answer.fit, answer.needed, answer.chain)
-    if answer.diagrams is not None:
+    if answer.diagrams is not None and answer.diagrams.names:
         print()
         show_table(_diagram_table(answer.diagrams.facts()))
 
@@ -229,6 +232,7 @@ OBSERVED = Tool(
         Output("maps", (".fits",), "Fit every pixel of a cube and write maps of the parameters", emission_cube.write),
     ),
     check=emission_cube.refuse,
+    withheld=withheld,
     workers="rows of a cube",
     instead="--over, --fit and their options",
 )

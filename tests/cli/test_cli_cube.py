@@ -159,6 +159,16 @@ def test_rotational_diagram_of_a_pixel(call, folder):
     assert (folder / "d.csv").read_text().startswith("species,frequency_mhz,energy_upper_k,log_population")
 
 
+def test_a_fit_without_a_diagram_is_printed(call, folder):
+    """A single line in the range: a note, no picture, and the fit all the same."""
+    picture = folder / "d.png"
+    code, out, err = call(*command(folder, "--pixel", "2,2", "--range", "230220:230245", "--diagram", str(picture)))
+    assert code == 0, err
+    assert "fitted parameters" in out
+    assert "not written: no species has a rotational diagram" in err
+    assert not picture.exists()
+
+
 def test_corner_of_a_sample(call, folder):
     pytest.importorskip("emcee")
     pytest.importorskip("corner")
