@@ -211,7 +211,7 @@ def assign_series(state: State, message: Message, context: Context) -> tuple[str
         )
     count = sum(record is not None for record in changes.values())
     context.notes.append(f"{count} of {len(centres.number)} rows assigned")
-    return f"assign a series ({count} lines)", changes
+    return f"assign a series ({counted(count, 'line')})", changes
 
 
 def remove(state: State, message: Message, context: Context) -> tuple[str, dict[str, Record | None]]:
@@ -422,9 +422,15 @@ def import_lines(
         _refuse_other_labels(state, species_number, record, context)
         model = context.predictions.model(record)
     read, remarks = read_assigned_lines(path, model.quanta, model.halves)
-    _refuse_many(state, len(read))
     context.notes.extend(remarks)
-    lines = lines_from(read, species_number, free_blend(state), state.settings.default_error_mhz)
+    every = lines_from(read, species_number, free_blend(state), state.settings.default_error_mhz)
+    known = {(line.upper, line.lower, line.frequency_mhz) for line in state.lines_of(species_number).values()}
+    lines = [line for line in every if (line.upper, line.lower, line.frequency_mhz) not in known]
+    if len(lines) < len(every):  # the same file, named again when the session is resumed
+        context.notes.append(
+            f"{path}: {counted(len(every) - len(lines), 'line is', 'lines are')} in the session already"
+        )
+    _refuse_many(state, len(lines))
     first = state.free_number("line")
     changes: dict[str, Record | None] = {line_key(first + place): line for place, line in enumerate(lines)}
     return f"read {len(lines)} lines", {**changes, species_key(species_number): record}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -20,6 +20,9 @@ from rotor.viewer.records import FitSummary, Line, Species
 
 MOST_DIFFERENCES = 300
 POOR_RMS = 1e9  # a poor fit is shown with its residuals, not refused
+POOR = 3.0  # weighted rms above which a wrong assignment is looked for
+BETTER = 0.3  # of the weighted rms, to which it falls without a wrong line
+TRIED = 3  # lines that are left out in turn
 
 
 def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
@@ -85,6 +88,31 @@ def fit_of(model: Model, lines: Mapping[int, Line]) -> Fit:
     return fit_lines(assigned, begin, parameters(begin, list(record.free)), FitOptions(poor_rms=POOR_RMS))
 
 
+def suspect(
+    fit: Fit, numbers: Sequence[int], again: Callable[[Assignments], Fit]
+) -> tuple[tuple[int, ...], float | None]:
+    """The lines, by number, of one measured frequency without which a poor fit is good, and the weighted rms then; empty without such.
+
+    To first order χ² falls by r²/(1 - h) when a datum of the weighted residual r and the leverage h is left out; the first few by
+    that number are left out in turn, and fitted `again`. numbers: of the lines of the fit.
+    """
+    if not fit.weighted_rms > POOR or fit.degrees_of_freedom < 2:
+        return (), None
+    count = len(fit.groups)
+    left = 1 - fit.statistics.leverages[:count]
+    falls = np.where(left > 1e-9, fit.residuals[:count] ** 2 / np.maximum(left, 1e-9), 0.0)
+    best: tuple[tuple[int, ...], float | None] = ((), BETTER * fit.weighted_rms)
+    for place in np.argsort(-falls)[:TRIED].tolist():
+        members = fit.lines.blend == fit.lines.blend[fit.groups[place]]
+        try:
+            without = again(replace(fit.lines, excluded=fit.lines.is_excluded | members))
+        except ValueError:
+            continue  # too few lines are left
+        if without.converged and best[1] is not None and without.weighted_rms < best[1]:
+            best = (tuple(numbers[i] for i in np.flatnonzero(members & fit.used)), without.weighted_rms)
+    return best if best[0] else ((), None)
+
+
 def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
     """The record after a refit: constants with their errors, and the summary of the fit."""
     record, fit = model.record, fit_of(model, lines)
@@ -92,6 +120,13 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
         raise ValueError(f"{record.name}: the fit did not converge: {fit.reason}; the constants stay as they are")
     fitted = fit.named
     rms, weighted = fit.rms_mhz(), fit.weighted_rms
+    lines_apart, rms_without = suspect(
+        fit,
+        list(lines),
+        lambda chosen: fit_lines(
+            chosen, with_names(model.constants, list(record.free)), fit.parameters, FitOptions(poor_rms=POOR_RMS)
+        ),
+    )
     summary = FitSummary(
         converged=True,
         reason=fit.reason,
@@ -101,6 +136,8 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
         before=dict(record.constants),
         open=tuple(combination.text for combination in fit.statistics.undetermined),
         notes=fit.notes,
+        suspect=lines_apart,
+        rms_without=rms_without,
     )
     errors = {name: error for name, error in fitted.uncertainties.items() if math.isfinite(error)}
     return msgspec.structs.replace(record, constants=dict(fitted.values), errors=errors, fit=summary)

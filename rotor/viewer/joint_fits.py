@@ -28,7 +28,7 @@ from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.top_constants import ConstantSet
 from rotor.fitting.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
-from rotor.viewer.fits import POOR_RMS, assignments_of, refitted
+from rotor.viewer.fits import POOR_RMS, assignments_of, refitted, suspect
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species, State
 
@@ -126,14 +126,20 @@ def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Sp
     if not any(part.free.names for part in parts):
         raise ValueError(f"{names}: no constant is free; mark those that the lines should determine")
     lines = _joined_lines(parts, names)
-    fit = fit_lines(
-        lines, None, _joined_parameters(parts), FitOptions(poor_rms=POOR_RMS), model=partial(JointLevels, parts)
+    fit_of = partial(
+        fit_lines,
+        constants=None,
+        parameters=_joined_parameters(parts),
+        options=FitOptions(poor_rms=POOR_RMS),
+        model=partial(JointLevels, parts),
     )
+    fit = fit_of(lines)
     if not fit.converged:
         raise ValueError(f"{names}: the fit did not converge: {fit.reason}; the constants stay as they are")
+    wrong = suspect(fit, [number for part in parts for number in part.lines], fit_of)
     places = np.cumsum([0, *(len(part.free.names) for part in parts)]).tolist()
     return {
-        part.number: _record(part, fit, slice(a, b), names)
+        part.number: _record(part, fit, slice(a, b), names, wrong)
         for part, a, b in zip(parts, places, places[1:], strict=False)
         if part.free.names
     }
@@ -196,7 +202,7 @@ def _joined_lines(parts: Sequence[Part], source: str) -> Assignments:
     return replace(joined, excluded=np.array([line.rejected for _, line in owners], dtype=bool))
 
 
-def _record(part: Part, fit: Fit, columns: slice, names: str) -> Species:
+def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: tuple[tuple[int, ...], float | None]) -> Species:
     """A species after the fit: its constants with their errors, and how the fit describes its lines."""
     free, record = part.free, part.model.record
     values = dict(zip(free.constant_names, free.constants_of(fit.values[columns]).tolist(), strict=True))
@@ -211,7 +217,7 @@ def _record(part: Part, fit: Fit, columns: slice, names: str) -> Species:
         record,
         constants={**dict(part.begin.values), **values},
         errors={name: error for name, error in errors.items() if math.isfinite(error)},
-        fit=_summary(part, fit, names),
+        fit=msgspec.structs.replace(_summary(part, fit, names), suspect=wrong[0], rms_without=wrong[1]),
     )
 
 
@@ -255,13 +261,13 @@ def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[st
     for members in _blends(state).values():
         mean = sum(share * calculated[n] for n, share in members.items())
         means |= dict.fromkeys(members, mean)
-    out = dict[int, dict[str, Any]]()
+    out, every = dict[int, dict[str, Any]](), state.lines
     for n, mean in means.items():
         there = math.isfinite(mean)
         out[n] = {
             "label": labels[n],
             "calculated_mhz": mean if there else None,
-            "difference_mhz": state.lines[n].frequency_mhz - mean if there else None,
+            "difference_mhz": every[n].frequency_mhz - mean if there else None,
         }
     return out
 

@@ -18,7 +18,7 @@ const KEYS = [
   ["Delete", "remove the selected line"], ["r", "refit"], ["u, Ctrl+Z", "undo"], ["y, Ctrl+Y", "redo"],
     ["w", "open or close a second window"],
   ["m", "prediction mirrored or overlaid"], ["s", "height of the sticks: of this window or of the whole band"],
-    ["l", "residuals or Loomis-Wood rows"],
+    ["l", "residuals or Loomis-Wood rows"], ["PageDown PageUp", "next, previous Loomis-Wood row (f fits its peak)"],
   ["1 … 5", "panels"], ["t", "light or dark"], ["? Esc", "show, hide these keys"],
 ];
 const EXPORTS = [
@@ -26,6 +26,7 @@ const EXPORTS = [
     ["toml", "Molecule file (.toml)"],
   ["scene", "Scene of the fit (.toml)"], ["fit", "Report of the fit"], ["md", "Table (Markdown)"], ["tex", "Table (LaTeX)"],
 ];
+const ROWS = 50; // Loomis-Wood rows at once
 const TABS = ["Assign", "Lines", "Constants", "Series", "Levels"];
 
 // --- Small tools
@@ -43,19 +44,44 @@ function h(tag, attributes = {}, ...children) {
 }
 const fixed = (value, digits) => (value == null || !isFinite(value) ? "–" : value.toFixed(digits));
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-const quantum = (q, name,
-  halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`) : name === "species" ? "AE"[q] ?? `${q}` : `${q}`);
-const HEAD = { j: "J", ka: "Ka", kc: "Kc", k: "K", n: "N", f: "F", f1: "F1", v: "v", i_tot: "I" };
+const SPECIES = { A: 0, E: 1, AA: 10, AE: 11, EA: 12, EE: 13, "EE*": 14 }; // of the permutations of turning groups
+const quantum = (q, name, halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`)
+  : name === "species" ? Object.keys(SPECIES).find((letter) => SPECIES[letter] === q) ?? `${q}` : `${q}`);
+const HEAD = { j: "J", ka: "Ka", kc: "Kc", k: "K", n: "N", f: "F", vt: "vt", i_tot: "I", i_sym: "Γ" };
+const headOf = (name) => HEAD[name] ?? name.replace(/^f(?=\d)/, "F");
 const digitsOf = (error, value) => (error > 0 ? clamp(Math.ceil(-Math.log10(error)) + 1, 0, 12) : value && Math.abs(value) < 1 ? 9 : 4);
 const short = (value) => (value >= 1e-4 && value < 1e5 ? value.toFixed(clamp(1 - Math.floor(Math.log10(value)), 0,
   9)) : value.toExponential(1));
 const percent = (part) => (part >= 0.1 ? (100 * part).toFixed(0) : (100 * part).toPrecision(2));
 const frame = () => new Promise((done) => requestAnimationFrame(done));
 
-function ints(text) { // "3 0 3", "3,0,3"
+function number(word, name, halves) { // one quantum number: 3, 5/2 or 2.5 (stored doubled), E
+  if (name === "species" && word in SPECIES) return SPECIES[word];
+  const value = /^-?\d+\/2$/.test(word) ? parseInt(word, 10) / 2 : Number(word), stored = halves.includes(name) ? 2 * value : value;
+  if (word === "" || !Number.isInteger(stored)) throw new Error(`'${word}': ${headOf(name)} is ${name === "species"
+    ? Object.keys(SPECIES).join(", ") : halves.includes(name) ? "a half-integer such as 5/2, or a whole number" : "a whole number"}`);
+  return stored;
+}
+function numbers(text, { names, halves }, step = false) { // "3 0 3", "3,0,3", of a step a difference in place of a letter
   const words = text.trim().split(/[\s,]+/).filter(Boolean);
-  if (!words.length || words.some((word) => !/^-?\d+$/.test(word))) throw new Error(`'${text}': whole numbers are needed, such as 3 0 3`);
-  return words.map(Number);
+  if (words.length !== names.length) throw new Error(`'${text}': ${names.length} quantum numbers are needed: ${names.map(headOf).join(" ")}`);
+  return words.map((word, i) => number(word, step && names[i] === "species" ? "" : names[i], halves));
+}
+
+const CONDITION = /^([Δd]?)([a-z]\w*)(['"]?)(<=|>=|=|<|>)(-?[\d./]+|[AE]+\*?)$/i;
+function fits(line, word, known) { // Ka=0, J">5, dJ=1: of the upper level, the lower one, their difference; null for other words
+  const part = CONDITION.exec(word), i = part ? known.names.indexOf(part[2].toLowerCase()) : -1;
+  if (i < 0) return null;
+  const value = part[1] ? line.upper[i] - line.lower[i] : (part[3] === '"' ? line.lower : line.upper)[i];
+  let than;
+  try { than = number(part[5].toUpperCase(), part[1] ? known.names[i].replace("species", "") : known.names[i], known.halves); } catch { return false; }
+  return { "=": value === than, "<": value < than, ">": value > than, "<=": value <= than, ">=": value >= than }[part[4]];
+}
+function inSeries(line, series) { // whether a line stands n steps from the first line of a series
+  const { upper, lower, step } = series ?? {}, at = step?.findIndex((one) => one !== 0) ?? -1;
+  if (at < 0 || line.species !== series.species) return false;
+  const n = (line.upper[at] - upper[at]) / step[at];
+  return Number.isInteger(n) && step.every((one, i) => line.upper[i] - upper[i] === n * one && line.lower[i] - lower[i] === n * one);
 }
 
 // --- Transports: call(message) gives an answer; onsession is called with the session after each change
@@ -112,7 +138,7 @@ export class StaticTransport { // an exported page: numbers inside, nothing comp
   async call(message) {
     if (message.do === "hello") return this.data.hello;
     if (message.do === "window") return this.window(message);
-    if (message.do === "loomis_wood") return this.data.loomis_wood;
+    if (message.do === "loomis_wood") return { ...this.data.loomis_wood, total: this.data.loomis_wood.rows.length };
     if (message.do === "levels") return this.data.levels[message.species] ?? { levels: [], differences: [] };
     throw new Error("an exported page shows what was saved; `rotor view` with the session file computes");
   }
@@ -414,7 +440,7 @@ class LoomisWood extends Plot {
     super(app, place, { label: "Loomis-Wood rows of a series" });
     const f = this.figure;
     this.half = app.transport.data?.loomis_wood.half_width_mhz ?? Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = [];
-      this.busy = false;
+      this.busy = false; this.first = 0; this.row = null; this.total = 0; this.count = ROWS;
     f.xaxis.axis_label = "distance from the expected line (MHz)";
     f.yaxis.visible = false; f.ygrid.visible = false;
     this.traces = this.source({ xs: [], ys: [] });
@@ -426,6 +452,8 @@ class LoomisWood extends Plot {
     f.scatter({ field: "x" }, { field: "y" }, { source: this.marks, marker: { field: "marker" }, size: 9, line_color: { field: "color" },
       fill_color: { field: "color" } });
     this.middle = new Bokeh.Span({ location: 0, dimension: "height", line_width: 1, line_dash: [4, 4] });
+    this.band = new Bokeh.BoxAnnotation({ bottom: 0, top: 0, fill_alpha: 0.12, visible: false });
+    f.add_layout(this.band);
     this.chosen = new Bokeh.BoxAnnotation({ left: 0, right: 0, fill_alpha: 0.2, visible: false });
     f.add_layout(this.middle); f.add_layout(this.chosen);
     this.onselect = (a, b, y) => { this.chosen.visible = false; const row = this.rowAt(y);
@@ -439,8 +467,23 @@ class LoomisWood extends Plot {
     super.theme();
     const pen = PEN[this.app.theme];
     this.traceGlyph.glyph.line_color = pen.trace; this.textGlyph.glyph.text_color = pen.ink; this.middle.line_color = pen.mark;
-    this.chosen.fill_color = pen.select;
+    this.chosen.fill_color = pen.select; this.band.fill_color = pen.select; this.band.line_color = pen.select;
     this.draw();
+  }
+  async turn(by, row = null) { // other rows where there are more than are drawn
+    const first = clamp(this.first + by, 0, Math.max(this.total - this.count, 0));
+    if (first === this.first) return;
+    this.first = first; this.row = row;
+    await this.load();
+  }
+  async next(by) { // the next row: marked, its line shown in the spectrum
+    let row = this.row == null ? (by > 0 ? 0 : this.rows.length - 1) : this.row + by;
+    if (row >= this.rows.length && this.first + this.rows.length < this.total) { await this.turn(this.count); row = this.row ?? 0; }
+    else if (row < 0 && this.first > 0) { await this.turn(-this.count); row = this.rows.length - 1; }
+    if (!this.rows[row]) return;
+    this.row = row; this.draw();
+    this.app.show(this.rows[row].centre_mhz, this.app.active);
+    this.app.say(`Row ${this.rows[row].n}: f fits its peak`);
   }
   rowAt(y) { return this.rows[Math.round(-y - 0.3)] ?? null; }
   async load() {
@@ -448,8 +491,11 @@ class LoomisWood extends Plot {
     this.busy = true;
     try {
       const answer = await this.app.transport.call({ do: "loomis_wood", half_width_mhz: this.half,
-        pixels: Math.round((this.box.width || 500) * 0.8), rows: 50, preview: this.app.preview ?? undefined });
-      this.rows = answer.rows; this.total = answer.total;
+        pixels: Math.round((this.box.width || 500) * 0.8), rows: this.count, first_row: this.first, preview: this.app.preview ?? undefined });
+      this.rows = answer.rows; this.total = answer.total ?? answer.rows.length;
+      if (!this.rows.length && this.first) { this.first = 0; this.again = true; }
+      if (this.row >= this.rows.length) this.row = null;
+      this.app.woodPage();
       this.draw();
     } catch (error) { this.app.say(error.message, true); }
     this.busy = false;
@@ -458,18 +504,19 @@ class LoomisWood extends Plot {
   draw() {
     const app = this.app, xs = [], ys = [], texts = { x: [], y: [], text: [] }, marks = { x: [], y: [], color: [], marker: [] };
     const colors = PALETTE[app.theme], series = app.settings.series;
+    const every = Math.ceil((12 * this.rows.length) / (this.box.height || 300)); // so that labels do not overlap
     this.rows.forEach((row, i) => {
       let low = Infinity, high = -Infinity;
       for (const value of row.y) { if (value < low) low = value; if (value > high) high = value; }
       const unit = (0.85 * this.scale) / (high - low || 1);
       xs.push(row.x); ys.push(row.y.map((value) => Math.min((value - low) * unit, 1.4) - i - 0.7));
-      texts.x.push(-0.99 * this.half); texts.y.push(-i - 0.56);
-      texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
+      if (i % every === 0) texts.x.push(-0.99 * this.half), texts.y.push(-i - 0.56), texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
       if (row.at != null && Math.abs(row.at) < this.half) { marks.x.push(row.at); marks.y.push(-i - 0.8);
         marks.color.push(colors[(app.species[series?.species]?.colour ?? 0) % colors.length]);
         marks.marker.push(row.rejected ? "x" : "triangle"); }
     });
     this.traces.data = { xs, ys }; this.texts.data = texts; this.marks.data = marks;
+    this.band.visible = this.row != null; this.band.top = 0.25 - (this.row ?? 0); this.band.bottom = -0.75 - (this.row ?? 0);
     this.figure.x_range.setv({ start: -this.half, end: this.half });
     this.figure.y_range.setv({ start: -Math.max(this.rows.length, 3) - 0.1, end: 0.6 });
   }
@@ -539,8 +586,8 @@ export class App {
   }
   lostText(text) { if (this.banner) { this.banner.textContent = text; this.banner.hidden = !text; } }
   name(line) { return this.species[line.species]?.name ?? "?"; }
-  label(q, species) { const known = this.quanta[species] ?? { names: [], halves: [] };
-    return q.map((value, i) => quantum(value, known.names[i], known.halves)).join(" "); }
+  known(species) { return this.quanta[species] ?? { names: [], halves: [] }; }
+  label(q, species) { const { names, halves } = this.known(species); return q.map((value, i) => quantum(value, names[i], halves)).join(" "); }
   text(line) { return `${this.label(line.upper, line.species)} ← ${this.label(line.lower, line.species)}`; }
 
   // Building
@@ -575,10 +622,14 @@ export class App {
     this.woodTools = h("span", { class: "group", hidden: true },
       h("label", {}, "± MHz ", h("input", { type: "number", min: "0.001", step: "any", style: "width:6em", "data-field": "half",
         onchange: (event) => { this.wood.half = Math.abs(Number(event.target.value)) || 1; this.wood.load(); } })),
+      h("label", {}, "rows ", h("input", { type: "number", min: "1", max: "200", value: `${ROWS}`, style: "width:4.5em", "data-field": "rows",
+        onchange: (event) => { this.wood.count = clamp(Math.round(Number(event.target.value)) || ROWS, 1, 200); this.wood.load(); } })),
       h("label", {}, "height ", h("input", { type: "range", min: "-1", max: "2", step: "0.1", value: "0",
         oninput: (event) => { this.wood.scale = 10 ** Number(event.target.value); this.wood.draw(); } })),
       live && button("Assign all rows", "a peak within a fifth of the half width of each expected line",
-        () => this.do({ do: "assign_series", tolerance_mhz: this.wood.half / 5 })));
+        () => this.do({ do: "assign_series", tolerance_mhz: this.wood.half / 5 })),
+      this.woodPages = h("span", { class: "group", hidden: true }, button("▲", "earlier rows", () => this.wood.turn(-this.wood.count), { "aria-label": "Earlier rows" }),
+        h("output", {}), button("▼", "later rows", () => this.wood.turn(this.wood.count), { "aria-label": "Later rows" })));
     this.tabButtons = TABS.map((name, i) => button(name, `${i + 1}`, () => this.showTab(name),
       { role: "tab", id: `tab-${name}`, "aria-controls": "panel" }));
     this.panel = h("div", { class: "panel", id: "panel", role: "tabpanel", tabindex: "0" });
@@ -674,6 +725,12 @@ export class App {
     if (load && wood) { this.woodTools.querySelector("[data-field=half]").value = this.wood.half; this.wood.load(); }
   }
 
+  woodPage() { // which of many rows are drawn
+    const { first, rows, total } = this.wood;
+    this.woodPages.hidden = total <= this.wood.count;
+    this.woodPages.querySelector("output").textContent = `${first + 1}–${first + rows.length} of ${total}`;
+  }
+
   // Assigning
 
   async fitPeak(first, last, one, row = null) {
@@ -704,8 +761,12 @@ export class App {
     const reach = Math.max(8 * this.info.channel_mhz, (one.last - one.first) / 40);
     return this.fitPeak(line.frequency_mhz - reach, line.frequency_mhz + reach, one);
   }
-  fitMiddle() { const w = this.active, middle = w.cursor.visible ? w.cursor.location : (w.first + w.last) / 2,
-    reach = Math.max(8 * this.info.channel_mhz, (w.last - w.first) / 40); return this.fitPeak(middle - reach, middle + reach, w); }
+  fitMiddle() {
+    const w = this.active, { row: at, rows, half } = this.wood, row = this.pane === "wood" && at != null ? rows[at] : null;
+    if (row && w.cursor.visible && w.cursor.location === row.centre_mhz) return this.fitPeak(row.centre_mhz - half / 5, row.centre_mhz + half / 5, w, row);
+    const middle = w.cursor.visible ? w.cursor.location : (w.first + w.last) / 2, reach = Math.max(8 * this.info.channel_mhz, (w.last - w.first) / 40);
+    return this.fitPeak(middle - reach, middle + reach, w);
+  }
   async assign() {
     const { peak, candidates, marked } = this.offered ?? {};
     const chosen = [...(marked ?? [])].map((i) => candidates[i]);
@@ -757,6 +818,12 @@ export class App {
     await frame();
     const fitted = Object.values(this.species).filter((one) => one.fit);
     this.say(fitted.map(({ name, fit }) => `${name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`).join("; "));
+    const wrong = fitted.find((one) => one.fit.suspect?.length);
+    if (wrong) { this.selectLine(wrong.fit.suspect[0], true); this.say(this.suspicion(wrong.fit), true); }
+  }
+  suspicion({ suspect, weighted_rms: poor, rms_without: good }) { // the line that a poor fit is better off without
+    const there = suspect.filter((number) => this.lines[number] && !this.lines[number].rejected);
+    return there.length ? `${there.map((number) => this.text(this.lines[number])).join(", ")} at ${this.lines[there[0]].frequency_mhz.toFixed(4)} MHz does not fit: without it the weighted rms is ${short(good)}, not ${short(poor)}. Reject it (x) or assign it anew.` : "";
   }
   async export(what) {
     if (!what) return;
@@ -817,40 +884,60 @@ export class App {
         h("button", { type: "button", onclick: () => { this.offered = null; this.panels(); } }, "Cancel")),
       this.picker()];
   }
-  picker() { // quantum numbers of a level: its allowed lines join the candidates
-    const number = Number(Object.keys(this.species).find((n) => this.species[n].visible) ?? Object.keys(this.species)[0]);
-    const select = h("select", { "aria-label": "Species" }, Object.entries(this.species).map(([n, one]) => h("option", { value: n },
-      one.name)));
-    const names = this.quanta[number]?.names ?? [], input = h("input",
-      { "data-field": "pick", placeholder: names.map((n) => HEAD[n] ?? n).join(" "), "aria-label": "Quantum numbers of a level",
-      style: "width:8em" });
-    const pick = async (event) => {
-      event.preventDefault();
+  picker() { // quantum numbers of a level, up and down by the arrow keys: its allowed lines join the candidates
+    const o = this.offered, shown = Object.keys(this.species).filter((n) => this.species[n].visible);
+    const of = this.pickOf in this.species ? this.pickOf : shown[0] ?? Object.keys(this.species)[0], { names, halves } = this.known(of);
+    const select = h("select", { "aria-label": "Species of the level", "data-field": "pickOf",
+      onchange: (event) => { this.pickOf = event.target.value; this.panels(); } },
+      Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === of }, one.name)));
+    const start = o.candidates.find((c) => String(c.species) === of)?.upper ?? names.map(() => 0);
+    const words = this.level?.of === of ? this.level.words : names.map((name, i) => quantum(start[i], name, halves));
+    const pick = async () => {
       try {
-        const found = await this.transport.call({ do: "pick", species: Number(select.value), level: ints(input.value) }),
-          middle = this.offered.peak?.frequency_mhz ?? 0;
-        const added = found.candidates.filter((c) => !this.offered.candidates.some((o) => this.same(o, c))).map((c) => ({ ...c,
-          off_mhz: c.frequency_mhz - middle }));
-        this.offered.candidates.push(...added);
-        this.say(`${added.length} allowed lines of the level added`); this.panels();
+        const level = words.map((word, i) => number(word.trim(), names[i], halves));
+        const { candidates } = await this.transport.call({ do: "pick", species: Number(of), level });
+        if (this.offered !== o) return;
+        const marked = new Set([...o.marked].map((i) => o.candidates[i])), middle = o.peak?.frequency_mhz ?? (o.first + o.last) / 2;
+        o.candidates = o.candidates.filter((c) => !c.picked || marked.has(c));
+        o.candidates.push(...candidates.filter((c) => !o.candidates.some((other) => this.same(other, c)))
+          .map((c) => ({ ...c, off_mhz: c.frequency_mhz - middle, picked: true })));
+        o.marked = new Set(o.candidates.flatMap((c, i) => (marked.has(c) ? [i] : [])));
+        this.say(`${candidates.length} allowed lines of ${words.join(" ")} in the band`); this.panels();
       } catch (error) { this.say(error.message, true); }
     };
-    return h("form", { onsubmit: pick, class: "row" }, h("label", {}, "Lines of the level ", input), select, h("button", {}, "Show"));
+    const type = (i, text) => { words[i] = text; this.level = { of, words }; };
+    const turn = (event, i) => {
+      const by = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      try { event.target.value = quantum(number(words[i].trim(), names[i], halves) + by * (halves.includes(names[i]) ? 2 : 1), names[i], halves); }
+      catch (error) { this.say(error.message, true); return; }
+      type(i, event.target.value); pick();
+    };
+    return h("form", { onsubmit: (event) => { event.preventDefault(); pick(); } }, h("h3", {}, "Lines of a level"),
+      h("div", { class: "row" }, select, names.map((name, i) => h("label", { class: "quantum" }, headOf(name),
+        h("input", { value: words[i], size: 3, "data-field": `pick${i}`, autocomplete: "off",
+          oninput: (event) => type(i, event.target.value), onkeydown: (event) => turn(event, i) }))),
+        h("button", { title: "the lines of this level that the dipole allows, strongest first" }, "Show")));
   }
   fitSummary() {
     return Object.entries(this.species).map(([number, one]) => h("section", {}, h("h3", {}, this.swatch(number), one.name), one.fit
       ? [h("p", {}, `${one.fit.lines} lines, rms ${fixed(1e3 * one.fit.rms_mhz, 2)} kHz, weighted rms ${fixed(one.fit.weighted_rms, 2)}`),
-        one.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${one.fit.open.join(", ")}`) : null]
-      : h("p", {}, `${Object.values(this.lines).filter((line) => line.species === Number(number)).length} lines assigned, not fitted`)));
+        one.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${one.fit.open.join(", ")}`) : null,
+        one.fit.suspect?.length && this.suspicion(one.fit) ? h("p", { class: "wrong" }, this.suspicion(one.fit), " ",
+          h("button", { type: "button", onclick: () => this.selectLine(one.fit.suspect[0], true) }, "Show it")) : null]
+      : h("p", {}, `Lines assigned: ${Object.values(this.lines).filter((line) => line.species === Number(number)).length}, not fitted`)));
   }
   panelLines() {
     const every = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz),
       words = this.filter.toLowerCase().split(/\s+/).filter(Boolean);
     const text = (number,
       line) => `${this.name(line)} ${this.facts[number]?.label ?? ""} ${line.frequency_mhz.toFixed(3)} ${line.comment} ${line.rejected ? "rejected" : ""} ${this.off(number) > 3 ? "far" : ""}`.toLowerCase();
-    const shown = every.filter(([number, line]) => words.every((word) => text(number, line).includes(word)));
+    const shown = every.filter(([number, line]) => words.every((word) => (word === "series" ? inSeries(line, this.settings.series)
+      : fits(line, word, this.known(line.species)) ?? text(number, line).includes(word))));
     const search = h("input", { type: "search", "data-field": "filter", value: this.filter,
-      placeholder: "filter: species, quantum numbers, rejected, far", "aria-label": "Filter",
+      placeholder: "filter: Ka=0 dJ=1 J>5, series, far, rejected, name", "aria-label": "Filter",
+      title: "Ka=0, J>5 of the upper level, J\">5 of the lower, dJ=1 of their difference; series: lines of the Loomis-Wood rows; far: beyond 3 σ",
       oninput: (event) => { this.filter = event.target.value; this.panels(); } });
     const edit = (name, label) => h("label", {}, label, " ", h("input",
       { type: "number", step: "any", min: "0", "data-field": name, style: "width:6em",
@@ -884,9 +971,13 @@ export class App {
   off(number) { const line = this.lines[number], d = this.facts[number]?.difference_mhz;
     return d == null ? 0 : Math.abs(d) / line.error_mhz; }
   adder() {
-    const input = h("input", { "data-field": "add", placeholder: "name, file or SMILES:…", "aria-label": "Molecule" });
+    const input = h("input", { "data-field": "add", placeholder: "OCS   OCS, S=34S   file   SMILES:…", "aria-label": "Molecule",
+      title: "a name, a file, SMILES:… or constants; an isotopologue by its isotopes behind a comma" });
+    const kelvin = h("input", { type: "number", min: "0.1", step: "any", style: "width:5em", "data-field": "add.kelvin",
+      value: Object.values(this.species)[0]?.temperature_k ?? 300 });
     return h("form", { class: "row", onsubmit: (event) => { event.preventDefault();
-      if (input.value.trim()) this.do({ do: "add_species", source: input.value.trim() }); } }, input, h("button", {}, "Add molecule"));
+      if (input.value.trim()) this.do({ do: "add_species", source: input.value.trim(), temperature_k: Number(kelvin.value) }); } }, input,
+      h("label", {}, kelvin, " K"), h("button", {}, "Add molecule"));
   }
   searcher() { // rotor assign over the whole spectrum
     const seconds = h("input", { type: "number", min: "1", max: "600", value: "20", style: "width:4.5em", "data-field": "seconds",
@@ -977,22 +1068,23 @@ export class App {
       c = this.offered ? [...this.offered.marked].map((i) => this.offered.candidates[i])[0] : this.line != null ? this.lines[this.line] : null;
     const guess = names.map((name) => (["j", "n", "kc", "f",
       "f1"].includes(name) ? (this.quanta[number].halves.includes(name) ? 2 : 1) : 0));
-    const head = names.map((name) => HEAD[name] ?? name).join(" ");
+    const head = names.map(headOf).join(" "), known = this.known(number);
+    const shown = (value, step) => (value ?? []).map((q, i) => quantum(q, step && names[i] === "species" ? "" : names[i], known.halves)).join(" ");
     const field = (key, label, value) => h("label", { class: "wide" }, label,
-      h("input", { "data-field": `series.${key}`, value: (value ?? []).join(" "), placeholder: head }));
+      h("input", { "data-field": `series.${key}`, value: shown(value, key === "step"), placeholder: head }));
     const species = h("select", { "aria-label": "Species", "data-field": "series.species" },
       Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === number }, one.name)));
     const from = c && String(c.species) === number ? c : now?.upper?.length ? now : null;
     const upper = field("upper", "upper level", from?.upper), lower = field("lower", "lower level", from?.lower),
       step = field("step", "step of each row", now?.step?.length ? now.step : guess);
     const show = (series) => this.do({ do: "series", series }).then((answer) => { if (answer) { this.showPane("wood"); } });
-    const read = (label) => ints(label.querySelector("input").value);
+    const read = (label, step) => numbers(label.querySelector("input").value, this.known(species.value), step);
     const frequencies = h("input", { "data-field": "series.frequencies",
       value: (now?.frequencies_mhz?.length ? now.frequencies_mhz : this.measured).map((f) => f.toFixed(4)).join(" "),
       placeholder: "two or three frequencies (MHz)", "aria-label": "Frequencies" });
     const guarded = (action) => (event) => { event.preventDefault(); try { action(); } catch (error) { this.say(error.message, true); } };
     return [h("h3", {}, "Loomis-Wood rows from the model"), h("form",
-      { onsubmit: guarded(() => show({ species: Number(species.value), upper: read(upper), lower: read(lower), step: read(step) })) },
+      { onsubmit: guarded(() => show({ species: Number(species.value), upper: read(upper), lower: read(lower), step: read(step, true) })) },
       h("label", { class: "wide" }, "species", species), upper, lower, step, h("button", { class: "main" }, "Show rows")),
       h("h3", {}, "From two or three lines, extrapolated"), h("form",
         { onsubmit: guarded(() => { const f = frequencies.value.trim().split(/[\s,]+/).map(Number);
@@ -1028,6 +1120,8 @@ export class App {
   // Keys
 
   key(event) {
+    const alone = !(event.ctrlKey || event.metaKey || event.altKey);
+    if (alone && this.root !== document.body) event.stopPropagation(); // the notebook around it has commands on single keys
     if (event.target.matches?.("input:not([type=checkbox]):not([type=range]), select, textarea")) return;
     if (this.helpBox.open && event.key !== "?" ) return;
     if (event.target.matches?.("button, summary, input") && [" ", "Enter"].includes(event.key)) return;
@@ -1045,6 +1139,7 @@ export class App {
         m: () => this.do({ do: "settings", overlaid: !this.settings.overlaid }),
       s: () => { this.autoscale = !this.autoscale; for (const one of this.windows) one.draw(); },
         l: () => this.showPane(this.pane === "wood" ? "residuals" : "wood"), t: () => this.turn(), "?": () => this.help(),
+      PageDown: () => this.pane === "wood" && this.wood.next(1), PageUp: () => this.pane === "wood" && this.wood.next(-1),
       Escape: () => { this.offered = null; for (const one of this.windows) { one.chosen.visible = false; one.cursor.visible = false;
         } this.choose(false); this.panels(); },
     };
@@ -1052,7 +1147,7 @@ export class App {
     let action = keys[event.key];
     if (control) action = { z: event.shiftKey ? keys.y : keys.u, Z: keys.y, y: keys.y }[event.key];
     if (!action || event.altKey) return;
-    event.preventDefault();
+    event.preventDefault(); event.stopPropagation();
     action();
   }
 }

@@ -52,13 +52,28 @@ def constant_set(top: Top, hyperfine: bool) -> ConstantSet:
 _CONSTANTS = re.compile(r"\s*[^\W\d_]\w*\s*=\s*[-+\d.]")  # such as "A=2458.69 B=490.43 C=408.87 MHz"
 
 
+_ISOTOPES = re.compile(r"\s*,((?:\s*[A-Za-z0-9]+\s*=\s*\d+[A-Z][a-z]?\s*,?)+)$")  # such as ", S=34S" behind "OCS"
+
+
+def without_isotopes(source: str) -> tuple[str, str]:
+    """A source and the isotopes behind it: "OCS" and "S=34S" of "OCS, S=34S"; no isotopes of a file whose name ends so."""
+    found = _ISOTOPES.search(source)
+    if found is None or _is_file(Path(source)) or not source[: found.start()]:
+        return source, ""
+    return source[: found.start()], found[1].strip(" ,")
+
+
 def top_of_source(source: str) -> Top:
-    """The top of a name, a file, a text such as SMILES:C=O, or constants such as "B=6081 MHz". ValueError for what is none."""
+    """The top of a name, a file, a text such as SMILES:C=O, or constants such as "B=6081 MHz"; of an isotopologue by "OCS, S=34S".
+
+    Raises ValueError for what is no molecule.
+    """
     from rotor.formats import read
 
     if _CONSTANTS.match(source) and not _is_file(Path(source)):
         return Top.from_constants(source)
-    top = read(source)
+    source, isotopes = without_isotopes(source)
+    top = read(source, isotopes=isotopes or None)
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__}, not a molecule or constants")
     return top
@@ -236,15 +251,18 @@ class Predictions:
 
     def stored(self, source: str) -> str:
         """How the session names a source: a file below its folder by its relative path, other files by their whole path."""
-        path = Path(source)
+        source, isotopes = without_isotopes(source)
+        behind, path = f", {isotopes}" if isotopes else "", Path(source)
         if not _is_file(path):
-            return source
+            return source + behind
         where = path.resolve()
-        return (where.relative_to(self.folder) if where.is_relative_to(self.folder) else where).as_posix()
+        return (where.relative_to(self.folder) if where.is_relative_to(self.folder) else where).as_posix() + behind
 
     def located(self, source: str) -> str:
         """The source as it is read: a file of the session's folder by its whole path."""
-        return str(self.folder / source) if _is_file(self.folder / source) else source
+        source, isotopes = without_isotopes(source)
+        behind = f", {isotopes}" if isotopes else ""
+        return (str(self.folder / source) if _is_file(self.folder / source) else source) + behind
 
     def model(self, record: Species) -> Model:
         """The model of a record."""

@@ -30,7 +30,11 @@ class SpectrumFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FitSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The last fit of a species. before: constants (MHz) from which it started. open: what the lines do not determine."""
+    """The last fit of a species. before: constants (MHz) from which it started. open: what the lines do not determine.
+
+    suspect: numbers of the lines of one measured frequency without which the weighted rms falls to `rms_without`, where that says
+    that they are assigned wrongly.
+    """
 
     converged: bool
     reason: str
@@ -40,6 +44,8 @@ class FitSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     before: dict[str, float]
     open: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    suspect: tuple[int, ...] = ()
+    rms_without: float | None = None
 
 
 class Species(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="species"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -347,6 +348,11 @@ def test_lines_written_and_read_again_are_the_same(service, tmp_path):
         assert len(numbers) == 2
         assert len(set(numbers)) == 1
         assert len({line.blend for line in lines}) == len(before) - 1
+        notes = []
+        again = open_session("spectrum.csv", [NAME], lines=made["name"], session=f"{suffix}{SUFFIX}", note=notes.append)
+        again.session.release()
+        assert again.session.state == other.session.state  # the file named again adds nothing
+        assert f"{len(before)} lines are in the session already" in notes[-1]
 
 
 def test_rejected_lines_stay_rejected_in_files(service, tmp_path):
@@ -499,6 +505,46 @@ def test_constants_as_text_are_a_species(service):
     assert "dipole not known, 1 D along each axis assumed" in answer["notes"][0]
     assert service.session.state.species[2].constants == {"A": 2458.69, "B": 490.43, "C": 408.87}
     assert done(service, "window", first_mhz=8000, last_mhz=9000, pixels=100)["sticks"]["2"]["x"]
+
+
+def test_isotopologues_are_species_by_the_isotopes_behind_a_comma(service, tmp_path):
+    from rotor.formats import read
+
+    done(service, "add_species", source="OCS, S=34S", temperature_k=20.0)
+    done(service, "add_species", source="OCS,O=18O , S=34S")
+    species = service.session.state.species
+    assert [species[n].source for n in (2, 3)] == ["OCS, S=34S", "OCS, O=18O , S=34S"]
+    assert species[2].constants == dict(read("OCS", isotopes="S=34S").constants.values)
+    assert species[2].constants["B"] > species[3].constants["B"] > 0.9 * species[2].constants["B"]
+    shutil.copy(tmp_path / NAME, tmp_path / "a, S=34S.toml")  # the name of a file is not taken apart
+    done(service, "add_species", source="a, S=34S.toml")
+    assert "isotope 99S is not in" in service.answer({"do": "add_species", "source": "OCS, S=99S"})["error"]
+    done(service, "assign", frequency_mhz=11865.55, error_mhz=0.01, to=[{"species": 2, "upper": [1], "lower": [0]}])
+    for what in ("csv", "toml", "par"):
+        done(service, "export", what=what, species=2)
+    service.session.release()
+    again = open_session("spectrum.csv", ["OCS, S=34S"])  # is there already
+    assert again.session.state == service.session.state
+    again.session.release()
+
+
+def test_a_wrong_assignment_in_a_refit_is_named(service):
+    for upper, lower in SERIES:
+        assign_line(service, upper, lower)
+    done(service, "refit", species=1)
+    good = service.session.state.species[1].fit
+    assert (good.suspect, good.rms_without) == ((), None)
+    wrong = [{"species": 1, "upper": [5, 1, 4], "lower": [5, 1, 5]}]  # the peak is 5 2 3 - 5 1 4
+    done(service, "assign", frequency_mhz=16022.8108, error_mhz=0.001, to=wrong)
+    done(service, "refit", species=1)
+    poor = service.session.state.species[1].fit
+    number = max(service.session.state.lines)
+    assert poor.suspect == (number,)
+    assert poor.weighted_rms > 1000
+    assert poor.rms_without == pytest.approx(good.weighted_rms, rel=1e-3)  # the same lines as before
+    done(service, "reject", lines=[number], rejected=True)
+    done(service, "refit", species=1)
+    assert service.session.state.species[1].fit.suspect == ()
 
 
 def test_a_list_of_peaks_is_drawn_as_sticks_and_a_drag_takes_its_peak(service, tmp_path):

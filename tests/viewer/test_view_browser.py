@@ -5,6 +5,7 @@ Skipped where Playwright or Chromium is not installed (`apt-get install chromium
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -213,6 +214,97 @@ def test_loomis_wood_rows_and_sliders(page, served):
     settled(page, f"Math.abs(rotorView.species[1].constants.B - {1.0005 * before.species[1].constants['B']}) < 0.01")
 
 
+def test_quantum_numbers_are_picked_by_arrow_keys_halves_as_fractions(page, served, tmp_path):
+    service = served[1]
+    text = 'name = "spins"\n[constants]\nB = 4e3\n[dipole]\na = 1.0\n[spins.35Cl]\nchi_aa = -70.0\n[spins.14N]\nchi_aa = -4.2\n'
+    (tmp_path / "spins.toml").write_text(text)
+    page.evaluate(f"rotorView.do({{do: 'add_species', source: '{tmp_path.as_posix()}/spins.toml', temperature_k: 3}})")
+    settled(page, "rotorView.species[2] !== undefined")
+    page.evaluate("rotorView.do({do: 'species', species: 2, hyperfine: true})")
+    settled(page, "rotorView.quanta[2].names.length === 3")
+    assert page.evaluate("JSON.stringify(rotorView.quanta[2])") == '{"names":["n","f1","f"],"halves":["f","f1"]}'
+    page.evaluate("rotorView.show(16022.8, null, 10)")
+    settled(page, "!rotorView.windows[0].busy")
+    page.keyboard.press("f")
+    settled(page, "rotorView.offered !== null")
+    page.select_option("[data-field=pickOf]", "2")
+    for i, word in enumerate(("1", "3/2", "5/2")):
+        page.fill(f"[data-field=pick{i}]", word)
+    page.keyboard.press("Enter")
+    settled(page, "rotorView.offered.candidates.some((c) => c.picked)")
+    level = [1, 3, 5]
+    expected = service.answer({"do": "pick", "species": 2, "level": level})["ok"]["candidates"]
+    shown = page.evaluate("rotorView.offered.candidates.filter((c) => c.species === 2).map((c) => [c.upper, c.lower])")
+    assert sorted(shown) == sorted([c["upper"], c["lower"]] for c in expected)
+    for upper, lower in shown:  # selection rules of a dipole: ΔN = 1, ΔF = 0 or 1
+        assert level in (upper, lower)
+        assert abs(upper[0] - lower[0]) == 1
+        assert abs(upper[2] - lower[2]) in (0, 2)
+    page.focus("[data-field=pick2]")
+    page.keyboard.press("ArrowDown")
+    settled(page, "document.querySelector('.status').textContent.includes('of 1 3/2 3/2')")
+    assert page.evaluate("document.activeElement.dataset.field") == "pick2"
+    page.fill("[data-field=pick1]", "3/4")
+    page.keyboard.press("Enter")
+    settled(page, "document.querySelector('.status').textContent.includes('F1 is a half-integer such as 5/2')")
+
+
+@pytest.mark.slow
+def test_lines_are_filtered_by_quantum_numbers_and_series(page, served):
+    service = served[1]
+    lines = [*SERIES, ([4, 1, 3], [4, 0, 4])]
+    for i, (upper, lower) in enumerate(lines):
+        target = [{"species": 1, "upper": upper, "lower": lower}]
+        service.answer({"do": "assign", "frequency_mhz": 9000.0 + i, "error_mhz": 0.01, "to": target})
+    series = {"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2], "step": [1, 0, 1]}
+    page.evaluate(f"rotorView.do({{do: 'series', series: {json.dumps(series)}}})")
+    page.keyboard.press("2")
+    settled(page, "Object.keys(rotorView.lines).length === 6 && rotorView.settings.series !== null")
+    for words, count in (
+        ("", 6), ("Ka=0", 2), ("ka'=1 ka\"=0", 2), ("dJ=0", 2), ("J>=4", 2), ("J\"<2", 2), ("series", 2), ("Q=1", 0),
+        ("9003", 1), ("Ka=0 series J=3", 1),
+    ):  # fmt: skip
+        page.fill("[data-field=filter]", words)
+        assert page.inner_text("#panel p.quiet").split()[0] == str(count), words
+
+
+@pytest.mark.slow
+def test_many_rows_are_paged_and_reached_by_keys(page, served, tmp_path):
+    service = served[1]
+    (tmp_path / "long.toml").write_text(
+        'name = "long"\n[constants]\nA = 3000.0\nB = 60.0\nC = 58.0\n[dipole]\na = 1.0\n'
+    )
+    service.answer({"do": "add_species", "source": str(tmp_path / "long.toml"), "temperature_k": 3.0})
+    series = {"species": 2, "upper": [80, 0, 80], "lower": [79, 0, 79], "step": [1, 0, 1]}
+    page.evaluate(
+        f"rotorView.do({{do: 'series', series: {json.dumps(series)}}}).then(() => rotorView.showPane('wood'))"
+    )
+    settled(page, "rotorView.wood.rows.length === 50 && rotorView.wood.total === 77")
+    first = page.evaluate("rotorView.wood.rows[0].n")
+    page.keyboard.press("PageDown")
+    settled(page, "rotorView.wood.row === 0")
+    assert page.evaluate("rotorView.active.cursor.location === rotorView.wood.rows[0].centre_mhz")
+    page.click("[aria-label='Later rows']")
+    settled(page, f"rotorView.wood.rows[0].n === {first + 27} && rotorView.wood.rows.length === 50")
+    page.keyboard.press("PageUp")
+    settled(page, "rotorView.wood.row === 49")
+    page.fill("[data-field=rows]", "20")
+    page.keyboard.press("Tab")
+    settled(page, "rotorView.wood.rows.length === 20")
+    done = {"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2], "step": [1, 0, 1]}
+    page.evaluate(f"rotorView.do({{do: 'series', series: {json.dumps(done)}}})")
+    settled(page, "rotorView.wood.rows.length === 2 && rotorView.wood.first === 0")
+    page.evaluate("document.activeElement.blur()")
+    for key in ("PageDown", "PageDown", "f"):
+        page.keyboard.press(key)
+        page.wait_for_timeout(400)
+    settled(page, "rotorView.offered?.peak != null")
+    page.keyboard.press("Enter")
+    settled(page, "Object.keys(rotorView.lines).length === 1")
+    line = service.session.state.lines[1]
+    assert (line.species, line.upper) == (1, tuple(page.evaluate("rotorView.wood.rows[1].upper")))
+
+
 def test_a_second_page_follows(page, served, browser):
     other = browser.new_context().new_page()
     other.goto(served[0].address)
@@ -278,6 +370,11 @@ def test_the_widget_of_a_notebook_is_the_same_page(served, browser, tmp_path):
         (tmp_path / "widget.mjs").read_text(encoding="utf-8"),
     )
     opened.wait_for_selector(READY, timeout=30_000)
+    opened.evaluate("globalThis.heard = []; document.addEventListener('keydown', (event) => heard.push(event.key))")
+    opened.focus(".window")
+    for key in ("b", "x", "d", "m", "m", "Control+s"):  # a notebook would insert and delete cells
+        opened.keyboard.press(key)
+    assert set(opened.evaluate("heard")) == {"Control", "s"}
     opened.click("#tab-Constants")
     assert opened.locator("details.species").count() == 1
     opened.click("details.species >> text=Remove")
@@ -316,7 +413,8 @@ def test_text_and_species_have_contrast(page, theme):
         page.keyboard.press("t")
     colours = page.evaluate(
         """(theme) => { const style = getComputedStyle(document.body), out = {};
-        for (const name of ['ink', 'quiet', 'wrong', 'accent', 'on-accent']) out[name] = style.getPropertyValue('--' + name).trim();
+        const names = ['ink', 'quiet', 'wrong', 'accent', 'on-accent', 'control'];
+        for (const name of names) out[name] = style.getPropertyValue('--' + name).trim();
         return [out, ['paper', 'raised'].map((name) => style.getPropertyValue('--' + name).trim())]; }""",
         theme,
     )
@@ -332,6 +430,7 @@ def test_text_and_species_have_contrast(page, theme):
     for paper in papers:
         for name in ("ink", "quiet", "wrong"):
             assert ratio(text[name], paper) >= 4.5, (name, paper)
+        assert ratio(text["control"], paper) >= 3, paper  # borders of what is operated, WCAG 1.4.11
         for colour in species:
             assert ratio(colour, papers[0]) >= 4.5, colour
     assert ratio(text["accent"], text["on-accent"]) >= 4.5
