@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.formats.spectra.axis import ReadChoices, intensity_unit
-from rotor.formats.spectra.fits_file import astropy_fits, beam_of, frame_of, image_axis_mhz, spectral_axis_number
+from rotor.formats.spectra.fits_file import (
+    astropy_fits,
+    beam_of,
+    frame_of,
+    image_axis_mhz,
+    spectral_axis_number,
+    unreadable,
+)
 from rotor.observed.cube import CubeFit
 from rotor.observed.spectrum import JANSKY_PER_BEAM, KELVIN, kelvin_per_jansky, noise_level
 from rotor.version import version
@@ -78,7 +85,7 @@ def read_cube(path: Path, choices: ReadChoices | None = None) -> Cube:
     try:
         opened = fits.open(path, memmap=False)
     except OSError as error:
-        raise ValueError(f"{path}: not a FITS file: {error}") from None
+        raise unreadable(path, error) from None
     with opened as units_of_file:
         image = next((hdu for hdu in units_of_file if hdu.data is not None), None)
         if image is None or isinstance(image, fits.BinTableHDU):
@@ -145,7 +152,7 @@ def read_mask(path: Path, shape: tuple[int, int]) -> NDArray[np.bool_]:
         with fits.open(path, memmap=False) as opened:
             image = next((np.asarray(hdu.data) for hdu in opened if hdu.data is not None), None)
     except OSError as error:
-        raise ValueError(f"{path}: not a FITS file: {error}") from None
+        raise unreadable(path, error) from None
     flat = None if image is None or image.ndim < 2 else image.reshape(-1, *image.shape[-2:])
     if flat is None or flat.shape != (1, *shape):
         pixels = "no image" if image is None else " by ".join(map(str, image.shape[::-1]))

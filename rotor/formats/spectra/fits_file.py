@@ -52,6 +52,11 @@ _CONVENTION = {
 }
 
 
+def unreadable(path: Path, error: OSError) -> ValueError:
+    """The error of a file that cannot be opened as FITS: the system's reason, or that its first card is another."""
+    return ValueError(f"{path}: {error.strerror or 'not a FITS file; its first card is not SIMPLE'}")
+
+
 def astropy_fits() -> Any:
     """`astropy.io.fits`; ImportError with the command that installs it."""
     try:
@@ -87,7 +92,7 @@ def read_fits_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     try:
         opened = fits.open(path, memmap=False)
     except OSError as error:
-        raise ValueError(f"{path}: not a FITS file: {error}") from None
+        raise unreadable(path, error) from None
     with opened as units_of_file:
         for hdu in units_of_file:
             if hdu.data is None:
