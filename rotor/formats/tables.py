@@ -103,13 +103,18 @@ def copy_columns(columns: Columns, path: Path, options: str) -> None:
     """Write columns through DuckDB's COPY with its options; numbers that are not finite become NULL, texts stay texts."""
     import duckdb
 
-    given = {name: _without_infinities(np.asarray(column)) for name, column in columns.items()}
-    chosen = ", ".join(
-        f'"{name}"::VARCHAR AS "{name}"' if given[name].dtype.kind in "UO" else f'"{name}"' for name in given
-    )
     with duckdb.connect() as engine:
-        engine.register("given", given)
+        chosen = registered(engine, "given", columns)
         run(engine, f"COPY (SELECT {chosen} FROM given) TO {quoted(str(path))} {options}", path)
+
+
+def registered(engine: DuckDBPyConnection, name: str, columns: Columns) -> str:
+    """Make columns a table of DuckDB; what selects them: numbers that are not finite are NULL, texts stay texts."""
+    arrays = {key: _without_infinities(np.asarray(column)) for key, column in columns.items()}
+    engine.register(name, arrays)
+    return ", ".join(
+        f'"{key}"::VARCHAR AS "{key}"' if column.dtype.kind in "UO" else f'"{key}"' for key, column in arrays.items()
+    )
 
 
 def run(engine: DuckDBPyConnection, command: str, path: Path) -> None:

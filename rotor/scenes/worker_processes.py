@@ -136,7 +136,9 @@ def _one_thread() -> Iterator[None]:
 def _started_process() -> ProcessPoolExecutor:
     """A pool of one process that has started with one thread of BLAS, whatever this process has."""
     start_ahead()
-    pool = ProcessPoolExecutor(1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(),))
+    pool = ProcessPoolExecutor(
+        1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(), gc.get_threshold())
+    )
     with _one_thread():
         try:
             pool.submit(_nothing)
@@ -154,11 +156,15 @@ def _environment() -> dict[str, str]:
     return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
 
 
-def _begin(environment: dict[str, str]) -> None:
-    """Ctrl-C reaches all processes of a terminal: the one that began ends the others, which end with it whatever ends it."""
+def _begin(environment: dict[str, str], threshold: tuple[int, int, int]) -> None:
+    """Take the environment of the process that began, and its threshold of the search for cycles, 5 to 15 % of a point at Python's.
+
+    Ctrl-C reaches all processes of a terminal: the one that began ends the others, which end with it whatever ends it.
+    """
     os.environ.clear()
     os.environ.update(environment)
     gc.freeze()  # modules stay: they are not searched for what is no longer used
+    gc.set_threshold(*threshold)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import json
 import os
 import signal
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import duckdb
@@ -22,8 +24,10 @@ from rotor.scenes.scene import LevelsScene, SpectrumScene
 from rotor.scenes.scene_file import parse_scene, write_scene
 from rotor.scenes.sections import BasisNumerics, LevelsObservables, LevelsOutputs, MoleculeSection
 from rotor.scenes.sweep import points, run_sweep
+from rotor.scenes.sweep.combined import CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.worker_processes import WorkerKilledError, worker_processes
+from rotor.table import Table
 from rotor.temporary import locked_file
 
 LINEAR = "[constants]\nB = {b}\n"
@@ -598,3 +602,41 @@ def test_a_csv_of_all_points_goes_on(folder):
     assert set(before.splitlines()) <= set(Path("all.csv").read_text().splitlines())  # text by text
     assert run_sweep(scene, record="r").computed == 0
     assert Path("all.csv").read_text() == before
+
+
+def test_workers_search_for_cycles_as_seldom_as_the_process_that_began():
+    """Python's own threshold takes 5 to 15 % of a prediction; a worker that forgot it would be slower than one process."""
+    before = gc.get_threshold()
+    gc.set_threshold(43_210, 7, 5)
+    try:
+        with worker_processes(1) as pool:
+            assert pool.submit(gc.get_threshold).result() == (43_210, 7, 5)
+    finally:
+        gc.set_threshold(*before)
+
+
+def test_points_that_wait_are_not_asked_one_by_one(folder, monkeypatch):
+    """Negative control of speed: the time of each point does not grow with the number of points that wait."""
+    asked = Counter()
+    ask = Future.done
+    monkeypatch.setattr(Future, "done", lambda self: asked.update(done=1) or ask(self))
+    sweep = {"observables.jmax": list(range(1, 61))}
+    with ThreadPoolExecutor(1) as pool:
+        result = run_sweep(LevelsScene(molecule="CO", sweep=sweep), record="r.jsonl", executor=pool)
+    assert [record["rows"] for record in result.records] == list(range(2, 62))
+    assert asked["done"] <= 60  # each once at most; 1,830 where all that wait are asked after each point
+
+
+def test_small_points_wait_as_one_array_of_any_names_and_lengths(folder):
+    """Texts of several lengths, infinite numbers and names beyond ASCII come back as they were, in the order of the keys."""
+    joined = CombinedFile.of(["a.parquet"], ".")
+    joined.open_folder()
+    rows = {"a" * 16: (["x"], [1.5]), "b" * 16: (["longer", "Å"], [np.inf, np.nan])}
+    for key, (texts, numbers) in rows.items():
+        columns = {"name": np.array(texts), "ν": np.array(numbers)}
+        joined.write_part(key, {"µ": 1}, type("FewColumns", (Table,), {"columns": columns})())
+    assert {path.suffix for path in joined.folder.iterdir()} == {".npy"}
+    joined.join(["b" * 16, "a" * 16], "{}")
+    table = duckdb.sql("SELECT * FROM 'a.parquet'").fetchall()
+    assert table == [("b" * 16, 1, "longer", None), ("b" * 16, 1, "Å", None), ("a" * 16, 1, "x", 1.5)]
+    assert not joined.folder.exists()

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
@@ -23,9 +24,12 @@ if TYPE_CHECKING:
 
 KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
 MEMORY_MB = 300  # for the sort; more goes to files
-SMALL_ROWS = 5_000  # of a point, up to which its rows wait as arrays of numpy: DuckDB takes 20 ms for a file, numpy 0.5
+SMALL_ROWS = (
+    5_000  # of a point, up to which its rows wait as one array of numpy: DuckDB takes 20 ms for a file, numpy 0.2
+)
 BATCH_ROWS, BATCH_FILES = 100_000, 2_000  # of small files that are joined at once
-_SMALL, _LARGE = ".npz", ".parquet"
+_SMALL, _LARGE = ".npy", ".parquet"
+_FORMAT = (3, 0)  # of numpy's files: names of columns are UTF-8
 
 
 def point_columns(values: Mapping[str, Any], table: Table) -> dict[str, Any]:
@@ -93,7 +97,7 @@ class CombinedFile:
         unfinished = path.with_suffix(f".{os.getpid()}{path.suffix}.part")  # in a folder that this sweep alone uses
         if small:
             with open(unfinished, "wb") as handle:
-                np.savez(handle, allow_pickle=False, **columns)
+                np.lib.format.write_array(handle, _rows_of(columns), _FORMAT, allow_pickle=False)
         else:
             copy_columns(columns, unfinished, "(FORMAT parquet)")
         os.replace(unfinished, path)
@@ -103,7 +107,7 @@ class CombinedFile:
         import duckdb
 
         from rotor.formats.atomic_write import atomic_path
-        from rotor.formats.tables import quoted, run
+        from rotor.formats.tables import quoted, registered, run
 
         waiting = self._waiting()
         before = self._joined() - waiting.keys()
@@ -113,8 +117,11 @@ class CombinedFile:
             engine.execute("SET memory_limit = $1", [f"{MEMORY_MB}MB"])
             engine.execute("SET temp_directory = $1", [str(self.folder / "sort")])
             _register_order(engine, keys)
-            sources = [str(path) for path in self._large_files(waiting.values())]
+            few, sources = self._large_files(waiting.values())
             parts = [_rows(sources)] if sources else []
+            if few is not None:
+                numbered = few | {"file_row_number": np.arange(len(few["point"]))}
+                parts.append(f"SELECT {registered(engine, 'few', numbered)} FROM few")
             if before:
                 others = ", ".join(map(quoted, ("", *waiting)))
                 parts.append(f"SELECT * FROM {_table_of(self.targets[0])} WHERE point NOT IN ({others})")
@@ -130,37 +137,47 @@ class CombinedFile:
                 run(engine, f"COPY ({chosen}) TO {quoted(str(path))} {options}", target)
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _large_files(self, paths: Iterable[Path]) -> list[Path]:
-        """The files of points, many small ones as one: what DuckDB opens takes it milliseconds each."""
+    def _large_files(self, paths: Iterable[Path]) -> tuple[dict[str, Any] | None, list[str]]:
+        """The columns of many small files, and the other files; further batches of small ones are files of their own."""
         from rotor.formats.tables import copy_columns
 
         place = self.folder / "joined"
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir()
+        batches = _gathered(path for path in paths if path.suffix == _SMALL)
+        few = next(batches, None)
         large: list[Path] = []
-        for columns in _gathered(path for path in paths if path.suffix == _SMALL):
+        for columns in batches:
             large.append(place / f"{len(large)}{_LARGE}")
             copy_columns(columns, large[-1], "(FORMAT parquet)")
-        return [*(path for path in paths if path.suffix == _LARGE), *large]
+        return few, [str(path) for path in (*(path for path in paths if path.suffix == _LARGE), *large)]
 
 
 def _gathered(paths: Iterable[Path]) -> Iterator[dict[str, Any]]:
     """Columns of small files of equal columns, one after the other, in batches of bounded size."""
-    batches: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    batches: dict[tuple[Any, ...], list[NDArray[Any]]] = {}
     for path in paths:
-        with np.load(path, allow_pickle=False) as file:
-            columns = dict(file)
-        form = tuple((name, column.dtype.kind) for name, column in columns.items())
+        rows = np.load(path, allow_pickle=False)
+        form = tuple((name, rows.dtype[name].kind) for name in rows.dtype.names)
         batch = batches.setdefault(form, [])
-        batch.append(columns)
-        if sum(len(part["point"]) for part in batch) > BATCH_ROWS or len(batch) > BATCH_FILES:
+        batch.append(rows)
+        if sum(map(len, batch)) > BATCH_ROWS or len(batch) > BATCH_FILES:
             yield _concatenated(batches.pop(form))
     for batch in batches.values():
         yield _concatenated(batch)
 
 
-def _concatenated(batch: list[dict[str, Any]]) -> dict[str, Any]:
-    return {name: np.concatenate([columns[name] for columns in batch]) for name in batch[0]}
+def _rows_of(columns: Mapping[str, Any]) -> NDArray[Any]:
+    """Columns as one array of rows with named fields."""
+    arrays = {name: np.asarray(column) for name, column in columns.items()}
+    rows = np.empty(len(arrays["point"]), [(name, column.dtype) for name, column in arrays.items()])
+    for name, column in arrays.items():
+        rows[name] = column
+    return rows
+
+
+def _concatenated(batch: list[NDArray[Any]]) -> dict[str, Any]:
+    return {name: np.concatenate([rows[name] for rows in batch]) for name in batch[0].dtype.names or ()}
 
 
 def _rows(files: Sequence[str]) -> str:

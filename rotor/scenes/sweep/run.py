@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from rotor.checks import NoAnswerError
@@ -147,30 +148,31 @@ def _computed(jobs: Iterable[Job], executor: Executor | None) -> Iterator[Record
         yield from map(run_point, jobs)
         return
     waiting: dict[Future[Record], Job] = {}
+    done: SimpleQueue[Future[Record]] = SimpleQueue()  # asking all that wait which of them is done takes 1 ms a point
     try:
         for job in jobs:
-            waiting[executor.submit(run_point, job)] = job
-            if len(waiting) >= AHEAD or any(future.done() for future in waiting):
-                yield from _ready(waiting)
+            future = executor.submit(run_point, job)
+            waiting[future] = job
+            future.add_done_callback(done.put)
+            while len(waiting) >= AHEAD or not done.empty():
+                yield _record_of(ready := done.get(), waiting.pop(ready))
         while waiting:
-            yield from _ready(waiting)
+            yield _record_of(ready := done.get(), waiting.pop(ready))
     finally:
         for future in waiting:
             future.cancel()
 
 
-def _ready(waiting: dict[Future[Record], Job]) -> Iterator[Record]:
-    """Records of jobs that are done, taken out of those that are waited for; of at least one."""
-    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-        job = waiting.pop(future)
-        try:
-            yield future.result()
-        except (BrokenExecutor, CancelledError):  # nothing more can be submitted
-            raise
-        except OSError as error:  # a disk that is full, see run_point
-            raise OSError(error.errno, error.strerror, error.filename) from error
-        except Exception as error:  # the worker was killed, or the cluster has lost it
-            yield _failed(job, f"{error}" or type(error).__name__, 0.0)
+def _record_of(future: Future[Record], job: Job) -> Record:
+    """The record of a job whose future is done."""
+    try:
+        return future.result()
+    except (BrokenExecutor, CancelledError):  # nothing more can be submitted
+        raise
+    except OSError as error:  # a disk that is full, see run_point
+        raise OSError(error.errno, error.strerror, error.filename) from error
+    except Exception as error:  # the worker was killed, or the cluster has lost it
+        return _failed(job, f"{error}" or type(error).__name__, 0.0)
 
 
 def run_point(job: Job) -> Record:
