@@ -41,9 +41,15 @@ inside one picture mean something, no more.
 def page(results: dict[str, list[Panel]]) -> str:
     """The whole page."""
     rows = "".join(
-        f"| [{one.title}](#{anchor(one.title)}) | {one.choose} |\n" for one in SUBJECTS if one.name in results
+        f"| [{subject.title}](#{anchor(subject.title)}) | {subject.choose} |\n"
+        for subject in SUBJECTS
+        if subject.name in results
     )
-    return HEAD + rows + "".join(section(one, results[one.name]) for one in SUBJECTS if one.name in results)
+    return (
+        HEAD
+        + rows
+        + "".join(section(subject, results[subject.name]) for subject in SUBJECTS if subject.name in results)
+    )
 
 
 def anchor(title: str) -> str:
@@ -65,7 +71,9 @@ def table(panel: Panel) -> str:
     """The errors of a panel, a row a curve."""
     rows = [
         f"| {name} | "
-        + ", ".join(f"{one.setting}: {one.error:.1e}" if one.setting else f"{one.error:.1e}" for one in points)
+        + ", ".join(
+            f"{point.setting}: {point.error:.1e}" if point.setting else f"{point.error:.1e}" for point in points
+        )
         + " |"
         for name, points in panel.curves.items()
     ]
@@ -77,7 +85,7 @@ def read_results() -> dict[str, list[Panel]]:
     if not RESULTS.exists():
         return {}
     content = json.loads(RESULTS.read_text(encoding="utf-8"))
-    return {name: [panel_of(one) for one in panels] for name, panels in content.items()}
+    return {name: [panel_of(panel) for panel in panels] for name, panels in content.items()}
 
 
 def panel_of(record: dict) -> Panel:
@@ -88,16 +96,16 @@ def panel_of(record: dict) -> Panel:
 
 def _by_panel(content: dict) -> str:
     """JSON with one panel a line."""
-    every = (
-        f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(one, ensure_ascii=False) for one in panels) + "\n]"
+    entries = (
+        f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(panel, ensure_ascii=False) for panel in panels) + "\n]"
         for name, panels in content.items()
     )
-    return "{\n" + ",\n".join(every) + "\n}\n"
+    return "{\n" + ",\n".join(entries) + "\n}\n"
 
 
 def write(results: dict[str, list[Panel]]) -> None:
     """Figures, pictures and page."""
-    ordered = {one.name: results[one.name] for one in SUBJECTS if one.name in results}
+    ordered = {subject.name: results[subject.name] for subject in SUBJECTS if subject.name in results}
     content = {name: [asdict(panel) for panel in panels] for name, panels in ordered.items()}
     RESULTS.write_text(_by_panel(content), encoding="utf-8")
     for subject in SUBJECTS:
@@ -112,19 +120,19 @@ def write(results: dict[str, list[Panel]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--shared", type=Path)
-    parser.add_argument("--only", nargs="*", choices=[one.name for one in SUBJECTS])
+    parser.add_argument("--only", nargs="*", choices=[subject.name for subject in SUBJECTS])
     parser.add_argument("--page", action="store_true")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     results = read_results()
     for subject in SUBJECTS:
         if (
-            given.page
-            or (given.only and subject.name not in given.only)
-            or (subject.name == "orders" and given.shared is None)
+            arguments.page
+            or (arguments.only and subject.name not in arguments.only)
+            or (subject.name == "orders" and arguments.shared is None)
         ):
             continue
         start = time.perf_counter()
-        results[subject.name] = subject.panels(given.shared)
+        results[subject.name] = subject.panels(arguments.shared)
         print(f"{subject.name}: {time.perf_counter() - start:.0f} s")
         write(results)
     write(results)

@@ -64,21 +64,21 @@ def curve(scene: Scene, knob: str, error_of: str | None = None) -> list[Point]:
 
 def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
     """The points of one knob of a scene for every error: what it is of, its unit, the points."""
-    found = next(one for one in knobs_of(scene, SCENES).knobs if one.name == knob)
-    rows, against, _, _ = sweep(found, LIMIT_SECONDS)
+    computed = next(item for item in knobs_of(scene, SCENES).knobs if item.name == knob)
+    rows, against, _, _ = sweep(computed, LIMIT_SECONDS)
     if "time limit" in against:
         raise ValueError(f"{knob}: {against}; the page needs the whole sweep")
-    return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in found.measures]
+    return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in computed.measures]
 
 
 def spectra() -> dict[str, SpectrumScene]:
     """Lists of lines: a light linear molecule, a heavy asymmetric one, a cold one."""
-    every = SpectrumObservables(min_lgint=-12.0)
+    complete = SpectrumObservables(min_lgint=-12.0)
     return {
-        "CO, 300 K": SpectrumScene(molecule="CO", observables=every),
+        "CO, 300 K": SpectrumScene(molecule="CO", observables=complete),
         "SO₂, 300 K": SpectrumScene(molecule="SO2", observables=SpectrumObservables(min_lgint=-8.0)),
         "CH₂OHCHO, 10 K": SpectrumScene(
-            molecule="CH2OHCHO", conditions=SpectrumConditions(temperature="10 K"), observables=every
+            molecule="CH2OHCHO", conditions=SpectrumConditions(temperature="10 K"), observables=complete
         ),
     }
 
@@ -88,14 +88,14 @@ def highest_j(_: Path | None) -> list[Panel]:
         Panel(
             "highest J of a list",
             "integrated intensity (%)",
-            {n: curve(one, "numerics.jmax") for n, one in spectra().items()},
+            {n: curve(scene, "numerics.jmax") for n, scene in spectra().items()},
         )
     ]
 
 
 def cut(_: Path | None) -> list[Panel]:
-    found = {name: curve(one, "observables.min_lgint") for name, one in spectra().items()}
-    return [Panel("least intensity in a list, log10(nm² MHz)", "integrated intensity (%)", found)]
+    computed = {name: curve(scene, "observables.min_lgint") for name, scene in spectra().items()}
+    return [Panel("least intensity in a list, log10(nm² MHz)", "integrated intensity (%)", computed)]
 
 
 def orders(shared: Path | None) -> list[Panel]:
@@ -128,48 +128,48 @@ def measured(name: str, shared: Path) -> list[Point]:
     seen = reference.take((reference.tag < 0) & (reference.quanta_upper[:, 0] <= tag.j_max))
     top, jmax = rotor.read(name), int(seen.quanta_upper[:, 0].max())
     points, calls = [], []
-    for order in sorted({2, *(order_of(one, top) for one in top.constants.values)}):
+    for order in sorted({2, *(order_of(value, top) for value in top.constants.values)}):
         calls.append(partial(rotor.api.line_list, to_order(top, order), jmax=jmax, min_lgint=None, q=1.0))
         lines, seconds, _ = timed(calls[-1])
-        found = compare(seen, catalogue(lines))
-        points.append(Point(f"J^{order}", seconds, float(np.median(np.abs(found.differences("frequency_mhz"))))))
-    times, _ = in_rounds(calls, [one.seconds for one in points])
-    return [replace(one, seconds=seconds) for one, seconds in zip(points, times, strict=True)]
+        comparison = compare(seen, catalogue(lines))
+        points.append(Point(f"J^{order}", seconds, float(np.median(np.abs(comparison.differences("frequency_mhz"))))))
+    times, _ = in_rounds(calls, [point.seconds for point in points])
+    return [replace(point, seconds=seconds) for point, seconds in zip(points, times, strict=True)]
 
 
 def evened(points: list[Point]) -> list[Point]:
     """The points with their times without what is scatter."""
-    times = without_scatter([[one.seconds] for one in points])
-    return [replace(one, seconds=seconds) for one, seconds in zip(points, times, strict=True)]
+    times = without_scatter([[point.seconds] for point in points])
+    return [replace(point, seconds=seconds) for point, seconds in zip(points, times, strict=True)]
 
 
 def partition(_: Path | None) -> list[Panel]:
-    found = {}
+    results = {}
     for name in ("CO", "water", "CH2OHCHO"):
         scene = ThermoScene(molecule=name, conditions=ThermoConditions(temperature=[10.0, 100.0, 300.0]))
-        found[name] = curve(scene, "numerics.relative_error", "Q")
-    return [Panel("relative error asked for, at 10, 100 and 300 K", "Q (%)", found)]
+        results[name] = curve(scene, "numerics.relative_error", "Q")
+    return [Panel("relative error asked for, at 10, 100 and 300 K", "Q (%)", results)]
 
 
 def hyperfine(_: Path | None) -> list[Panel]:
     from bench_spins import METHODS, methods
 
-    found = {
-        name: [Point(method, *own[method], own=method == "exact") for method in METHODS]
-        for name, own in methods(3).items()
+    computed = {
+        name: [Point(method, *solver[method], own=method == "exact") for method in METHODS]
+        for name, solver in methods(3).items()
     }
     formamide = read_scene(SCENES / "formamide_hyperfine.toml")
     scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables=LevelsObservables(jmax=20))
-    found["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
-    return [Panel("method of hyperfine structure", "energy of a level (MHz)", found, joined=False)]
+    computed["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
+    return [Panel("method of hyperfine structure", "energy of a level (MHz)", computed, joined=False)]
 
 
 def stark(_: Path | None) -> list[Panel]:
-    found = {}
+    results = {}
     for name, molecule in (("OCS", "OCS"), ("indole", INDOLE)):
         scene = StarkScene(molecule=molecule, conditions=StarkConditions(field="0:200kV/cm:21"))
-        found[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
-    return [Panel("highest J of the basis, states of J ≤ 2", "energy (MHz)", found)]
+        results[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
+    return [Panel("highest J of the basis, states of J ≤ 2", "energy (MHz)", results)]
 
 
 def pulse(_: Path | None) -> list[Panel]:
@@ -180,13 +180,13 @@ def pulse(_: Path | None) -> list[Panel]:
         "QuTiP vern7": ("1e-6", "1e-8", "1e-10", "1e-12"),
         "scipy expm_multiply": ("64 steps", "256 steps", "1024 steps", "4096 steps"),
     }
-    one = {
+    single = {
         name: evened([Point(s, ms / 1e3, error) for s, (error, ms) in zip(settings[name], points, strict=True)])
         for name, points in work_precision().items()
     }
     thermal = curve(read_scene(SCENES / "ocs_alignment.toml"), "numerics.tolerance")
     return [
-        Panel("OCS from J = 0, 50 fs, 4001 times", "⟨cos²θ⟩", one),
+        Panel("OCS from J = 0, 50 fs, 4001 times", "⟨cos²θ⟩", single),
         Panel("OCS at 1 K, 1 ps: tolerance", "⟨cos²θ⟩", {"rotor": thermal}),
     ]
 
@@ -194,21 +194,21 @@ def pulse(_: Path | None) -> list[Panel]:
 def free(_: Path | None) -> list[Panel]:
     from bench_work_precision import curves as methods
 
-    found = {}
+    results = {}
     for name, points in methods().items():
         if name.endswith(("order 2", "order 8", "Moser-Veselov 8", "DOP853")) or name.startswith("exact"):
-            found[name] = evened([Point("", us * 1e-6, error) for us, error in points])
-    return [Panel("after 1000 periods, time of one period", "attitude (rad)", found)]
+            results[name] = evened([Point("", us * 1e-6, error) for us, error in points])
+    return [Panel("after 1000 periods, time of one period", "attitude (rad)", results)]
 
 
 def driven(_: Path | None) -> list[Panel]:
-    every = {
+    complete = {
         "pendulum": "physical_pendulum",
         "gyrostat": "dual_spin_satellite",
         "chaos": "driven_chaos",
     }
     panel = {}
-    for name, file in every.items():
+    for name, file in complete.items():
         scene = read_scene(SCENES / f"{file}.toml")
         few = replace_times(scene, 5)
         panel[name] = curve(few, "numerics.tolerance")
@@ -260,7 +260,7 @@ def ewald(_: Path | None) -> list[Panel]:
 def samples(_: Path | None) -> list[Panel]:
     times = GasObservables(times="0:0.5:51")
     scene = GasScene(molecule="water", observables=times, numerics=GasNumerics(molecules=10_000))
-    knobs = [one for one in knobs_of(scene).knobs if one.name == "numerics.molecules"]
+    knobs = [knob for knob in knobs_of(scene).knobs if knob.name == "numerics.molecules"]
     panels = []
     for knob in knobs:
         rows, _, _, _ = sweep(knob, LIMIT_SECONDS)

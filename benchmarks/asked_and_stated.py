@@ -172,8 +172,8 @@ class Measured:
 Reference = tuple[float, str]
 
 
-def maximum(one: Any, other: Any) -> float:
-    return float(np.nanmax(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0))
+def maximum(value: Any, other: Any) -> float:
+    return float(np.nanmax(np.abs(np.asarray(value) - np.asarray(other)), initial=0.0))
 
 
 def reference_of(scene: Any, result: Any) -> Reference:
@@ -189,7 +189,7 @@ def _levels(scene: Any, request: Any, answer: Any) -> Reference:
     levels = answer.table.levels if hasattr(answer, "table") else answer.lines.levels
     if any(effect.spins(request.top) for effect in request.effects):
         exact = answer_levels(replace(request, effects=effects_of(request.top, True, "exact"))).table.levels
-        rows = [np.lexsort((one.energy_mhz, one.quanta["f"])) for one in (levels, exact)]
+        rows = [np.lexsort((table.energy_mhz, table.quanta["f"])) for table in (levels, exact)]
         return maximum(levels.energy_mhz[rows[0]], exact.energy_mhz[rows[1]]), "the exact method"
     assert request.top.kind == "linear"
     constants = {name: Fraction(value) for name, value in request.top.constants.values.items()}
@@ -229,7 +229,7 @@ def _map(scene: Any, request: Any, answer: Any) -> Reference:
 def _thermo(scene: Any, request: Any, answer: Any) -> Reference:
     exact = kind_of(scene).verb.answer(replace(request, relative_error=1e-13), _work(kind_of(scene)))
     names = ("q_rot", "energy_j_per_mol", "cv_over_r")
-    pairs = [[getattr(one.functions, name) for one in (answer, exact)] for name in names]
+    pairs = [[getattr(result.functions, name) for result in (answer, exact)] for name in names]
     return max(float(np.abs(a / b - 1).max()) for a, b in pairs), "sums to 1e-13"
 
 
@@ -253,12 +253,12 @@ def exact_attitude_error(request: Any, answer: Any) -> float:
     import mpmath
 
     mpmath.mp.dps = 25
-    moments = [mpmath.mpf(one) for one in request.moments]
+    moments = [mpmath.mpf(moment) for moment in request.moments]
 
     def slopes(_: Any, state: list[Any]) -> list[Any]:
         """dL/dt = L x ω in the body and dq/dt = q ω/2."""
         momentum, (w, x, y, z) = state[:3], state[3:]
-        p, q, r = (one / moment for one, moment in zip(momentum, moments, strict=True))
+        p, q, r = (component / moment for component, moment in zip(momentum, moments, strict=True))
         turning = [
             momentum[1] * r - momentum[2] * q,
             momentum[2] * p - momentum[0] * r,
@@ -274,11 +274,12 @@ def exact_attitude_error(request: Any, answer: Any) -> float:
         slopes, 0, [*map(mpmath.mpf, request.angular_momentum), 1, 0, 0, 0], tol=mpmath.mpf(10) ** -22
     )
     worst = mpmath.mpf(0)
-    for time_, found in zip(answer.table.times.tolist(), answer.table.attitude.tolist(), strict=True):
+    for time_, computed in zip(answer.table.times.tolist(), answer.table.attitude.tolist(), strict=True):
         true = solve(mpmath.mpf(time_))[3:]
-        same = 1 if mpmath.fdot(true, found) > 0 else -1
+        same = 1 if mpmath.fdot(true, computed) > 0 else -1
         worst = max(
-            worst, 2 * mpmath.sqrt(sum((one - same * other) ** 2 for one, other in zip(true, found, strict=True)))
+            worst,
+            2 * mpmath.sqrt(sum((first - same * other) ** 2 for first, other in zip(true, computed, strict=True))),
         )
     return float(worst)
 
@@ -292,8 +293,8 @@ def _emission(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, least_depth=1e-3 * request.least_depth)
     exact = kind_of(scene).verb.answer(finer, _work(kind_of(scene)))
     grid = exact.spectrum.frequency_mhz
-    found = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
-    return maximum(found, exact.spectrum.brightness_k), "lines of a thousandth of the depth"
+    interpolated = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
+    return maximum(interpolated, exact.spectrum.brightness_k), "lines of a thousandth of the depth"
 
 
 def _fit(scene: Any, request: Any, answer: Any) -> Reference:
@@ -305,11 +306,11 @@ def _fit(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _torsion(scene: Any, request: Any, answer: Any) -> Reference:
     count = request.vmax + 1
-    found = [
-        [answer.torsion.states(one, waves)[0][:count] for waves in (answer.waves, 2 * answer.waves)]
-        for one in range(answer.torsion.fold // 2 + 1)
+    computed = [
+        [answer.torsion.states(sigma, waves)[0][:count] for waves in (answer.waves, 2 * answer.waves)]
+        for sigma in range(answer.torsion.fold // 2 + 1)
     ]
-    return max(maximum(few, many) for few, many in found), "twice as many functions"
+    return max(maximum(few, many) for few, many in computed), "twice as many functions"
 
 
 def _fluid(scene: Any, request: Any, answer: Any) -> Reference:
@@ -364,9 +365,9 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - start, value
 
 
-def measured(number: int, kind: str, asked: str, body: str, folder: Path) -> Measured:
+def measured(number: int, kind: str, goal: str, body: str, folder: Path) -> Measured:
     """One scene: run, compared with its reference and with the next coarser setting."""
-    accuracy = asked if kind in ("align",) or (not asked[-1].isalpha() and "%" not in asked) else f'"{asked}"'
+    accuracy = goal if kind in ("align",) or (not goal[-1].isalpha() and "%" not in goal) else f'"{goal}"'
     (folder / "l.csv").write_text(LINES_OF_CO, encoding="utf-8")
     scene = parse_scene(f'schema = 1\nkind = "{kind}"\naccuracy = {accuracy}\n{body}')
     result = run_scene(scene, folder=folder, out=folder)
@@ -388,18 +389,18 @@ def measured(number: int, kind: str, asked: str, body: str, folder: Path) -> Mea
         except ValueError as reason:
             words += f": refused ({' '.join(str(reason).split())[:70]} ...)"
     return Measured(
-        number, kind, asked, reached.how, reached.unit, reached.asked, reached.error, actual, against, seconds, words, error, coarse_seconds
+        number, kind, goal, reached.how, reached.unit, reached.asked, reached.error, actual, against, seconds, words, error, coarse_seconds
     )  # fmt: skip
 
 
-def verdict(one: Measured) -> str:
+def verdict(row: Measured) -> str:
     """What does not hold, in words; empty where all does."""
     faults = []
-    if one.actual > one.stated:
+    if row.actual > row.stated:
         faults.append("actual above stated")
-    if one.stated > one.limit:
+    if row.stated > row.limit:
         faults.append("stated above asked")
-    if one.coarser_error is not None and one.coarser_error <= one.limit:
+    if row.coarser_error is not None and row.coarser_error <= row.limit:
         faults.append("coarser serves")
     return ", ".join(faults)
 
@@ -409,20 +410,20 @@ def page(rows: list[Measured]) -> str:
         "| scene | kind | asked | chosen | stated | actual | against | coarser states | seconds | |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for one in rows:
-        unit = f" {one.unit}".rstrip()
-        coarser = one.coarser if one.coarser_error is None else f"{one.coarser}: {one.coarser_error:.1e}{unit}"
-        seconds = f"{one.seconds:.2g}" + ("" if one.coarser_seconds is None else f", {one.coarser_seconds:.2g}")
-        errors = f"{one.stated:.1e}{unit} | {one.actual:.1e}{unit}"
-        cells = (one.number, one.kind, one.asked, one.chosen, errors, one.reference, coarser, seconds, verdict(one))
+    for row in rows:
+        unit = f" {row.unit}".rstrip()
+        coarser = row.coarser if row.coarser_error is None else f"{row.coarser}: {row.coarser_error:.1e}{unit}"
+        seconds = f"{row.seconds:.2g}" + ("" if row.coarser_seconds is None else f", {row.coarser_seconds:.2g}")
+        errors = f"{row.stated:.1e}{unit} | {row.actual:.1e}{unit}"
+        cells = (row.number, row.kind, row.asked, row.chosen, errors, row.reference, coarser, seconds, verdict(row))
         lines.append(f"| {' | '.join(map(str, cells))} |")
-    bounds = sum(one.actual <= one.stated for one in rows)
-    wasteful = [one for one in rows if "coarser serves" in verdict(one)]
-    ratios = [one.stated / max(one.actual, 1e-300) for one in rows if one.actual > 0]
+    bounds = sum(row.actual <= row.stated for row in rows)
+    wasteful = [row for row in rows if "coarser serves" in verdict(row)]
+    ratios = [row.stated / max(row.actual, 1e-300) for row in rows if row.actual > 0]
     summary = (
         f"\nStated is above actual in {bounds} of {len(rows)} scenes; the median of stated over actual is {np.median(ratios):.2g}. In "
         f"{len(wasteful)} the next coarser setting would have served"
-        + (f": {', '.join(str(one.number) for one in wasteful)}.\n" if wasteful else ".\n")
+        + (f": {', '.join(str(row.number) for row in wasteful)}.\n" if wasteful else ".\n")
     )
     return HEAD + "\n".join(lines) + "\n" + summary
 

@@ -36,7 +36,7 @@ def between(name: str, edges: list[float], form: str = "{:g}") -> Groups:
     ]
 
 
-def of_type(letter: str) -> Callable[[Row], bool]:
+def row_selector(letter: str) -> Callable[[Row], bool]:
     """Whether the greatest dipole component of the strongest species is this."""
     return lambda row: bool(row["type"] == letter)
 
@@ -45,14 +45,14 @@ PANELS: dict[str, Groups] = {
     "signal-to-noise ratio": between("signal_to_noise", [100, 300, 1000, 3001]),
     "share of foreign peaks": between("foreign", [0.0, 0.1, 0.2, 0.35]),
     "κ": between("kappa", [-1.0, -0.9, -0.5, 0.0, 1.0]),
-    "strongest type": [(letter, of_type(letter)) for letter in "abc"],
+    "strongest type": [(letter, row_selector(letter)) for letter in "abc"],
 }
 
 
 def with_bars(axes: Any, places: Any, shares: list[dict[str, Any]], colour: str) -> None:
     """Shares in per cent with their intervals."""
-    y = np.array([100 * one["share"] for one in shares])
-    low, high = (np.array([100 * one[end] for one in shares]) for end in ("low", "high"))
+    y = np.array([100 * item["share"] for item in shares])
+    low, high = (np.array([100 * item[end] for item in shares]) for end in ("low", "high"))
     axes.errorbar(
         places, y, yerr=[np.maximum(y - low, 0), np.maximum(high - y, 0)], fmt="o", ms=4, capsize=3, color=colour
     )
@@ -82,10 +82,12 @@ def diagram(rows: list[Row]) -> Any:
     with styled():
         figure = new_figure((4.0, 3.4))
         axes = figure.add_subplot()
-        groups = [one for one in reliability(rows) if one["of"]]
-        with_bars(axes, [100 * one["stated"] for one in groups], groups, BLUE)
-        for one in groups:
-            axes.annotate(f" {one['of']}", (100 * one["stated"], 100 * one["share"]), fontsize=7, va="top", ha="left")
+        groups = [group for group in reliability(rows) if group["of"]]
+        with_bars(axes, [100 * group["stated"] for group in groups], groups, BLUE)
+        for group in groups:
+            axes.annotate(
+                f" {group['of']}", (100 * group["stated"], 100 * group["share"]), fontsize=7, va="top", ha="left"
+            )
         axes.plot([0, 100], [0, 100], color=GREY, lw=0.6, ls=":")
         axes.set(xlabel="Stated probability (%)", ylabel="Right (%)", xlim=(45, 101), ylim=(0, 103))
         return figure
@@ -99,7 +101,9 @@ def isotopologues(result: dict[str, Any]) -> Any:
         axes = figure.add_subplot()
         x = np.arange(len(rows))
         axes.bar(x, [len(row["species"]) for row in rows], color=GREY, alpha=0.35, label="13C species")
-        enough = [sum(one["lines"] >= result["summary"]["enough_lines"] for one in row["species"]) for row in rows]
+        enough = [
+            sum(component["lines"] >= result["summary"]["enough_lines"] for component in row["species"]) for row in rows
+        ]
         axes.bar(
             x,
             enough,
@@ -109,7 +113,7 @@ def isotopologues(result: dict[str, Any]) -> Any:
         )
         axes.bar(
             x,
-            [sum(one["right"] for one in row["species"]) for row in rows],
+            [sum(component["right"] for component in row["species"]) for row in rows],
             width=0.5,
             color=BLUE,
             label="found, right",

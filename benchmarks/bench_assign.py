@@ -57,7 +57,7 @@ def kind_of(dipole: Sequence[float]) -> str:
     return "abc"[int(np.argmax(np.abs(dipole)))]
 
 
-def own(first: int, count: int) -> Iterator[Truth]:
+def simulated(first: int, count: int) -> Iterator[Truth]:
     """Cases of the generator with enough signal."""
     seed = first
     while count:
@@ -72,7 +72,8 @@ def own(first: int, count: int) -> Iterator[Truth]:
         }  # fmt: skip
         yield Truth(
             case.seed, peak_list(*case.peaks.T, band_mhz=case.band_mhz), case.signal_to_noise,
-            [tuple(one.constants[:3].tolist()) for one in case.species], [one.parent for one in case.species], facts,
+            [tuple(component.constants[:3].tolist()) for component in case.species],
+            [component.parent for component in case.species], facts,
         )  # fmt: skip
 
 
@@ -99,11 +100,11 @@ def redrawn(peaks: PeakList, seed: int) -> PeakList:
     return peak_list(np.clip(f, *peaks.band_mhz), peaks.intensity, peaks.uncertainty_mhz, band_mhz=peaks.band_mhz)
 
 
-def is_right(one: AssignedSpecies, truth: tuple[float, ...]) -> bool:
+def is_right(species: AssignedSpecies, truth: tuple[float, ...]) -> bool:
     """Whether the constants are those of the truth."""
-    values, errors = one.refined.values[:3], one.refined.errors[:3]
+    values, errors = species.refined.values[:3], species.refined.errors[:3]
     off = np.abs(values - np.array(truth))
-    closed = np.array([name not in one.refined.open_constants for name in "ABC"])
+    closed = np.array([name not in species.refined.open_constants for name in "ABC"])
     return bool(closed[1:].all() and (off[closed] < np.minimum(5 * errors, 1e-3 * values)[closed]).all())
 
 
@@ -127,11 +128,12 @@ def row_of(case: Truth, answer: AssignAnswer, seconds: float) -> dict[str, Any]:
     """What is recorded of a case."""
     species = [
         {
-            "right": [n for n, truth in enumerate(case.constants) if is_right(one, truth)],
-            "word": one.word, "probability": one.probability, "evidence": float(one.grown.evidence), "lines": one.grown.lines,
-            "types": one.kind,
+            "right": [n for n, truth in enumerate(case.constants) if is_right(component, truth)],
+            "word": component.word, "probability": component.probability,
+            "evidence": float(component.grown.evidence), "lines": component.grown.lines,
+            "types": component.kind,
         }
-        for one in answer.species
+        for component in answer.species
     ]  # fmt: skip
     a, b, c = case.constants[0]
     return {
@@ -143,18 +145,18 @@ def row_of(case: Truth, answer: AssignAnswer, seconds: float) -> dict[str, Any]:
 
 def has(row: dict[str, Any], number: int) -> bool:
     """Whether a species of the truth is among the answers."""
-    return any(number in one["right"] for one in row["found"])
+    return any(number in entry["right"] for entry in row["found"])
 
 
 def wrong_and_certain(row: dict[str, Any]) -> bool:
     """Whether an answer that is no species of the truth is called certain."""
-    return any(one["word"] == CERTAIN and not one["right"] for one in row["found"])
+    return any(entry["word"] == CERTAIN and not entry["right"] for entry in row["found"])
 
 
 def reliability(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Of the answers within limits of the stated probability: their mean probability and the share that is right."""
-    stated = np.array([one["probability"] for row in rows for one in row["found"]])
-    right = np.array([bool(one["right"]) for row in rows for one in row["found"]])
+    stated = np.array([entry["probability"] for row in rows for entry in row["found"]])
+    right = np.array([bool(entry["right"]) for row in rows for entry in row["found"]])
     out = []
     for low, high in itertools.pairwise(EDGES):
         inside = (stated >= low) & ((stated < high) | (high == EDGES[-1]))
@@ -174,12 +176,14 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "cases": len(rows),
         "strongest_found": share(sum(has(row, 0) for row in rows), len(rows)),
-        "strongest_first": share(sum(0 in one["right"] for one in first), len(rows)),
+        "strongest_first": share(sum(0 in species["right"] for species in first), len(rows)),
         "second_found": share(second, len(several)),
         "lists_with_a_certain_and_wrong_species": share(sum(map(wrong_and_certain, rows)), len(rows)),
-        "first_certain_and_wrong": share(sum(one["word"] == CERTAIN and not one["right"] for one in first), len(rows)),
+        "first_certain_and_wrong": share(
+            sum(species["word"] == CERTAIN and not species["right"] for species in first), len(rows)
+        ),
         "lists_without_any_species": share(sum(not row["found"] for row in rows), len(rows)),
-        "certain_species": sum(one["word"] == CERTAIN for row in rows for one in row["found"]),
+        "certain_species": sum(entry["word"] == CERTAIN for row in rows for entry in row["found"]),
         "reliability": reliability(rows),
         "seconds_median": float(np.median(times)) if times else None,
         "seconds_95": float(np.quantile(times, 0.95)) if times else None,
@@ -215,7 +219,11 @@ def run(cases: Iterator[Truth], guess: bool, null: bool, state: Path | None, min
         if state:
             with state.open("a") as file:
                 file.write(json.dumps(row) + "\n")
-        print(row["case"], [(one["right"], one["word"], round(one["evidence"])) for one in row["found"]], flush=True)
+        print(
+            row["case"],
+            [(entry["right"], entry["word"], round(entry["evidence"])) for entry in row["found"]],
+            flush=True,
+        )
     return rows
 
 
@@ -230,23 +238,24 @@ def run_isotopologues() -> dict[str, Any]:
         middle = time.process_time()
         answer = answer_assign(replace(plain, molecule=case.molecule, isotopologues=True))
         ended = time.process_time()
-        labelled = [one for one in answer.species if one.isotopologue]
+        labelled = [component for component in answer.species if component.isotopologue]
         right = [
-            one.isotopologue
-            for one in labelled
-            if is_right(one, case.substituted.get(one.isotopologue, (0.0, 0.0, 0.0)))
+            assigned.isotopologue
+            for assigned in labelled
+            if is_right(assigned, case.substituted.get(assigned.isotopologue, (0.0, 0.0, 0.0)))
         ]
         rows.append({
-            "smiles": case.smiles, "peaks": len(case.peaks), "parent": any(is_right(one, case.parent) for one in answer.species),
+            "smiles": case.smiles, "peaks": len(case.peaks),
+            "parent": any(is_right(component, case.parent) for component in answer.species),
             "species": [{"label": label, "lines": lines, "right": label in right} for label, lines in case.visible.items()],
             "wrong": len(labelled) - len(right), "seconds": ended - middle, "seconds_without": middle - started,
         })  # fmt: skip
         print(rows[-1], flush=True)
-    species = [one for row in rows for one in row["species"]]
-    enough = [one for one in species if one["lines"] >= ENOUGH_LINES]
+    species = [component for row in rows for component in row["species"]]
+    enough = [component for component in species if component["lines"] >= ENOUGH_LINES]
     result = {
-        "right_of_all": share(sum(one["right"] for one in species), len(species)),
-        "right_of_those_with_enough_lines": share(sum(one["right"] for one in enough), len(enough)),
+        "right_of_all": share(sum(component["right"] for component in species), len(species)),
+        "right_of_those_with_enough_lines": share(sum(entry["right"] for entry in enough), len(enough)),
         "enough_lines": ENOUGH_LINES,
         "wrong": sum(row["wrong"] for row in rows),
     }
@@ -272,7 +281,7 @@ def main() -> None:
         if chosen.json:
             chosen.json.write_text(json.dumps(result, indent=1) + "\n")
         return
-    cases = shared(chosen.shared) if chosen.shared else own(chosen.first, chosen.cases)
+    cases = shared(chosen.shared) if chosen.shared else simulated(chosen.first, chosen.cases)
     rows = run(cases, chosen.guess, chosen.redrawn, chosen.state, chosen.minutes)
     result = summary(rows)
     print(json.dumps(result, indent=1))

@@ -71,7 +71,7 @@ def compiled_beside_called() -> dict[str, float]:
     """Steps a second of one body under two effects: in the compiled loop, and with both called from Python at every step."""
     table = {}
     for name, (method, names) in PAIRS.items():
-        effects, length = [EFFECTS[one] for one in names], getattr(method, "fixed_step", None) or STEP
+        effects, length = [EFFECTS[name] for name in names], getattr(method, "fixed_step", None) or STEP
         speed = {}
         for form, few, steps in (("compiled", 0, 200_000), ("called", np.inf, 2_000)):
             splitting.WORTH_LOADING = lie_runge_kutta.PLAIN_STEPS = few  # type: ignore[assignment]

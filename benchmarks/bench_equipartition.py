@@ -74,12 +74,12 @@ def frames_of(
         if k >= 0:
             momenta = (dynamics.state.momentum.copy(), dynamics.state.angular.copy())
             seen.append(momenta if on_step else dynamics.half_step_momenta())
-    found = kinetic_degrees(
+    kinetics = kinetic_degrees(
         masses=bodies.mass, velocities=np.array([p for p, _ in seen]) / bodies.mass[:, None],
         moments=bodies.moments, momenta=np.array([spin for _, spin in seen]),
     )  # fmt: skip
     kt = fluid.temperature_k * units.EV_PER_K
-    return KineticDegrees({name: energies / kt for name, energies in found.energies.items()}, found.counts)
+    return KineticDegrees({name: energies / kt for name, energies in kinetics.energies.items()}, kinetics.counts)
 
 
 def family(parts: dict[str, KineticDegrees]) -> KineticDegrees:

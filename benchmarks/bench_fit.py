@@ -63,12 +63,12 @@ def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeat
 
     points = cycle([free.start * (1 + 1e-12), free.start * (1 - 1e-12)])  # the last point is not computed again
 
-    def one() -> None:
+    def round_() -> None:
         point = next(points)
         state = _State.at(point, *search.evaluate(point))
         _Linear.of(state, state.norms, np.zeros(len(free.start))).step(0.0)
 
-    return 1e3 * fastest(one, repeats)
+    return 1e3 * fastest(round_, repeats)
 
 
 def fastest(run: Callable[[], object], repeats: int) -> float:
@@ -112,11 +112,11 @@ def iterations(count: int = 500, jmax: int = 30, share: float = 0.03) -> list[di
 
     best = fitted(100, 1e-9)
     for most in range(1, 20):
-        found = fitted(most)
-        left = float(np.abs((found.values - best.values) / best.errors).max())
+        computed = fitted(most)
+        left = float(np.abs((computed.values - best.values) / best.errors).max())
         seconds = fastest(lambda most=most: fitted(most), 3)  # type: ignore[misc]
-        rows.append({"iterations": len(found.minimum.iterations), "off_sigma": left, "ms": 1e3 * seconds})
-        if found.converged:
+        rows.append({"iterations": len(computed.minimum.iterations), "off_sigma": left, "ms": 1e3 * seconds})
+        if computed.converged:
             break
     return rows
 
@@ -132,12 +132,12 @@ def work_precision(count: int = 500, jmax: int = 30, share: float = 0.03) -> lis
 
     best = fitted(1e-9)
     for tolerance in 10.0 ** np.arange(5, -8, -1):
-        found = fitted(tolerance)
+        computed = fitted(tolerance)
         rows.append({
             "tolerance": float(tolerance),
-            "iterations": len(found.minimum.iterations),
+            "iterations": len(computed.minimum.iterations),
             "seconds": fastest(lambda tolerance=tolerance: fitted(tolerance), 3),  # type: ignore[misc]
-            "off_sigma": float(np.abs((found.values - best.values) / best.errors).max()),
+            "off_sigma": float(np.abs((computed.values - best.values) / best.errors).max()),
         })  # fmt: skip
     return rows
 
@@ -159,9 +159,9 @@ def picture(path: Path) -> None:
             facts[label] = rows
             x, y = [row["ms"] for row in rows], [max(row["off_sigma"], 1e-9) for row in rows]
             axes.semilogy(x, y, "o-", color=color, label=label, markersize=3.5)
-            for row, one, other in zip(rows, x, y, strict=True):
+            for row, cost, other in zip(rows, x, y, strict=True):
                 axes.annotate(
-                    f"{row['iterations']:g}", (one, other), fontsize=6, xytext=(3, 3), textcoords="offset points"
+                    f"{row['iterations']:g}", (cost, other), fontsize=6, xytext=(3, 3), textcoords="offset points"
                 )
         axes.axhline(1.0, color="#555555", linewidth=0.7)
         axes.axhline(1e-4, color="#555555", linewidth=0.7, linestyle="--")
@@ -176,20 +176,20 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
-    given = parser.parse_args()
-    if given.picture:
-        picture(given.picture)
+    arguments = parser.parse_args()
+    if arguments.picture:
+        picture(arguments.picture)
         return
-    found = {"one_state": one_state(), "iterations": iterations(), "work_precision": work_precision()}
-    for rows in found.values():
+    computed = {"one_state": one_state(), "iterations": iterations(), "work_precision": work_precision()}
+    for rows in computed.values():
         for row in rows:
             print(
                 "  ".join(
                     f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()
                 )
             )
-    if given.json:
-        given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(computed, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -48,12 +48,12 @@ def _above(*states: int) -> str:
 def _each(states: int) -> str:
     """All of A, B, C, quartic and sextic constants of every state, in place of those of all states together."""
     rows = [row.split() for row in (ROTATION + QUARTIC + SEXTIC).splitlines()]
-    found = ""
+    word = ""
     for v in range(states):
         for place, (code, value, label) in enumerate(rows):
             change = OTHERS[v - 1][2 + place] if v and place < 3 else 0.0
-            found += f"{code[:-2]}{v}{v} {float(value) * (1 + 0.01 * v if place > 2 else 1) + change!r} {label}{v}\n"
-    return found + "".join(f"{v}{v} {OTHERS[v - 1][1]} E{v}\n" for v in range(1, states))
+            word += f"{code[:-2]}{v}{v} {float(value) * (1 + 0.01 * v if place > 2 else 1) + change!r} {label}{v}\n"
+    return word + "".join(f"{v}{v} {OTHERS[v - 1][1]} E{v}\n" for v in range(1, states))
 
 
 def _lit(states: int) -> str:
@@ -146,10 +146,10 @@ class Run:
 def processor_time(command: list[str], folder: Path) -> float:
     """Seconds of user and system time of a process; RuntimeError with what it said where it fails."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    own = {
+    our_run = {
         name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
     }  # else compiled each time
-    environment = own | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    environment = our_run | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
     )
@@ -177,8 +177,8 @@ def spfit_run(folder: Path, program: str) -> Run:
         shutil.copy(folder / f"case.{suffix}", here / f"case.{suffix}")
     seconds = processor_time([program, "case"], here)
     text = (here / "case.fit").read_text(errors="replace")
-    found = re.findall(r"END OF ITERATION\s+(\d+) OLD, NEW RMS ERROR=\s*(\S+)", text)
-    return Run(seconds, len(found), float(found[-1][1]))
+    matches = re.findall(r"END OF ITERATION\s+(\d+) OLD, NEW RMS ERROR=\s*(\S+)", text)
+    return Run(seconds, len(matches), float(matches[-1][1]))
 
 
 def iteration(folder: Path) -> float:
@@ -192,21 +192,27 @@ def iteration(folder: Path) -> float:
     from rotor.quantum.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State
 
-    asked = read_fit(folder / "case.par")
-    labels, upper, lower = levels_in(asked.lines)
-    model = asked.model(labels) if asked.model else level_model(asked.constants, labels, kmax=asked.options.kmax)
-    used = np.ones(len(asked.lines), dtype=bool)
-    start = asked.parameters.start
-    search = Search(asked.lines, model, asked.parameters, asked.options, upper, lower, asked.lines.error_mhz, used)
+    fit_input = read_fit(folder / "case.par")
+    labels, upper, lower = levels_in(fit_input.lines)
+    model = (
+        fit_input.model(labels)
+        if fit_input.model
+        else level_model(fit_input.constants, labels, kmax=fit_input.options.kmax)
+    )
+    used = np.ones(len(fit_input.lines), dtype=bool)
+    start = fit_input.parameters.start
+    search = Search(
+        fit_input.lines, model, fit_input.parameters, fit_input.options, upper, lower, fit_input.lines.error_mhz, used
+    )
 
     points = cycle([start * (1 + 1e-12), start * (1 - 1e-12)])  # neither the start nor the last point is computed again
 
-    def one() -> None:
+    def iterate() -> None:
         point = next(points)
         state = _State.at(point, *search.evaluate(point))
         _Linear.of(state, state.norms, np.zeros(len(start))).step(0.0)
 
-    return 1e3 * fastest(one, 9)
+    return 1e3 * fastest(iterate, 9)
 
 
 def measured(name: str, folder: Path, rounds: int, program: str | None) -> dict[str, Any]:
@@ -225,19 +231,19 @@ def measured(name: str, folder: Path, rounds: int, program: str | None) -> dict[
         "case": name,
         "lines": kind.lines,
         "parameters": len(re.findall(r"1\.0+E\+36", (folder / "case.par").read_text())),
-        "run_s": statistics.median(one.seconds for one in ours),
-        "run_fastest_s": min(one.seconds for one in ours),
+        "run_s": statistics.median(timing.seconds for timing in ours),
+        "run_fastest_s": min(timing.seconds for timing in ours),
         "iterations": ours[-1].iterations,
         "weighted_rms": ours[-1].rms,
         "iteration_ms": iteration(folder),
     }
     if theirs:
         row |= {
-            "spfit_run_s": statistics.median(one.seconds for one in theirs),
-            "spfit_fastest_s": min(one.seconds for one in theirs),
+            "spfit_run_s": statistics.median(timing.seconds for timing in theirs),
+            "spfit_fastest_s": min(timing.seconds for timing in theirs),
             "spfit_iterations": theirs[-1].iterations,
             "spfit_rms": theirs[-1].rms,
-            "spfit_iteration_ms": 1e3 * min(one.seconds for one in theirs) / theirs[-1].iterations,
+            "spfit_iteration_ms": 1e3 * min(timing.seconds for timing in theirs) / theirs[-1].iterations,
         }
     return row
 
@@ -261,15 +267,15 @@ def main() -> None:
     parser.add_argument("--only", default="", help="cases whose names have this in them")
     parser.add_argument("--folder", type=Path, help="where the cases are, made there where they are missing")
     parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
-        folder, rows = given.folder or Path(temporary), []
+        folder, rows = arguments.folder or Path(temporary), []
         for number, name in enumerate(CASES):
-            if given.only in name:
-                rows.append(measured(name, folder.resolve() / str(number), given.rounds, given.spfit))
+            if arguments.only in name:
+                rows.append(measured(name, folder.resolve() / str(number), arguments.rounds, arguments.spfit))
                 print(text_of(rows[-1]), flush=True)
-    if given.json:
-        given.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

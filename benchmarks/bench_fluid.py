@@ -341,19 +341,21 @@ def main() -> None:
     parser.add_argument("--boxes", type=Path, default=Path(tempfile.gettempdir()), help="folder that keeps the boxes")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
-    given = parser.parse_args()
-    stored = json.loads(given.json.read_text(encoding="utf-8")) if given.json and given.json.exists() else {}
+    arguments = parser.parse_args()
+    stored = (
+        json.loads(arguments.json.read_text(encoding="utf-8")) if arguments.json and arguments.json.exists() else {}
+    )
     parts = {
-        "speed": lambda: speed(given.boxes),
-        "drift": lambda: drift(given.boxes, given.ps),
-        "ase": lambda: by_ase(given.boxes, given.ase_steps),
+        "speed": lambda: speed(arguments.boxes),
+        "drift": lambda: drift(arguments.boxes, arguments.ps),
+        "ase": lambda: by_ase(arguments.boxes, arguments.ase_steps),
     }
-    for part in given.parts:
+    for part in arguments.parts:
         stored[part] = parts[part]()
-    if given.json:
-        given.json.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
-    if given.picture and "drift" in stored:
-        draw(stored["drift"], given.picture)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    if arguments.picture and "drift" in stored:
+        draw(stored["drift"], arguments.picture)
 
 
 if __name__ == "__main__":

@@ -42,12 +42,12 @@ def water(n: int, rng: np.random.Generator) -> Atoms:
 
 def seconds(run: Callable[[], object], repeats: int) -> float:
     """The fastest of some runs."""
-    found = []
+    results = []
     for _ in range(repeats):
         start = time.perf_counter()
         run()
-        found.append(time.perf_counter() - start)
-    return min(found)
+        results.append(time.perf_counter() - start)
+    return min(results)
 
 
 def measured(n: int, electrostatics: str, threads: int, repeats: int) -> dict[str, float]:

@@ -65,8 +65,8 @@ def truncation(constants: dict[str, float], rho: float) -> tuple[float, float]:
     """The largest difference in Hz of v_t = 0 at J = 25 between n_v = 9 and all functions, and the stated one."""
     ram, actual = model(constants, rho), 0.0
     for sigma in (0, 1):
-        found = [ram.blocks(sigma, 25, jmin=25, count=n).solve(ram.coefficients, 0) for n in (9, 21)]
-        by_name = [one.energies[np.lexsort([one.quanta[n] for n in ("kc", "ka")])] for one in found]
+        computed = [ram.blocks(sigma, 25, jmin=25, count=n).solve(ram.coefficients, 0) for n in (9, 21)]
+        by_name = [entry.energies[np.lexsort([entry.quanta[n] for n in ("kc", "ka")])] for entry in computed]
         actual = max(actual, float(np.abs(by_name[0] - by_name[1]).max()))
     return actual * 1e6, truncation_mhz(ram, 25, 0, 9) * 1e6
 
@@ -79,8 +79,8 @@ def slope_to_rigid() -> float:
     for ratio in (4e3, 16e3):
         ram = RamModel(constants | {"F": 160e3, "rho": 0.1, "V3": 160e3 * ratio})
         levels = ram.blocks(0, 3, count=7, waves=24).solve(ram.coefficients, 0)
-        found = np.sort(levels.energies[levels.quanta["j"] == 3]) - levels.energies[levels.quanta["j"] == 0][0]
-        errors.append(np.abs(found - expected).max())
+        computed = np.sort(levels.energies[levels.quanta["j"] == 3]) - levels.energies[levels.quanta["j"] == 0][0]
+        errors.append(np.abs(computed - expected).max())
     return float(np.log(errors[1] / errors[0]) / np.log(4.0))
 
 

@@ -101,18 +101,18 @@ class Planned:
 
 def cases() -> dict[str, Scene]:
     """All scenes that are measured, without files and sweeps."""
-    found: dict[str, Scene] = {}
+    results: dict[str, Scene] = {}
     for path in sorted(FOLDER.glob("*.toml")):
         scene = read_scene(path)
-        found[path.stem] = msgspec.structs.replace(scene, outputs=type(scene.outputs)(), sweep={})
+        results[path.stem] = msgspec.structs.replace(scene, outputs=type(scene.outputs)(), sweep={})
     for name, tables in CHANGED.items():
-        scene = found[name]
+        scene = results[name]
         changes = {table: msgspec.structs.replace(getattr(scene, table), **new) for table, new in tables.items()}
         changes |= {"accuracy": COARSER[name]} if name in COARSER else {}
         if "numerics" in tables or name == "driven_chaos":
             changes["accuracy"] = None  # the numbers are given here; chaos allows none for so long
-        found[f"{name}, longer"] = msgspec.structs.replace(scene, **changes)
-    return found | OTHERS
+        results[f"{name}, longer"] = msgspec.structs.replace(scene, **changes)
+    return results | OTHERS
 
 
 def measure(case: str) -> Planned:
@@ -142,23 +142,25 @@ def within(planned: float, taken: float, least: float) -> bool:
     return max(planned, taken) < least or 1 / 3 < planned / taken < 3
 
 
-def line(one: Planned) -> str:
-    ratios = one.planned_seconds / one.taken_seconds, one.planned_mb / one.taken_mb
+def line(planned: Planned) -> str:
+    ratios = planned.planned_seconds / planned.taken_seconds, planned.planned_mb / planned.taken_mb
     missed = (
         ""
-        if within(one.planned_seconds, one.taken_seconds, 1.0) and within(one.planned_mb, one.taken_mb, 1.0)
+        if within(planned.planned_seconds, planned.taken_seconds, 1.0)
+        and within(planned.planned_mb, planned.taken_mb, 1.0)
         else "  MISSED"
     )
     return (
-        f"{one.case:28s} seconds: planned {one.planned_seconds:8.3g}, taken {one.taken_seconds:8.3g}, ratio {ratios[0]:5.2f}    "
-        f"MB: planned {one.planned_mb:8.3g}, taken {one.taken_mb:8.3g}, ratio {ratios[1]:5.2f}{missed}"
+        f"{planned.case:28s} seconds: planned {planned.planned_seconds:8.3g}, "
+        f"taken {planned.taken_seconds:8.3g}, ratio {ratios[0]:5.2f}    "
+        f"MB: planned {planned.planned_mb:8.3g}, taken {planned.taken_mb:8.3g}, ratio {ratios[1]:5.2f}{missed}"
     )
 
 
 def read_results() -> dict[str, Planned]:
     """What was measured last."""
     stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-    return {one["case"]: Planned(**one) for one in stored}
+    return {row["case"]: Planned(**row) for row in stored}
 
 
 def main() -> None:
@@ -167,16 +169,16 @@ def main() -> None:
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--missing", action="store_true", help="those that have no figure yet")
     parser.add_argument("--measure", help=argparse.SUPPRESS)  # one case, in this process
-    given = parser.parse_args()
-    if given.measure:
-        print(json.dumps(asdict(measure(given.measure)), ensure_ascii=False))
+    arguments = parser.parse_args()
+    if arguments.measure:
+        print(json.dumps(asdict(measure(arguments.measure)), ensure_ascii=False))
         return
-    known, every = read_results(), list(cases())
-    for case in given.only or [one for one in every if not (given.missing and one in known)]:
+    known, names = read_results(), list(cases())
+    for case in arguments.only or [name for name in names if not (arguments.missing and name in known)]:
         done = subprocess.run([sys.executable, __file__, "--measure", case], capture_output=True, text=True, check=True)
         known[case] = Planned(**json.loads(done.stdout.splitlines()[-1]))
         print(line(known[case]), flush=True)
-        text = ",\n".join(json.dumps(asdict(known[one]), ensure_ascii=False) for one in every if one in known)
+        text = ",\n".join(json.dumps(asdict(known[name]), ensure_ascii=False) for name in names if name in known)
         RESULTS.write_text(f"[\n{text}\n]\n", encoding="utf-8")
 
 

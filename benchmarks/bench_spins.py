@@ -49,14 +49,14 @@ METHODS = ("first-order", "N-diagonal", "exact")
 def timed(run: Callable[[], Any]) -> tuple[float, Any]:
     """Seconds of a run, and what it returned."""
     start = time.perf_counter()
-    found = run()
-    return time.perf_counter() - start, found
+    process = run()
+    return time.perf_counter() - start, process
 
 
 def median(run: Callable[[], Any], rounds: int) -> tuple[float, Any]:
     """The median of the seconds of some rounds, and what the last one returned."""
-    every = [timed(run) for _ in range(rounds)]
-    return statistics.median(seconds for seconds, _ in every), every[-1][1]
+    seconds = [timed(run) for _ in range(rounds)]
+    return statistics.median(seconds for seconds, _ in seconds), seconds[-1][1]
 
 
 def five_nuclei() -> Top:
@@ -97,8 +97,8 @@ def write_four_states(folder: Path, jmax: int) -> None:
     """The same four states as files four.var and four.int of SPCAT."""
     rows = [(f"{11 * v:02d}", 150_000.0 * v) for v in range(1, 4)]
     for v in range(4):
-        of_axes = (9000.0 + 20 * v, 3000.0 - 3 * v, 2300.0 - 2 * v)
-        rows += [(f"{axis}00{11 * v:02d}", value) for axis, value in zip("123", of_axes, strict=True)]
+        constants = (9000.0 + 20 * v, 3000.0 - 3 * v, 2300.0 - 2 * v)
+        rows += [(f"{axis}00{11 * v:02d}", value) for axis, value in zip("123", constants, strict=True)]
     for v in range(1, 4):
         rows += [(f"6000{v - 1}{v}", 300.0), (f"6100{v - 1}{v}", 1.0)]
     lines = [f"{code:>13s} {value:22.15E} 1.0E-37 /x" for code, value in rows]
@@ -141,12 +141,14 @@ def beside_spcat(path: Path, rounds: int) -> dict[str, Any]:
     }
     if program := shutil.which("spcat"):
         programs["SPCAT, whole process"] = partial(spcat, program, path)
-    found = predict_file(path)  # what is loaded and kept once is not part of a round
+    prediction = predict_file(path)  # what is loaded and kept once is not part of a round
     times: dict[str, list[float]] = {name: [] for name in programs}
     for _ in range(rounds):
         for name, run in programs.items():
             times[name].append(timed(run)[0])
-    row: dict[str, Any] = {"lines": len(found.lines)} | {name: statistics.median(own) for name, own in times.items()}
+    row: dict[str, Any] = {"lines": len(prediction.lines)} | {
+        name: statistics.median(seconds) for name, seconds in times.items()
+    }
     if program:
         row["in memory / SPCAT"] = row["in memory"] / row["SPCAT, whole process"]
     return row
@@ -163,8 +165,8 @@ def measure(rounds: int) -> dict[str, dict[str, Any]]:
         write_four_states(folder, 30)
         out["four states, J <= 30"] = beside_spcat(folder / "four.int", rounds)
     out["four states, J <= 30"]["in memory, line_list"] = median(partial(four_states, 30), rounds)[0]
-    seconds, found = median(partial(spectrum_of_five, 10), max(1, rounds // 2))
-    out["five nuclei, N <= 10"] = {"lines": len(found), "in memory": seconds}
+    seconds, computed = median(partial(spectrum_of_five, 10), max(1, rounds // 2))
+    out["five nuclei, N <= 10"] = {"lines": len(computed), "in memory": seconds}
     out["five nuclei, N <= 10"]["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     return out
 
@@ -182,24 +184,24 @@ def methods(rounds: int) -> dict[str, dict[str, tuple[float, float]]]:
         ("two ¹⁴N and three H, N ≤ 10", five_nuclei(), 10),
     ):
         exact, _ = sorted_energies(top, nmax, "exact")
-        own = {}
+        seconds_ = {}
         for method in METHODS:
-            seconds, (found, _) = median(partial(sorted_energies, top, nmax, method), rounds)
-            own[method] = (seconds, float(np.abs(found - exact).max()))
-        out[name] = own
+            seconds, (computed, _) = median(partial(sorted_energies, top, nmax, method), rounds)
+            seconds_[method] = (seconds, float(np.abs(computed - exact).max()))
+        out[name] = seconds_
     return out
 
 
-def picture(found: dict[str, dict[str, tuple[float, float]]], path: Path) -> None:
+def picture(computed: dict[str, dict[str, tuple[float, float]]], path: Path) -> None:
     """Largest error of a level against time, a point a method."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     axes = figure.add_subplot()
-    for name, own in found.items():
-        seconds = [own[method][0] for method in METHODS]
+    for name, points in computed.items():
+        seconds = [points[method][0] for method in METHODS]
         errors = [
-            max(own[method][1], 1e-9) for method in METHODS
+            max(points[method][1], 1e-9) for method in METHODS
         ]  # the exact one counts as far as digits of energies go
         axes.loglog(seconds, errors, "o-", label=name)
         for method, x, y in zip(METHODS, seconds, errors, strict=True):
@@ -219,16 +221,21 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()
-    times, own = measure(options.rounds), methods(options.rounds)
+    times, curves = measure(options.rounds), methods(options.rounds)
     for case, row in times.items():
         print(f"{case:24s}", ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{v} {k}" for k, v in row.items()))
-    for name, row in own.items():
+    for name, row in curves.items():
         print(name, ", ".join(f"{method}: {s:.3g} s, {error:.2g} MHz" for method, (s, error) in row.items()))
     if options.json:
-        content = {"machine": platform.machine(), "python": platform.python_version(), "times": times, "methods": own}
+        content = {
+            "machine": platform.machine(),
+            "python": platform.python_version(),
+            "times": times,
+            "methods": curves,
+        }
         options.json.write_text(json.dumps(content, indent=1), encoding="utf-8")
     if options.picture:
-        picture(own, options.picture)
+        picture(curves, options.picture)
 
 
 if __name__ == "__main__":

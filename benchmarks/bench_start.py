@@ -93,8 +93,8 @@ MEMORY = {"J ≤ 200 above 1e-12, in memory": ("-12", 0.22), "J ≤ 200 all line
 
 def _environment() -> dict[str, str]:
     """Of an installation: this package, its modules compiled to bytecode once."""
-    own = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    return own | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return environment | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
 
 
 def run(case: Case, folder: Path) -> float:

@@ -119,7 +119,7 @@ class ByRotations(Flows):
 
 def drifts(atoms: Atoms, step_fs: float = 2.0) -> dict[str, dict[str, float]]:
     """Energy error over 2 ps and cost of a drift, for both splittings."""
-    found = {}
+    results = {}
     makers: dict[str, Callable[..., Flows]] = {"symmetric top and remainder": Flows, "three rotations": ByRotations}
     for name, make in makers.items():
         dynamics = dynamics_from(atoms, step_fs)
@@ -127,8 +127,8 @@ def drifts(atoms: Atoms, step_fs: float = 2.0) -> dict[str, dict[str, float]]:
         rows = series(dynamics, round(2000 / step_fs))
         energy = rows[:, 0] + rows[:, 1] + rows[:, 4]
         best = min(timed(lambda d=dynamics: d._flows.drift(d.state, 1e-9)) for _ in range(20))
-        found[name] = {"energy_rms_kj_per_mol": energy.std() * 96.48533212331, "us_per_body": best / MOLECULES * 1e6}
-    return found
+        results[name] = {"energy_rms_kj_per_mol": energy.std() * 96.48533212331, "us_per_body": best / MOLECULES * 1e6}
+    return results
 
 
 def timed(job: Callable[[], None]) -> float:

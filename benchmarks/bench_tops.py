@@ -49,8 +49,8 @@ def ours(n: int, steps: int) -> dict[str, float]:
     momentum, attitude = bodies(n)
     propagate(MOMENTS, momentum[:1], attitude[:1], STEP, 1)  # compile
     step = STEP / np.max(np.linalg.norm(momentum, axis=-1))  # the fastest body turns by at most STEP / smallest moment
-    one = best(lambda: propagate(MOMENTS, momentum, attitude, step, steps), n * steps)
-    rates = {"rotor, 1 core": one}
+    single = best(lambda: propagate(MOMENTS, momentum, attitude, step, steps), n * steps)
+    rates = {"rotor, 1 core": single}
     if cores() > 1:
         with ThreadPoolExecutor(2) as pool:
             two = best(lambda: propagate(MOMENTS, momentum, attitude, step, steps, executor=pool), n * steps)
@@ -158,7 +158,7 @@ def best_rounds(rounds: list[dict[str, float | str]]) -> dict[str, float | str]:
     table = rounds[0]
     for name, value in table.items():
         if not isinstance(value, str):
-            table[name] = max(float(one[name]) for one in rounds)
+            table[name] = max(float(round[name]) for round in rounds)
     table["rounds"] = float(len(rounds))
     peers = {name: value for name, value in table.items() if name.startswith(("LAMMPS", "MuJoCo"))}
     ratios = {

@@ -65,8 +65,8 @@ def start(settings: Settings, molecules: int, box: Path) -> Atoms:
         atoms = lattice_box(model_of(settings.model), molecules, 0.997, np.random.default_rng(7))
         atoms.calc = potential(settings)
         relax(atoms)
-        for friction, every in ((10.0, 1000), (2.0, 50)):
-            warm = replace(settings, ensemble="langevin", friction_per_ps=friction, steps=10_000, every=every)
+        for friction, interval in ((10.0, 1000), (2.0, 50)):
+            warm = replace(settings, ensemble="langevin", friction_per_ps=friction, steps=10_000, every=interval)
             record, _ = ours(atoms, warm)
         # the mean energy of the ensemble is potential + f kT/2; the momenta are scaled to it
         energy = float(np.mean(record.potential_ev)) + (6 * molecules - 3) / 2 * units.kB * settings.temperature_k
@@ -108,9 +108,9 @@ def measured(engine: str, atoms: Atoms, settings: Settings) -> dict[str, Any]:
     g = np.mean([shell.g for shell in shells], axis=0)
     table["g"] = [np.round(shells[0].r_angstrom, 4).tolist(), np.round(g, 4).tolist()]
     interval = float(record.time_ps[1] - record.time_ps[0])
-    found = diffusion(oxygen, interval)
-    endless = yeh_hummer_correction(found, float(np.mean(record.temperature_k)), VISCOSITY, float(edges[0]))
-    table["diffusion_1e9_m2_per_s"] = [found.value * 1e9, found.error * 1e9]
+    transport = diffusion(oxygen, interval)
+    endless = yeh_hummer_correction(transport, float(np.mean(record.temperature_k)), VISCOSITY, float(edges[0]))
+    table["diffusion_1e9_m2_per_s"] = [transport.value * 1e9, transport.error * 1e9]
     table["diffusion_endless_box"] = endless.corrected * 1e9
     slope, error = drift_per_ns(record.time_ps, record.total_ev / (6 * molecules - 3) / (units.kB * 298.15))
     table["drift_kt_per_degree_per_ns"] = [slope, error]
@@ -127,23 +127,23 @@ def main() -> None:
     parser.add_argument("--ps", type=float, default=200.0)
     parser.add_argument("--box", type=Path, default=Path("water.extxyz"), help="made if it is not there")
     parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     settings = Settings(
-        model=given.model,
-        electrostatics=given.electrostatics,
-        steps=round(given.ps * 500),
+        model=arguments.model,
+        electrostatics=arguments.electrostatics,
+        steps=round(arguments.ps * 500),
         every=25,
         cutoff_angstrom=9.0,
     )
-    for engine in given.engines:
-        table = measured(engine, start(settings, given.molecules, given.box), settings)
+    for engine in arguments.engines:
+        table = measured(engine, start(settings, arguments.molecules, arguments.box), settings)
         for name, value in table.items():
             if name != "g":
                 print(f"{engine:8s} {name:35s} {value}", flush=True)
-        if given.json:
-            stored = json.loads(given.json.read_text(encoding="utf-8")) if given.json.exists() else {}
-            stored[f"{given.model}, {given.electrostatics}, {engine}"] = table
-            given.json.write_text(
+        if arguments.json:
+            stored = json.loads(arguments.json.read_text(encoding="utf-8")) if arguments.json.exists() else {}
+            stored[f"{arguments.model}, {arguments.electrostatics}, {engine}"] = table
+            arguments.json.write_text(
                 json.dumps(stored, indent=None, separators=(",", ":")).replace('"},', '"},\n') + "\n", encoding="utf-8"
             )
 

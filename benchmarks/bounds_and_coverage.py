@@ -57,11 +57,11 @@ def measured(kind: str) -> dict[str, Any]:
     """The figures of one kind."""
     start = time.process_time()
     cases = [CASES[kind](seed) for seed in range(EACH)]
-    ratios = np.array([one.stated / max(one.actual, one.floor) for one in cases])
-    plain = [one.stated / one.actual for one in cases if one.actual > 0]
+    ratios = np.array([case.stated / max(case.actual, case.floor) for case in cases])
+    plain = [case.stated / case.actual for case in cases if case.actual > 0]
     return {
         "cases": len(cases),
-        "above": sum(one.actual > one.stated for one in cases),
+        "above": sum(case.actual > case.stated for case in cases),
         "median": float(np.median(ratios)),
         "of_95": float(np.sort(ratios)[int(0.95 * (len(ratios) - 1))]),
         "plain_median": float(np.median(plain)) if plain else None,
@@ -69,28 +69,31 @@ def measured(kind: str) -> dict[str, Any]:
     }
 
 
-def row(kind: str, one: dict[str, Any]) -> str:
+def row(kind: str, summary: dict[str, Any]) -> str:
     """A row of the table of bounds."""
     doc = (CASES[kind].__doc__ or "").splitlines()[0].rstrip(".")
-    plain = "-" if one["plain_median"] is None else f"{one['plain_median']:.2g}"
+    plain = "-" if summary["plain_median"] is None else f"{summary['plain_median']:.2g}"
     return (
-        f"| {kind.replace('_', ' ')} | {doc} | {one['cases']} | {one['above']} | {one['median']:.2g} | {one['of_95']:.2g} | {plain} "
-        f"| {one['seconds']:.0f} |"
+        f"| {kind.replace('_', ' ')} | {doc} | {summary['cases']} | {summary['above']} | {summary['median']:.2g} "
+        f"| {summary['of_95']:.2g} | {plain} "
+        f"| {summary['seconds']:.0f} |"
     )
 
 
 def page(results: dict[str, Any]) -> str:
     """The whole page."""
     kinds = results["bounds"]
-    above, cases = sum(one["above"] for one in kinds.values()), sum(one["cases"] for one in kinds.values())
+    above, cases = sum(kind["above"] for kind in kinds.values()), sum(kind["cases"] for kind in kinds.values())
     lines = [
         "| kind | actual error | cases | above | median ratio | 95 % below | median of stated over actual | seconds |",
         "|---|---|---|---|---|---|---|---|",
-        *(row(kind, one) for kind, one in kinds.items()),
+        *(row(kind, item) for kind, item in kinds.items()),
         "",
         f"{above} of {cases} cases are above their bound.",
     ]
-    rows = [f"| {name} | {one['draws']} | {100 * one['inside']:.1f} % |" for name, one in results["coverage"].items()]
+    rows = [
+        f"| {name} | {entry['draws']} | {100 * entry['inside']:.1f} % |" for name, entry in results["coverage"].items()
+    ]
     return HEAD + "\n".join(lines) + "\n" + COVERAGE + "\n".join(rows) + "\n"
 
 
@@ -105,13 +108,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", choices=[*CASES, "coverage"])
     parser.add_argument("--page", action="store_true")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {"bounds": {}, "coverage": {}}
-    for kind in [] if given.page else CASES if given.only is None else [one for one in given.only if one in CASES]:
+    for kind in (
+        []
+        if arguments.page
+        else CASES
+        if arguments.only is None
+        else [kind_ for kind_ in arguments.only if kind_ in CASES]
+    ):
         results["bounds"][kind] = measured(kind)
         write(results)
         print(row(kind, results["bounds"][kind]), flush=True)
-    if not given.page and (given.only is None or "coverage" in given.only):
+    if not arguments.page and (arguments.only is None or "coverage" in arguments.only):
         for name in COVERED:
             inside = covered(name)
             results["coverage"][name] = {

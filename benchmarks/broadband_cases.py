@@ -139,23 +139,23 @@ def make_case(seed: int, signal_to_noise: float | None = None) -> Case:
             dipole = rng.uniform(0.1, 2.0, 3) * (rng.random(3) < 0.85)
             if rng.random() < 0.3:
                 dipole *= np.eye(3)[int(rng.integers(3))]
-            one = Species(
+            component = Species(
                 np.concatenate([rigid, quartic(rigid, rng)]), tuple(dipole.round(4).tolist()),
                 1.0 if k == 0 else float(rng.uniform(0.1, 1.0)), atoms,
             )  # fmt: skip
             if not dipole.any():
                 continue
             try:
-                enough = len(lines_of(one, temperature, band, max(floor, 1e-3))[0]) >= 16
+                enough = len(lines_of(component, temperature, band, max(floor, 1e-3))[0]) >= 16
             except ValueError:
                 enough = False
             if enough:
                 break
-        mains.append(one)
+        mains.append(component)
     species = list(mains)
     if snr > 450:
-        for place, one in enumerate(mains):
-            species += isotopologues(one, place, rng)
+        for place, component in enumerate(mains):
+            species += isotopologues(component, place, rng)
     return case_with(seed, band, temperature, snr, floor, species, len(mains), rng)
 
 
@@ -173,9 +173,9 @@ def case_with(
         return np.asarray(ripple / (1 + np.exp(-(x - 0.0) / 0.06)) / (1 + np.exp((x - 1.0) / 0.06)))
 
     saturation = rng.uniform(150, 2000)
-    for place, one in enumerate(species):
-        f, i = lines_of(one, temperature, band, floor / 3)
-        if one.parent is None and place > 0 and rng.random() < 0.25:
+    for place, component in enumerate(species):
+        f, i = lines_of(component, temperature, band, floor / 3)
+        if component.parent is None and place > 0 and rng.random() < 0.25:
             split = True
             f, i = _split(f, i, float(rng.uniform(0.5, 1.5)), rng)
         i = i * response(f)
@@ -211,8 +211,8 @@ def _measured(f: Floats, i: Floats, fwhm: float, noise: float, floor: float, rng
     height = np.bincount(blend, i)
     centre = np.bincount(blend, f * i) / height
     height = height + noise * rng.normal(size=len(height))
-    kept = height > floor
-    centre, height = centre[kept], height[kept]
+    visible = height > floor
+    centre, height = centre[visible], height[visible]
     error = np.sqrt(0.004**2 + (0.5 * fwhm * noise / height) ** 2)
     centre = centre + error * rng.normal(size=len(centre))
     order = np.argsort(centre)

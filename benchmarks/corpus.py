@@ -65,10 +65,10 @@ def record(path: Path, checkout: Path, only: str) -> None:
             shutil.copytree(CASES / "inputs", folder, dirs_exist_ok=True)
             if name.startswith("scene "):
                 Path(folder, "s.toml").write_text(scene, encoding="utf-8")
-            inputs = {one.name for one in Path(folder).iterdir()}
+            inputs = {path.name for path in Path(folder).iterdir()}
             results[name] = run(words, Path(folder), inputs)
     path.write_text(json.dumps(results, ensure_ascii=False, indent=0), encoding="utf-8")
-    print(f"{len(results)} cases, {sum(one['seconds'] for one in results.values()):.0f} s")
+    print(f"{len(results)} cases, {sum(result['seconds'] for result in results.values()):.0f} s")
 
 
 def run(words: list[str], folder: Path, inputs: set[str]) -> dict[str, Any]:
@@ -122,21 +122,21 @@ def difference(key: str, old: Any, new: Any) -> list[str]:
         return []
     if not isinstance(old, str) or not isinstance(new, str):
         return [f"{key}: {str(old)[:200]} -> {str(new)[:200]}"]
-    found = []
+    results = []
     for line in difflib.unified_diff(old.splitlines(), new.splitlines(), lineterm="", n=0):
         if line[:1] in "+-" and line[:3] not in ("+++", "---"):
-            found.append(line)
-    gone, come = ([line[1:] for line in found if line[0] == sign] for sign in "-+")
+            results.append(line)
+    gone, come = ([line[1:] for line in results if line[0] == sign] for sign in "-+")
     if len(gone) == len(come) and all(same(a, b) for a, b in zip(gone, come, strict=True)):
         return []
-    return [f"  {key}: {line[:300]}" for line in found]
+    return [f"  {key}: {line[:300]}" for line in results]
 
 
-def same(one: str, other: str) -> bool:
+def same(first: str, other: str) -> bool:
     """Whether two lines have the same words and numbers within round-off."""
-    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+    if NUMBER.sub("#", first) != NUMBER.sub("#", other):
         return False
-    pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    pairs = zip(NUMBER.findall(first), NUMBER.findall(other), strict=True)
     return all(abs(float(a) - float(b)) <= 1e-9 * max(abs(float(a)), abs(float(b))) + 1e-12 for a, b in pairs)
 
 

@@ -275,8 +275,8 @@ def options_of(verb: str) -> list[str]:
         return []
     if verb not in _OPTIONS:
         command = typer.main.get_command(_application([verb]))
-        found = command.commands[verb].params  # type: ignore[attr-defined]
-        _OPTIONS[verb] = [o for one in found for o in one.opts if o.startswith("--") and o not in UNBOUNDED]
+        computed = command.commands[verb].params  # type: ignore[attr-defined]
+        _OPTIONS[verb] = [o for option in computed for o in option.opts if o.startswith("--") and o not in UNBOUNDED]
     return _OPTIONS[verb]
 
 
@@ -289,13 +289,13 @@ def run_case(number: int, files: dict[str, bytes], templates: tuple[str, ...]) -
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         words = case_words(number, folder, files, templates)
-        given = _names(folder)
+        names = _names(folder)
         os.chdir(folder)
         try:
             outcome = run_words(words)[0]
         finally:
             os.chdir(before)
-        new = _names(folder) - given
+        new = _names(folder) - names
         if outcome.code != 0 and words[:1] != [
             "fluid"
         ]:  # the rows of a fluid, the report of a fit without an end, stay
@@ -304,7 +304,7 @@ def run_case(number: int, files: dict[str, bytes], templates: tuple[str, ...]) -
             name for name in new if Path(name).name.startswith(".rotor") and name not in outcome.left
         )
         if outcome.failing:
-            outcome.made_by = repr({p: (folder / p).read_bytes()[:300] for p in sorted(given)})
+            outcome.made_by = repr({p: (folder / p).read_bytes()[:300] for p in sorted(names)})
     return outcome
 
 
@@ -382,18 +382,24 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--cases", type=int, default=2000)
     parser.add_argument("--seconds", type=float, default=float("inf"))
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with contextlib.suppress(ImportError):
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     os.environ["COLUMNS"] = "100"
-    failing, done = fuzz(asked.first, asked.cases, QUICK * 3 + SLOW, asked.seconds)
-    counts = Counter(one.failing for one in failing)
-    piece = {"first": asked.first, "cases": done, **{name: counts[name] for name in ("defect", "hang", "left behind")}}
+    failing, done = fuzz(options.first, options.cases, QUICK * 3 + SLOW, options.seconds)
+    counts = Counter(failure.failing for failure in failing)
+    piece = {
+        "first": options.first,
+        "cases": done,
+        **{name: counts[name] for name in ("defect", "hang", "left behind")},
+    }
     pieces = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-    pieces = [one for one in pieces if one["first"] != asked.first] + [piece]
-    RESULTS.write_text(json.dumps(sorted(pieces, key=lambda one: one["first"]), indent=1) + "\n", encoding="utf-8")
+    pieces = [piece for piece in pieces if piece["first"] != options.first] + [piece]
+    RESULTS.write_text(
+        json.dumps(sorted(pieces, key=lambda piece_: piece_["first"]), indent=1) + "\n", encoding="utf-8"
+    )
     print(piece)
 
 

@@ -108,8 +108,8 @@ def _file_seeds() -> list[Seed]:
     seeds = []
     for path in sorted((ROOT / "tests" / "oracles").rglob("*.*")):
         if path.suffix in verbs and "hitran" not in path.parts and path.stat().st_size < 9000:
-            beside = [one for one in path.parent.glob(f"{path.stem}.*") if one.suffix in (*verbs, ".lin")]
-            files = tuple((one.name, one.read_bytes()) for one in sorted(beside) if one.stat().st_size < 20_000)
+            beside = [file for file in path.parent.glob(f"{path.stem}.*") if file.suffix in (*verbs, ".lin")]
+            files = tuple((file.name, file.read_bytes()) for file in sorted(beside) if file.stat().st_size < 20_000)
             seeds += [Seed("file", tuple(text.format(path.name).split()), files) for text in verbs[path.suffix]]
     return seeds
 
@@ -219,7 +219,7 @@ def changed_words(seed: Seed, rng: random.Random, seeds: list[Seed]) -> list[str
         ):
             words[at] = changed_text(words[at], rng, 0.4, bool(SIZES.search(before)))
     if rng.random() < 0.15:
-        same = [one.words for one in seeds if one.words[:1] == seed.words[:1] and one.kind == "command"]
+        same = [item.words for item in seeds if item.words[:1] == seed.words[:1] and item.kind == "command"]
         donor = rng.choice(same)
         options = [at for at, word in enumerate(donor) if word.startswith("--") and word not in words]
         if options and rng.random() < 0.95:
@@ -283,8 +283,8 @@ def _not_results(words: list[str], printed: str, files: list[Path]) -> list[str]
     texts = {"printed": printed} | {
         p.name: p.read_text("utf-8", errors="replace") for p in files if p.suffix in (".csv", ".json", ".cat", ".toml")
     }
-    defects = [f"{found[0]} in {name}: {text[max(0, found.start() - 80) : found.end() + 20]!r}" for name, text in texts.items()
-               if (found := NOT_FINITE.search(text))]  # fmt: skip
+    defects = [f"{computed[0]} in {name}: {text[max(0, computed.start() - 80) : computed.end() + 20]!r}" for name, text in texts.items()
+               if (computed := NOT_FINITE.search(text))]  # fmt: skip
     for name, text in texts.items():
         if name.endswith(".json") or (
             name == "printed"
@@ -390,45 +390,49 @@ def main() -> None:
     parser.add_argument("--state", type=Path, default=RESULTS)
     parser.add_argument("--case", type=int)
     parser.add_argument("--folder", type=Path)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     os.environ |= {"COLUMNS": "100", "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     resource.setrlimit(resource.RLIMIT_AS, (fuzz.MEMORY_BYTES, fuzz.MEMORY_BYTES))
     for library in ("numpy", "scipy.linalg", "scipy.optimize", "numba", "matplotlib.pyplot", "ase", "rdkit.Chem"):
         __import__(library)  # once, before children are forked
     load_package()
     gc.freeze()  # what is loaded is not looked through again in every case
-    lines = [json.loads(line) for line in given.state.read_text("utf-8").splitlines()] if given.state.exists() else []
+    lines = (
+        [json.loads(line) for line in arguments.state.read_text("utf-8").splitlines()]
+        if arguments.state.exists()
+        else []
+    )
     seeds = all_seeds()
     known = lines[0]["seeds"] if lines else {}
     missing = [seed for seed in dict.fromkeys(seeds) if seed.digest not in known]
     if missing and len(lines) > 1:
         raise SystemExit(
-            f"{given.state}: {len(missing)} of {len(seeds)} seeds are new since it was begun; begin another state"
+            f"{arguments.state}: {len(missing)} of {len(seeds)} seeds are new since it was begun; begin another state"
         )
     if missing:
-        found = zip(missing, in_child(seed_outcomes, missing), strict=True)
-        known |= {seed.digest: [one["code"], round(one["seconds"], 3)] for seed, one in found}
-        given.state.write_text(json.dumps({"seeds": known}) + "\n", encoding="utf-8")
+        computed = zip(missing, in_child(seed_outcomes, missing), strict=True)
+        known |= {seed.digest: [outcome["code"], round(outcome["seconds"], 3)] for seed, outcome in computed}
+        arguments.state.write_text(json.dumps({"seeds": known}) + "\n", encoding="utf-8")
     outcomes = [{"code": known[seed.digest][0], "seconds": known[seed.digest][1]} for seed in seeds]
     weighted = seeds, weights_of(seeds, outcomes)
     hostile = fuzz.seed_files()
-    if given.case is not None:
-        given.folder.mkdir(parents=True, exist_ok=True)
-        print(json.dumps(run_case(given.case, given.folder, weighted, hostile, given.whole), indent=1))
+    if arguments.case is not None:
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+        print(json.dumps(run_case(arguments.case, arguments.folder, weighted, hostile, arguments.whole), indent=1))
         return
-    size = WHOLE_PIECE if given.whole else PIECE
-    done = {line["first"] for line in lines[1:] if line["whole"] == given.whole}
-    missing = [first for first in range(given.first, given.first + given.cases, size) if first not in done]
+    size = WHOLE_PIECE if arguments.whole else PIECE
+    done = {line["first"] for line in lines[1:] if line["whole"] == arguments.whole}
+    missing = [first for first in range(arguments.first, arguments.first + arguments.cases, size) if first not in done]
     children = []
-    for worker in range(given.workers):
+    for worker in range(arguments.workers):
         if not (child := os.fork()):
-            for first in missing[worker :: given.workers]:
-                add_line(given.state, run_piece(range(first, first + size), weighted, hostile, given.whole))
+            for first in missing[worker :: arguments.workers]:
+                add_line(arguments.state, run_piece(range(first, first + size), weighted, hostile, arguments.whole))
             os._exit(0)
         children.append(child)
     for child in children:
         os.waitpid(child, 0)
-    print(summary([json.loads(line) for line in given.state.read_text("utf-8").splitlines()]))
+    print(summary([json.loads(line) for line in arguments.state.read_text("utf-8").splitlines()]))
 
 
 def add_line(path: Path, line: Answer) -> None:
@@ -458,13 +462,13 @@ def run_piece(numbers: range, weighted: Weighted, hostile: dict[str, bytes], who
         if len(done) < len(numbers):  # the process ended inside a case
             done.append({"case": first + len(done), "kind": "", "verb": "", "code": None, "seconds": fuzz.HANG_S, "computed": False,
                          "defects": ["died"], "said": "", "words": []})  # fmt: skip
-    counts = Counter(f"{one['kind']} {one['verb']} {one['code']}" for one in done)
-    defects = [one for one in done if one["defects"]]
-    for one in defects:
-        print(json.dumps(one), flush=True)
-    times = {"processor": round(sum(one["seconds"] for one in done), 1), "wall": round(time.time() - started, 1)}
-    slowest = max(done, key=lambda one: one["seconds"])
-    computed = sum(one["computed"] for one in done)
+    counts = Counter(f"{row['kind']} {row['verb']} {row['code']}" for row in done)
+    defects = [row for row in done if row["defects"]]
+    for defect in defects:
+        print(json.dumps(defect), flush=True)
+    times = {"processor": round(sum(row["seconds"] for row in done), 1), "wall": round(time.time() - started, 1)}
+    slowest = max(done, key=lambda row: row["seconds"])
+    computed = sum(row["computed"] for row in done)
     return {"first": first, "whole": whole, "cases": len(done), "computed": computed, "counts": counts, **times,
             "slowest": slowest, "defects": defects}  # fmt: skip
 
@@ -485,7 +489,7 @@ def summary(lines: list[Answer]) -> str:
         computed, defects = (
             sum(numbers) for numbers in zip(*((p["computed"], len(p["defects"])) for p in pieces), strict=True)
         )
-        slowest = max((piece["slowest"] for piece in pieces), key=lambda one: one["seconds"])
+        slowest = max((piece["slowest"] for piece in pieces), key=lambda row: row["seconds"])
         where = "whole commands" if whole else "in process"
         texts.append(f"{where}: {cases} inputs, {computed} computed ({computed / cases:.0%}), {defects} defects")
         texts += [f"  {kind or 'died':8} exit {code}: {count}" for (kind, code), count in sorted(counts.items())]

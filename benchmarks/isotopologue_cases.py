@@ -52,17 +52,21 @@ def _case(smiles: str, rng: np.random.Generator) -> IsotopologueCase:
     distortion = quartic(rigid, rng)
     dipole = (rng.permutation([2.0, 0.6, 0.3]) * rng.uniform(0.7, 1.3, 3)).round(3)
     components = (float(dipole[0]), float(dipole[1]), float(dipole[2]))
-    singles = [one for one in isotopologues(top, min_abundance=CARBON_13)[1:] if len(one.substituted) == 1]
+    singles = [
+        isotopologue
+        for isotopologue in isotopologues(top, min_abundance=CARBON_13)[1:]
+        if len(isotopologue.substituted) == 1
+    ]
     none, floor = np.zeros((0, 4)), LOWEST * 100 / SIGNAL_TO_NOISE
     species = [Species(np.concatenate([rigid, distortion]), components, 1.0, none)]
     whole = isotopologues(top, min_abundance=CARBON_13)[0].abundance
     truth, visible = dict[str, tuple[float, ...]](), dict[str, int]()
-    for one in singles:
-        changed = np.array([one.top.constants[name] for name in "ABC"])
+    for single in singles:
+        changed = np.array([single.top.constants[name] for name in "ABC"])
         quartics = distortion * ((changed[1:] / rigid[1:]).mean() ** 2)
-        species.append(Species(np.concatenate([changed, quartics]), components, one.abundance / whole, none, 0))
-        truth[one.label] = tuple(changed.tolist())
-        visible[one.label] = len(lines_of(species[-1], TEMPERATURE_K, BAND_MHZ, floor)[0])
+        species.append(Species(np.concatenate([changed, quartics]), components, single.abundance / whole, none, 0))
+        truth[single.label] = tuple(changed.tolist())
+        visible[single.label] = len(lines_of(species[-1], TEMPERATURE_K, BAND_MHZ, floor)[0])
     rows = case_with(0, BAND_MHZ, TEMPERATURE_K, SIGNAL_TO_NOISE, floor, species, 1, rng).peaks
     strain = rng.normal(size=(3, 3)) * STRAIN
     moved = molecule.positions_angstrom @ (np.eye(3) + (strain + strain.T) / 2)

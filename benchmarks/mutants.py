@@ -112,7 +112,8 @@ class Source:
             here = place
             if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
                 compiled = (
-                    any(COMPILED.search(self.text(one)) for one in child.decorator_list) or child.name in self.inlined
+                    any(COMPILED.search(self.text(decorator)) for decorator in child.decorator_list)
+                    or child.name in self.inlined
                 )
                 inside = not isinstance(child, ast.ClassDef)
                 name = () if place.function else (child.name,)
@@ -139,7 +140,8 @@ class Source:
                 for pair in pairwise(node.values):
                     yield from self._between(*pair, {"and": "or", "or": "and"}, "boolean")
             case ast.BinOp() if not any(
-                isinstance(one, ast.Constant | ast.JoinedStr) and not _is_number(one) for one in (node.left, node.right)
+                isinstance(operand, ast.Constant | ast.JoinedStr) and not _is_number(operand)
+                for operand in (node.left, node.right)
             ):
                 yield from self._between(node.left, node.right, ARITHMETIC, "arithmetic")
             case ast.UnaryOp(op=ast.Not()):
@@ -165,19 +167,19 @@ class Source:
         self, left: ast.expr, right: ast.expr, table: dict[str, str], operator: str
     ) -> Iterator[tuple[str, int, int, str]]:
         start, end = self.span(left)[1], self.span(right)[0]
-        found = re.search(
+        match = re.search(
             r"not\s+in|is\s+not|\b(?:in|is|and|or)\b|\*\*|//|[<>=!]=|[-+*/%<>]", self.bytes[start:end].decode()
         )
-        if found and " ".join(found[0].split()) in table:
-            before = len(self.bytes[start:end].decode()[: found.start()].encode())
-            yield operator, start + before, start + before + len(found[0].encode()), table[" ".join(found[0].split())]
+        if match and " ".join(match[0].split()) in table:
+            before = len(self.bytes[start:end].decode()[: match.start()].encode())
+            yield operator, start + before, start + before + len(match[0].encode()), table[" ".join(match[0].split())]
 
     def _of_call(self, node: ast.Call) -> Iterator[tuple[str, int, int, str]]:
         name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
         if name in REDUCED:
             end = self.span(node.func)[1]
             yield "all/any", end - len(name), end, REDUCED[name]
-        if len(node.args) >= 2 and not any(isinstance(one, ast.Starred) for one in node.args[:2]):
+        if len(node.args) >= 2 and not any(isinstance(arg, ast.Starred) for arg in node.args[:2]):
             first, second = node.args[:2]
             if self.text(first) != self.text(second) and name not in (
                 "isinstance",

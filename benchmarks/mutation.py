@@ -127,32 +127,32 @@ class Fresh:
 # Mutants run
 
 
-def run(folder: Path, mutants: list[Mutant], given: argparse.Namespace) -> None:
+def run(folder: Path, mutants: list[Mutant], arguments: argparse.Namespace) -> None:
     """Run the mutants that have no result of a budget yet, the small budget first; with test files of `later`, survivors on these alone.
 
     With numbers of mutants these alone, and nothing is recorded.
     """
     import pytest
 
-    fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * given.minutes
+    fresh, selection, until = Fresh(folder, mutants), Selection(folder), time.time() + 60 * arguments.minutes
 
     def work(session: Session) -> None:
         sources = {m.file: (folder / "original" / m.file).read_bytes() for m in mutants}
         session.marks = session.patches(dict(enumerate(mutants)), sources)
         reach = Reach(folder / "reach.jsonl")
-        for budget in given.budget:
+        for budget in arguments.budget:
             done = finished(folder)
-            left = [n for n in range(len(mutants)) if is_left(n, done.get(n), budget, given)]
+            left = [n for n in range(len(mutants)) if is_left(n, done.get(n), budget, arguments)]
             for number in sorted(left, key=lambda n: (mutants[n].compiled or not mutants[n].statement, n)):
                 if time.time() > until:
                     return
-                mutant, last = mutants[number], None if given.only else done.get(number)
+                mutant, last = mutants[number], None if arguments.only else done.get(number)
                 doctests = [test for test in session.items if test.startswith(f"{mutant.file}::")]
                 ranked = {**dict.fromkeys(doctests, 10.0), **selection.ranked(mutant)}
-                most_missed = math.inf if given.later else UNREACHED_MOST
-                row = of_mutant(folder, mutant, number, last, budget, session, reach, ranked, most_missed, fresh)
-                if not given.only:
-                    append(folder / "results.jsonl", {**row, "later": bool(given.later)})
+                most_missed = math.inf if arguments.later else UNREACHED_MOST
+                row = mutant_result(folder, mutant, number, last, budget, session, reach, ranked, most_missed, fresh)
+                if not arguments.only:
+                    append(folder / "results.jsonl", {**row, "later": bool(arguments.later)})
                 place = number, f"{mutant.file}:{mutant.line}", mutant.operator
                 note(
                     folder, *place, row["result"], row["by"], len(row["reached"]), "of", len(row["tests"]), row["wall"]
@@ -163,17 +163,17 @@ def run(folder: Path, mutants: list[Mutant], given: argparse.Namespace) -> None:
     sys.path.insert(0, str(folder))
     sys.dont_write_bytecode = False  # until the mutants begin
     plugin = Session(folder, work)
-    pytest.main([*QUIET, *(given.later or ["tests", "rotor"])], plugins=[plugin])
+    pytest.main([*QUIET, *(arguments.later or ["tests", "rotor"])], plugins=[plugin])
     if plugin.failed:
         raise plugin.failed
 
 
-def is_left(number: int, last: dict[str, Any] | None, budget: float, given: argparse.Namespace) -> bool:
+def is_left(number: int, last: dict[str, Any] | None, budget: float, arguments: argparse.Namespace) -> bool:
     """Whether a mutant is to be run."""
-    if given.only:
-        return number in given.only
-    mine = number % given.part[1] == given.part[0] - 1
-    if given.later:
+    if arguments.only:
+        return number in arguments.only
+    mine = number % arguments.part[1] == arguments.part[0] - 1
+    if arguments.later:
         return mine and last is not None and last["result"] != "killed"
     return mine and (last is None or (last["result"] != "killed" and last["budget"] < budget))
 
@@ -184,7 +184,7 @@ def note(folder: Path, *words: object) -> None:
         print(time.strftime("%H:%M:%S"), *words, file=file)
 
 
-def of_mutant(
+def mutant_result(
     folder: Path,
     mutant: Mutant,
     number: int,
@@ -204,8 +204,8 @@ def of_mutant(
         (folder / mutant.file).write_bytes(mutant.applied(source))
         try:
             row, seen = session.judged(number, mutant, source, reach.chosen(number, ranked, left, most_missed), budget)
-            for one in seen:
-                reach.add(one)
+            for item in seen:
+                reach.add(item)
         except Unpatchable:
             tests = [test for test in ranked if test not in before["tests"]]
             row = fresh.judged(number, tests, budget) | {"reached": ["?"]}
@@ -263,10 +263,10 @@ def processor_time() -> float:
 
 def culprit(folder: Path) -> str:
     """The first test that was red."""
-    found = re.search(
+    match = re.search(
         r"^(?:FAILED|ERROR) (.*?)(?: - |$)", (folder / "last.log").read_text("utf-8", errors="replace"), re.M
     )
-    return found[1] if found else "no start"
+    return match[1] if match else "no start"
 
 
 def stale_caches(folder: Path, mutant: Mutant) -> dict[Path, bytes]:
@@ -369,26 +369,26 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", type=int, default=[], help="numbers of mutants; nothing is recorded")
     parser.add_argument("--check", action="store_true", help="run the tests that killed on the package as it is")
     parser.add_argument("--survivors", action="store_true")
-    given = parser.parse_args()
-    folder = given.folder.resolve()
+    arguments = parser.parse_args()
+    folder = arguments.folder.resolve()
     os.environ |= {
         "PYTHONDONTWRITEBYTECODE": "1",
         "MPLBACKEND": "Agg",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    mutants = prepared(folder, given.checkout.resolve(), given.mutants, given.seed)
-    if given.check:
+    mutants = prepared(folder, arguments.checkout.resolve(), arguments.mutants, arguments.seed)
+    if arguments.check:
         print("red without a mutant:", check(folder))
-    elif not given.survivors:
+    elif not arguments.survivors:
         for library in LIBRARIES:
             __import__(library)  # once, before children are forked
-        if given.later:
-            shutil.copytree(given.checkout.resolve() / "tests", folder / "tests", dirs_exist_ok=True)
-        run(folder, mutants, given)
-    if given.table:
-        exchanged(folder, mutants, given.table)
-    print(summary(folder, mutants, given.equivalent))
+        if arguments.later:
+            shutil.copytree(arguments.checkout.resolve() / "tests", folder / "tests", dirs_exist_ok=True)
+        run(folder, mutants, arguments)
+    if arguments.table:
+        exchanged(folder, mutants, arguments.table)
+    print(summary(folder, mutants, arguments.equivalent))
 
 
 if __name__ == "__main__":

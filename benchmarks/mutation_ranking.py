@@ -30,7 +30,7 @@ def imported(text: str) -> set[str]:
     out = set(re.findall(r"\brotor(?:\.\w+)+", text))
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and node.module:
-            out |= {f"{node.module}.{one.name}" for one in node.names}
+            out |= {f"{node.module}.{alias.name}" for alias in node.names}
     return out
 
 
@@ -53,7 +53,7 @@ class Selection:
             self.imports[file] = imported(text)
             for node in ast.parse(text).body:
                 slow = isinstance(node, ast.FunctionDef) and any(
-                    "slow" in ast.unparse(one) for one in node.decorator_list
+                    "slow" in ast.unparse(decorator) for decorator in node.decorator_list
                 )
                 if isinstance(node, ast.FunctionDef) and node.name.startswith("test") and not slow:
                     self.tests[f"{file}::{node.name}"] = set(
@@ -67,8 +67,8 @@ class Selection:
         for file, tree in self.trees.items():
             for node in ast.walk(tree):
                 if isinstance(node, ast.FunctionDef):
-                    for one in ast.walk(node):
-                        name = one.id if isinstance(one, ast.Name) else getattr(one, "attr", "")
+                    for child in ast.walk(node):
+                        name = child.id if isinstance(child, ast.Name) else getattr(child, "attr", "")
                         self.callers[name] |= {node.name, Path(file).stem}
 
     def words(self, mutant: Mutant) -> dict[str, float]:
@@ -82,7 +82,9 @@ class Selection:
                 inside[node.name] = 1.0
             if isinstance(node, ast.Raise | ast.If) and at_it:
                 texts = [
-                    one.value for one in ast.walk(node) if isinstance(one, ast.Constant) and isinstance(one.value, str)
+                    node.value
+                    for node in ast.walk(node)
+                    if isinstance(node, ast.Constant) and isinstance(node.value, str)
                 ]
                 messages |= {word for text in texts for word in WORD.findall(text) if len(word) > 3}
         edge, weight = set(inside), 1.0
@@ -101,8 +103,12 @@ class Selection:
     def ranked(self, mutant: Mutant) -> dict[str, float]:
         """The module itself, for its doctests, and the test functions with their scores, the highest first."""
         words = self.words(mutant)
-        of_file = {file: self.score(words, known) / 3 + self.near(mutant, file) for file, known in self.files.items()}
-        scores = {test: self.score(words, known) + of_file[test.split("::")[0]] for test, known in self.tests.items()}
+        file_scores = {
+            file: self.score(words, known) / 3 + self.near(mutant, file) for file, known in self.files.items()
+        }
+        scores = {
+            test: self.score(words, known) + file_scores[test.split("::")[0]] for test, known in self.tests.items()
+        }
         best = sorted((test for test, score in scores.items() if score > 0), key=lambda test: -scores[test])
         first = [mutant.file] if ">>>" in ast.unparse(self.trees[mutant.file]) else []
         return {**dict.fromkeys(first, math.inf), **{test: scores[test] for test in best}}
@@ -171,7 +177,7 @@ class Reach:
                 factors[last[0].split("::")[0]] *= REACHED if last[1] else NOT_REACHED
             if not scores or missed >= most_missed:
                 return None
-            best = max(scores, key=lambda one: scores[one] * factors[one.split("::")[0]])
+            best = max(scores, key=lambda test: scores[test] * factors[test.split("::")[0]])
             del scores[best]
             return best
 

@@ -41,20 +41,20 @@ def functions(folder: Path) -> dict[tuple[str, str, int], list[FunctionType]]:
     """Functions of the package that are loaded, by file, name and first line."""
     prefix = f"{folder}/rotor/"
     out: dict[tuple[str, str, int], list[FunctionType]] = defaultdict(list)
-    for one in gc.get_objects():
-        if type(one) is FunctionType and one.__code__.co_filename.startswith(prefix):
-            code = one.__code__
+    for candidate in gc.get_objects():
+        if type(candidate) is FunctionType and candidate.__code__.co_filename.startswith(prefix):
+            code = candidate.__code__
             file = os.path.relpath(code.co_filename, folder)
-            out[file, code.co_qualname, code.co_firstlineno].append(one)
+            out[file, code.co_qualname, code.co_firstlineno].append(candidate)
     return out
 
 
 def codes(code: CodeType) -> Iterator[CodeType]:
     """A code and those inside it."""
     yield code
-    for one in code.co_consts:
-        if isinstance(one, CodeType):
-            yield from codes(one)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from codes(constant)
 
 
 def marked(source: bytes, statements: dict[int, int], path: str) -> dict[tuple[str, int], CodeType]:
@@ -76,8 +76,8 @@ def _mark(function: ast.AST, line: int, number: int) -> bool:
         for node in ast.walk(function)
         for block in (getattr(node, name, None) for name in ("body", "orelse", "finalbody"))
         if isinstance(block, list)
-        for k, one in enumerate(block)
-        if isinstance(one, ast.stmt) and one.lineno == line
+        for k, statement in enumerate(block)
+        if isinstance(statement, ast.stmt) and statement.lineno == line
     ]
     for block, k in places[-1:]:
         mark = ast.parse(f"__reached__.add({number})").body[0]
@@ -141,19 +141,23 @@ class Session:
             here = {m.statement: n for n, m in mutants.items() if m.file == file and m.statement and not m.compiled}
             for name, code in marked(source, here, str(self.folder / file)).items():
                 loaded = self.functions.get((file, *name), [])
-                out += [(one, code) for one in loaded if len(one.__code__.co_freevars) == len(code.co_freevars)]
+                out += [
+                    (function, code)
+                    for function in loaded
+                    if len(function.__code__.co_freevars) == len(code.co_freevars)
+                ]
         return out
 
     def judged(
         self, number: int, mutant: Mutant, source: bytes, next_test: NextTest, budget: float
     ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         """Whether a test is red, up to the budget of processor time; and what its tests reach of all mutants."""
-        own = self.patches({number: mutant}, {mutant.file: mutant.applied(source)})
-        if not own:
+        patches = self.patches({number: mutant}, {mutant.file: mutant.applied(source)})
+        if not patches:
             raise Unpatchable(mutant.file)
         row: dict[str, Any] = {"result": "survived", "by": "", "tests": [], "reached": []}
         reach = []
-        events = self._forked(lambda tell: _run(self, tell, next_test, number, [*self.marks, *own], budget), budget)
+        events = self._forked(lambda tell: _run(self, tell, next_test, number, [*self.marks, *patches], budget), budget)
         for kind, test, value in events:
             if kind == "time":
                 seen = self._sees(test, value)
@@ -180,8 +184,8 @@ class Session:
 
     def _forked(self, work: Callable[[Callable[..., None]], None], seconds: float) -> list[tuple[str, str, Any]]:
         """What a fork tells; a test inside which the processor time was over ends it with `time`."""
-        told = self.folder / "events.jsonl"
-        told.write_text("")
+        value = self.folder / "events.jsonl"
+        value.write_text("")
         limit = int(seconds) + 3
         child = os.fork()
         if child == 0:
@@ -191,7 +195,7 @@ class Session:
             os.dup2(log, 2)
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
             signal.alarm(20 * limit)  # a test that waits
-            with told.open("a") as file:
+            with value.open("a") as file:
                 try:
                     work(lambda *event: print(json.dumps(event), file=file, flush=True))
                 finally:
@@ -199,7 +203,7 @@ class Session:
         os.waitpid(child, 0)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)  # what its tests have left
-        events = [json.loads(line) for line in told.read_text().splitlines()]
+        events = [json.loads(line) for line in value.read_text().splitlines()]
         starts = [event for event in events if event[0] == "start"]
         ends = [event for event in events if event[0] != "start"]
         if len(starts) > len(ends):

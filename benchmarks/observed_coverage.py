@@ -63,7 +63,7 @@ def one_case(rng: np.random.Generator, noise: float = 0.05) -> dict[str, list]:
         peak = min(noise * np.exp(rng.uniform(np.log(3), np.log(100))), 0.6 * start.excitation_k)
         true.append(scaled(start, peak, grid))
     spectrum = observed_spectrum(grid, model(true, grid).brightness_k + rng.normal(0, noise, len(grid)), noise=noise)
-    species = [one.species for one in true] + [artificial("wrong", rng)]
+    species = [component.species for component in true] + [artificial("wrong", rng)]
     fit = fit_source(
         spectrum,
         start_components(spectrum, species, velocity_km_s=velocity + rng.normal(0, 0.3), fwhm_km_s=width * 1.2),

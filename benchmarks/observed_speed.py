@@ -35,7 +35,7 @@ def wide_fit(rng: np.random.Generator) -> None:
     """Ten species with 100 lines each, the start included."""
     grid = np.arange(220e3, 223e3, 0.1)
     species = [artificial(f"s{i}", rng, grid[0], grid[-1], 100) for i in range(10)]
-    true = [Component(one, 10 ** rng.uniform(15, 16), rng.uniform(30, 200), 2.0, 2.0) for one in species]
+    true = [Component(component, 10 ** rng.uniform(15, 16), rng.uniform(30, 200), 2.0, 2.0) for component in species]
     spectrum = observed_spectrum(grid, model(true, grid).brightness_k + rng.normal(0, 0.05, len(grid)), noise=0.05)
     begin, cpu = time.perf_counter(), time.process_time()
     start = start_components(spectrum, species)
@@ -57,20 +57,22 @@ def cube(rng: np.random.Generator, rows: int, workers: int) -> None:
     for i in range(rows):
         for j in range(64):
             scale = np.exp(-((x[i, j] - 32) ** 2 + (y[i, j] - rows / 2) ** 2) / 800)
-            parts = [Component(one, 5e15 * scale, 60 + 60 * scale, 0.05 * (x[i, j] - 32), 3.0) for one in species]
+            parts = [
+                Component(component, 5e15 * scale, 60 + 60 * scale, 0.05 * (x[i, j] - 32), 3.0) for component in species
+            ]
             data[:, i, j] = model(parts, grid).brightness_k
     data += rng.normal(0, 0.1, data.shape)
-    start = [Component(one, 3e15, 90.0, 0.0, 3.0) for one in species]
+    start = [Component(component, 3e15, 90.0, 0.0, 3.0) for component in species]
     choices = FitChoices(shared=("velocity_km_s", "fwhm_km_s"))
     begin, cpu = time.perf_counter(), time.process_time()
     if workers > 1:
         with ProcessPoolExecutor(workers) as pool:
-            found = fit_cube(grid, data, 0.1, start, choices=choices, executor=pool)
+            cube_fit = fit_cube(grid, data, 0.1, start, choices=choices, executor=pool)
     else:
-        found = fit_cube(grid, data, 0.1, start, choices=choices)
+        cube_fit = fit_cube(grid, data, 0.1, start, choices=choices)
     print(
         f"cube of {rows} by 64 pixels, {len(grid)} channels, 3 species, {workers} processes: {time.perf_counter() - begin:.1f} s "
-        f"({time.process_time() - cpu:.1f} s of this process); {int(found.fitted.sum())} of {found.fitted.size} converged"
+        f"({time.process_time() - cpu:.1f} s of this process); {int(cube_fit.fitted.sum())} of {cube_fit.fitted.size} converged"
     )
 
 

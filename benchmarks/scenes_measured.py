@@ -119,73 +119,86 @@ def measure(name: str) -> Measured:
         run()
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-    one = result.reached
+    reached = result.reached
     table = work_precision(scene, folder=SCENES, limit_seconds=LIMIT_SECONDS)
-    found = knobs(table, KNOBS.get(scene.kind, ()), quantile(result.request.confidence) if scene.kind == "gas" else 1.0)
+    computed = knobs(
+        table, KNOBS.get(scene.kind, ()), quantile(result.request.confidence) if scene.kind == "gas" else 1.0
+    )
     return Measured(
-        name, one.asked, one.unit, one.how, one.error, found, plan.seconds, seconds, plan.memory_mb, peak / 1e6
+        name,
+        reached.asked,
+        reached.unit,
+        reached.how,
+        reached.error,
+        computed,
+        plan.seconds,
+        seconds,
+        plan.memory_mb,
+        peak / 1e6,
     )
 
 
 def knobs(table: WorkPrecision, errors_of: tuple[str, ...], widening: float) -> tuple[Knob, ...]:
     """What was found with the setting of the scene and with the one before, times the quantile of a confidence."""
-    found = []
+    results = []
     for (name, error_of, unit), rows in table.curves().items():
         place = next((n for n, row in enumerate(rows) if row.own), None)
         if error_of not in errors_of or place is None:
             continue
         before = next((row for row in reversed(rows[:place]) if coarser(row, rows[place])), None)
-        found.append(
+        results.append(
             Knob(
                 name, error_of, unit, rows[place].setting, widening * rows[place].error,
                 None if before is None else before.setting, None if before is None else widening * before.error,
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(results)
 
 
-def coarser(row: Row, own: Row) -> bool:
+def coarser(row: Row, reference: Row) -> bool:
     """Whether a setting is a step coarser: of a length of a step by a quarter at least, else any that comes before."""
-    return row.knob != "numerics.step" or float(row.setting) >= 1.25 * float(own.setting)
+    return row.knob != "numerics.step" or float(row.setting) >= 1.25 * float(reference.setting)
 
 
 def page(rows: list[Measured]) -> str:
     """The whole page."""
-    return HEAD + "".join(line(one) for one in rows) + tail(rows)
+    return HEAD + "".join(line(row) for row in rows) + tail(rows)
 
 
-def line(one: Measured) -> str:
-    unit = f" {one.unit}" if one.unit else ""
-    found = "<br>".join(f"{k.name.removeprefix('numerics.')} {k.setting}: {k.found:.1e}" + _unit(k) for k in one.knobs)
+def line(row: Measured) -> str:
+    unit = f" {row.unit}" if row.unit else ""
+    computed = "<br>".join(
+        f"{k.name.removeprefix('numerics.')} {k.setting}: {k.found:.1e}" + _unit(k) for k in row.knobs
+    )
     coarser = (
-        "nothing is cheaper" if CHEAPEST in one.how or not one.knobs
-        else "<br>".join(f"{k.coarser_setting}: {k.coarser:.1e}" + _unit(k) for k in one.knobs if k.coarser is not None)
+        "nothing is cheaper" if CHEAPEST in row.how or not row.knobs
+        else "<br>".join(f"{k.coarser_setting}: {k.coarser:.1e}" + _unit(k) for k in row.knobs if k.coarser is not None)
     )  # fmt: skip
-    seconds, memory = f"{one.plan_seconds:.2g}, {one.run_seconds:.2g}", f"{one.plan_mb:.2g}, {one.run_mb:.2g}"
-    return f"| {one.scene} | {one.asked:g}{unit} | {one.how} | {one.stated:.1e} | {found} | {coarser} | {seconds} | {memory} |\n"
+    seconds, memory = f"{row.plan_seconds:.2g}, {row.run_seconds:.2g}", f"{row.plan_mb:.2g}, {row.run_mb:.2g}"
+    return f"| {row.scene} | {row.asked:g}{unit} | {row.how} | {row.stated:.1e} | {computed} | {coarser} | {seconds} | {memory} |\n"
 
 
 def _unit(knob: Knob) -> str:
     return f" {knob.unit} of {knob.error_of}" if knob.error_of in ("Q", "U", "C_v") else f" {knob.unit}".rstrip()
 
 
-def in_unit_asked(one: Measured, error: float, knob: Knob) -> float:
+def in_unit_asked(row: Measured, error: float, knob: Knob) -> float:
     """An error in the unit of the accuracy: percent become parts where that is a number."""
-    return error / 100.0 if knob.unit == "%" and one.unit == "" else error
+    return error / 100.0 if knob.unit == "%" and row.unit == "" else error
 
 
-def misses(one: Measured) -> list[str]:
+def misses(row: Measured) -> list[str]:
     """The knobs of a scene that one step coarser would miss its accuracy."""
     return [
         knob.name
-        for knob in one.knobs
-        if knob.coarser is not None and in_unit_asked(one, knob.coarser, knob) > one.asked
+        for knob in row.knobs
+        if knob.coarser is not None and in_unit_asked(row, knob.coarser, knob) > row.asked
     ]
 
 
 def tail(rows: list[Measured]) -> str:
     """Which scenes could be coarser."""
-    spared = [one.scene for one in rows if CHEAPEST not in one.how and one.knobs and not misses(one)]
+    spared = [row.scene for row in rows if CHEAPEST not in row.how and row.knobs and not misses(row)]
     if not spared:
         return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
     return (
@@ -199,13 +212,13 @@ def read_results() -> list[Measured]:
     if not RESULTS.exists():
         return []
     return [
-        Measured(**{**one, "knobs": tuple(Knob(**knob) for knob in one["knobs"])})
-        for one in json.loads(RESULTS.read_text(encoding="utf-8"))
+        Measured(**{**record, "knobs": tuple(Knob(**knob) for knob in record["knobs"])})
+        for record in json.loads(RESULTS.read_text(encoding="utf-8"))
     ]
 
 
 def write(rows: list[Measured]) -> None:
-    text = ",\n".join(json.dumps(asdict(one), ensure_ascii=False) for one in rows)
+    text = ",\n".join(json.dumps(asdict(row), ensure_ascii=False) for row in rows)
     RESULTS.write_text(f"[\n{text}\n]\n", encoding="utf-8")
     PAGE.write_text(page(rows), encoding="utf-8", newline="\n")
 
@@ -215,12 +228,12 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", choices=asking())
     parser.add_argument("--page", action="store_true")
     parser.add_argument("--measure", help=argparse.SUPPRESS)  # one scene, in this process
-    given = parser.parse_args()
-    if given.measure:
-        print(json.dumps(asdict(measure(given.measure)), ensure_ascii=False))
+    arguments = parser.parse_args()
+    if arguments.measure:
+        print(json.dumps(asdict(measure(arguments.measure)), ensure_ascii=False))
         return
-    known = {one.scene: one for one in read_results()}
-    for name in [] if given.page else given.only or asking():
+    known = {record.scene: record for record in read_results()}
+    for name in [] if arguments.page else arguments.only or asking():
         command = [sys.executable, __file__, "--measure", name]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         record = json.loads(done.stdout.splitlines()[-1])

@@ -37,11 +37,11 @@ def holds(value: Any, text: str, numbers: tuple[float, ...], deep: int = DEEP) -
     if isinstance(value, str):
         return text in value
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return any(abs(value - one) <= 1e-9 * abs(one) for one in numbers)
+        return any(abs(value - number) <= 1e-9 * abs(number) for number in numbers)
     if isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size <= 4:
-        return any(holds(float(one), text, numbers, 0) for one in value.ravel())
+        return any(holds(float(number), text, numbers, 0) for number in value.ravel())
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
-    return deep > 0 and len(items) <= SMALL and any(holds(one, text, numbers, deep - 1) for one in items)
+    return deep > 0 and len(items) <= SMALL and any(holds(item, text, numbers, deep - 1) for item in items)
 
 
 def walk(root: Path, text: str, numbers: tuple[float, ...], arguments: list[str]) -> tuple[int, int, int]:
@@ -71,15 +71,19 @@ def walk(root: Path, text: str, numbers: tuple[float, ...], arguments: list[str]
 
 def main() -> None:
     """Print a table of all walks in one checkout or several."""
-    roots = [Path(one).resolve() for one in sys.argv[1:]] or [Path(__file__).resolve().parents[1]]
+    roots = [Path(argument).resolve() for argument in sys.argv[1:]] or [Path(__file__).resolve().parents[1]]
     for name in WALKS:
         for root in roots:
             with tempfile.TemporaryDirectory() as folder:
                 (Path(folder) / "s.toml").write_text(SCENE, encoding="utf-8")
                 call = [sys.executable, __file__, "--one", str(root), name]
-                made = subprocess.run(call, cwd=folder, env={"PYTHONPATH": str(root)}, capture_output=True, check=True)
+                process = subprocess.run(
+                    call, cwd=folder, env={"PYTHONPATH": str(root)}, capture_output=True, check=True
+                )
             print(
-                name, root.name, "functions {}, files {}, returns {}".format(*json.loads(made.stdout.splitlines()[-1]))
+                name,
+                root.name,
+                "functions {}, files {}, returns {}".format(*json.loads(process.stdout.splitlines()[-1])),
             )
 
 

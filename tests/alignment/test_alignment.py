@@ -155,15 +155,15 @@ def test_revivals(b_cm, period):
 
 def test_spin_weights_halve_or_quarter_the_revivals():
     """With even J alone (CO2) or 2:1 (N2) the quarter revival is there; with equal weights odd and even J cancel in it."""
-    found = {}
+    results = {}
     for weights in ({"even": 1, "odd": 1}, {"even": 1, "odd": 0}, {"even": 2, "odd": 1}):
         top = Top.from_constants("B=0.39 cm-1", spin_weights=weights).with_polarizability(np.diag([2.0, 0, 0]), "test")
         quarter = revival_period_ps(top) / 4
         trace = align(top, Kick.of_strength(2.0, 2.0), np.linspace(quarter - 3, quarter + 3, 601), temperature_k=60)
-        found[tuple(weights.values())] = float(np.ptp(trace.cosines["cos2theta"]))
-    assert found[1, 0] > 0.05
-    assert found[1, 1] < 0.1 * found[1, 0]
-    assert found[2, 1] == pytest.approx(found[1, 0] / 3, rel=0.05)  # (2 - 1)/(2 + 1), and little overlap of the two
+        results[tuple(weights.values())] = float(np.ptp(trace.cosines["cos2theta"]))
+    assert results[1, 0] > 0.05
+    assert results[1, 1] < 0.1 * results[1, 0]
+    assert results[2, 1] == pytest.approx(results[1, 0] / 3, rel=0.05)  # (2 - 1)/(2 + 1), and little overlap of the two
 
 
 def test_no_ensemble_passes_the_kinematic_ceiling():
@@ -283,11 +283,11 @@ def test_an_adiabatic_pulse_follows_the_pendular_ground_state():
 def test_executors_change_nothing():
     times = np.linspace(0, 50, 101)
     with ThreadPoolExecutor(2) as pool:
-        one, two = (
+        first, two = (
             align(OCS, GaussianPulse(5e12, 0.1), np.append(times, 60.0), temperature_k=4.0, executor=e)
             for e in (None, pool)
         )
-    assert np.array_equal(one.cosines["cos2theta"], two.cosines["cos2theta"])
+    assert np.array_equal(first.cosines["cos2theta"], two.cosines["cos2theta"])
 
 
 def test_pieces_of_a_pulse_change_nothing(monkeypatch):
@@ -346,10 +346,10 @@ def test_symmetric_tops_and_asymmetric_ones_join():
     tensor, times = np.diag([6.0, 4.0, 4.0]), np.linspace(-0.5, 30, 201)
     prolate = Top.from_constants("A=20000 B=9000 MHz").with_polarizability(tensor, "test")
     nearly = Top.from_constants("A=20000 B=9000.0005 C=8999.9995 MHz").with_polarizability(tensor, "test")
-    one, two = (
+    first, two = (
         align(top, GaussianPulse(1e13, 0.1), times, temperature_k=3.0, tolerance=1e-5) for top in (prolate, nearly)
     )
-    assert np.abs(one.cosines["cos2theta"] - two.cosines["cos2theta"]).max() < 2e-5  # both tolerances
+    assert np.abs(first.cosines["cos2theta"] - two.cosines["cos2theta"]).max() < 2e-5  # both tolerances
 
 
 def test_an_oblate_top_has_its_axis_along_c():

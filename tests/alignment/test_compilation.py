@@ -18,18 +18,18 @@ def compiled_with(function: Any, *arguments: Any) -> list[str]:
     from numba import njit
     from numba.core import event
 
-    found: list[str] = []
+    results: list[str] = []
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            found.append(event.data["dispatcher"].py_func.__module__)
+            results.append(event.data["dispatcher"].py_func.__module__)
 
         def on_end(self, event: Any) -> None:
             pass
 
     with event.install_listener("numba:compile", Listener()):
         njit(function.py_func)(*arguments)
-    return found
+    return results
 
 
 def call_of(name: str) -> tuple[Any, ...]:

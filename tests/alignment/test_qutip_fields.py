@@ -40,7 +40,7 @@ def test_both_agree_on_an_asymmetric_top_and_on_crossed_pulses():
         [GaussianPulse(4e12, 0.1), GaussianPulse(3e12, 0.1, 0.05, axis=(1, 0, 0))],
     ):
         blocks = [block_objects(top, pulses, jmax=8, block=n) for n in range(4)]
-        number = next(n for n, one in enumerate(blocks) if "0 0 0" in one.labels)
+        number = next(n for n, block in enumerate(blocks) if "0 0 0" in block.labels)
         objects = block_objects(top, pulses, jmax=24, block=number)
         theirs = solve_windows(objects, objects.state("0 0 0"), times)["cos2theta"]
         ours = align(top, pulses, times, tolerance=1e-8, jmax=24).cosines["cos2theta"]
@@ -76,7 +76,7 @@ def test_operators_of_all_states():
     objects = linear_objects(OCS, 8)
     assert objects.cosine.isherm
     assert np.abs((objects.turns[1] - objects.cosine).full()).max() < 1e-15  # D_00 is cosθ
-    total = sum((one.dag() * one for one in objects.turns[1:]), objects.turns[0].dag() * objects.turns[0])
+    total = sum((turn.dag() * turn for turn in objects.turns[1:]), objects.turns[0].dag() * objects.turns[0])
     inside = objects.j < 8
     assert np.abs(np.diag(total.full())[inside] - 1).max() < 1e-14  # Σ_p |D_p0|² = 1 where J + 1 is there
     assert np.trace(objects.thermal(10.0).full()).real == pytest.approx(1.0)
@@ -141,14 +141,14 @@ def test_classical_and_quantum_gas_agree_while_both_dephase():
 def test_a_classical_kick_turns_by_its_torque():
     """At 0 K a kick gives θ' = -(P/I) sin2θ ħ: ⟨cos²θ⟩ follows from one dimension."""
     kick, times = Kick.of_strength(1.0, 4.04), np.linspace(1e-6, 3.0, 30)
-    found = classical_trace(OCS, [kick], times, temperature_k=0.0, molecules=20_000, rng=np.random.default_rng(1))[
+    computed = classical_trace(OCS, [kick], times, temperature_k=0.0, molecules=20_000, rng=np.random.default_rng(1))[
         "cos2theta"
     ]
     cosine = np.linspace(-1, 1, 20001)
     theta = np.arccos(cosine)
     rate = -np.sin(2 * theta) * 2 * (2 * math.pi * 6081.492e-6)
     exact = [np.mean(np.cos(theta + rate * t) ** 2) for t in times]
-    assert np.abs(found - exact).max() < 1e-2  # four standard errors of 20,000 bodies
+    assert np.abs(computed - exact).max() < 1e-2  # four standard errors of 20,000 bodies
 
 
 def test_an_asymmetric_gas_moves_with_the_same_core():

@@ -35,18 +35,18 @@ def answer() -> AssignAnswer:
 def test_the_species_is_found_with_its_kind_and_temperature(answer: AssignAnswer) -> None:
     assert answer.word == "certain"
     assert is_right(answer, 0, TRUTH)
-    one = answer.species[0]
-    assert one.kind == "bc"
-    np.testing.assert_allclose(one.dipole_ratio, [0, 1, 0.6], atol=0.15)  # intensities scatter by 20 %
-    assert 1.4 <= one.grown.temperature_k <= 2.8  # the grid's neighbours of 2 K
+    best = answer.species[0]
+    assert best.kind == "bc"
+    np.testing.assert_allclose(best.dipole_ratio, [0, 1, 0.6], atol=0.15)  # intensities scatter by 20 %
+    assert 1.4 <= best.grown.temperature_k <= 2.8  # the grid's neighbours of 2 K
 
 
 def test_lines_and_what_is_left(answer: AssignAnswer) -> None:
-    one = answer.species[0]
-    assert len(one.lines) > 60
-    assert np.abs(one.refined.fit.difference_mhz).max() < 0.05
+    best = answer.species[0]
+    assert len(best.lines) > 60
+    assert np.abs(best.refined.fit.difference_mhz).max() < 0.05
     columns = answer.table.columns
-    assert (columns["species"] == 1).sum() == len(np.unique(one.peak))
+    assert (columns["species"] == 1).sum() == len(np.unique(best.peak))
     assert answer.unexplained.sum() > 30  # most of the foreign peaks
     assigned = columns["species"] > 0
     np.testing.assert_allclose(
@@ -77,11 +77,11 @@ def test_the_same_request_gives_the_same_answer(answer: AssignAnswer) -> None:
 
 
 def test_two_species() -> None:
-    found = answer_assign(AssignRequest(spectrum(second=True), species=2, seconds=120))
-    assert len(found.species) == 2
-    assert is_right(found, 0, TRUTH)
-    assert is_right(found, 1, SECOND)
-    assert found.species[1].kind == "a"
+    computed = answer_assign(AssignRequest(spectrum(second=True), species=2, seconds=120))
+    assert len(computed.species) == 2
+    assert is_right(computed, 0, TRUTH)
+    assert is_right(computed, 1, SECOND)
+    assert computed.species[1].kind == "a"
 
 
 PROLATE = {"A": 8636.7, "B": 703.9, "C": 650.8, "DJ": 3e-5, "DJK": 3e-4, "DK": 8e-3, "d1": -2e-6, "d2": -3e-7}
@@ -100,9 +100,9 @@ def light_and_heavy(height: float = 100.0) -> PeakList:
 
 def test_a_light_top_is_found_though_its_lines_are_far_from_rigid() -> None:
     """And it is looked for though the request is for one species: several of the strongest peaks are left without it."""
-    found = answer_assign(AssignRequest(light_and_heavy(), seconds=120))
-    assert is_right(found, 0, LIGHT)
-    assert is_right(found, 1, SECOND)
+    computed = answer_assign(AssignRequest(light_and_heavy(), seconds=120))
+    assert is_right(computed, 0, LIGHT)
+    assert is_right(computed, 1, SECOND)
 
 
 def test_lines_split_by_different_amounts() -> None:
@@ -113,16 +113,18 @@ def test_lines_split_by_different_amounts() -> None:
     split, heights = np.concatenate([f - apart, f + apart]), np.concatenate([i * share, i * (1 - share)])
     strong = heights > 2.0
     peaks = peak_list(split[strong] + 0.004 * rng.normal(size=strong.sum()), heights[strong], 0.004, band_mhz=BAND)
-    found = answer_assign(AssignRequest(peaks, seconds=120))
-    assert found.species[0].split
-    assert is_right(found, 0, SECOND | {"A": 4301.0, "B": 2002.7, "C": 1550.5})
-    assert [one.word for one in found.species[1:]].count("certain") == 0  # the other components are no second species
+    computed = answer_assign(AssignRequest(peaks, seconds=120))
+    assert computed.species[0].split
+    assert is_right(computed, 0, SECOND | {"A": 4301.0, "B": 2002.7, "C": 1550.5})
+    assert [component.word for component in computed.species[1:]].count(
+        "certain"
+    ) == 0  # the other components are no second species
 
 
 def test_a_guess_is_enough_where_the_search_is_narrow() -> None:
     guess = tuple(TRUTH[name] * factor for name, factor in zip("ABC", (1.02, 0.98, 1.015), strict=True))
-    found = answer_assign(AssignRequest(spectrum(seed=8), guess_mhz=guess, temperature_k=2.0, seconds=120))
-    assert is_right(found, 0, TRUTH)
+    computed = answer_assign(AssignRequest(spectrum(seed=8), guess_mhz=guess, temperature_k=2.0, seconds=120))
+    assert is_right(computed, 0, TRUTH)
 
 
 @pytest.mark.parametrize(
@@ -137,8 +139,8 @@ def test_a_guess_of_a_near_prolate_top(truth: dict[str, float], dipole: tuple[fl
         f[strong] + 0.004 * np.random.default_rng(2).normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND
     )
     guess = tuple(truth[name] * factor for name, factor in zip("ABC", (0.975, 0.98, 1.02), strict=True))
-    found = answer_assign(AssignRequest(peaks, guess_mhz=guess, seconds=120))
-    assert is_right(found, 0, truth)
+    computed = answer_assign(AssignRequest(peaks, guess_mhz=guess, seconds=120))
+    assert is_right(computed, 0, truth)
     far = tuple(truth[name] * 1.2 for name in "ABC")
     assert answer_assign(AssignRequest(peaks, guess_mhz=far, seconds=120)).word == "not found"
 
@@ -181,9 +183,9 @@ def test_seconds_end_a_search() -> None:
 
 
 def test_two_peaks_hold_no_species() -> None:
-    found = answer_assign(AssignRequest(peak_list([7000.0, 9000.0], [1.0, 2.0])))
-    assert found.word == "not found"
-    assert found.facts()["species"] == []
+    computed = answer_assign(AssignRequest(peak_list([7000.0, 9000.0], [1.0, 2.0])))
+    assert computed.word == "not found"
+    assert computed.facts()["species"] == []
 
 
 def test_isotopologues_of_a_geometry() -> None:
@@ -204,11 +206,15 @@ def test_isotopologues_of_a_geometry() -> None:
     )
     molecule = Molecule(("C", "C", "C", "O", "C", "C", "O"), x)
     parent = rotor.Top.from_molecule(molecule)
-    singles = [one for one in isotopologues(parent, min_abundance=5e-3)[1:] if len(one.substituted) == 1]
+    singles = [
+        isotopologue
+        for isotopologue in isotopologues(parent, min_abundance=5e-3)[1:]
+        if len(isotopologue.substituted) == 1
+    ]
     distortion = {"DJ": 2e-5, "DJK": 1e-4, "DK": 1e-3, "d1": -3e-6, "d2": -2e-7}
     rng = np.random.default_rng(4)
     f, i = [], []
-    for top, height in [(parent, 2000.0), *((one.top, 22.0) for one in singles)]:
+    for top, height in [(parent, 2000.0), *((single.top, 22.0) for single in singles)]:
         truth = {name: top.constants[name] for name in "ABC"} | distortion
         frequency, intensity = lines_of(truth, (1.0, 0.6, 0.0), height)
         f.append(frequency)
@@ -218,14 +224,14 @@ def test_isotopologues_of_a_geometry() -> None:
     peaks = peak_list(f[strong] + 0.004 * rng.normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND)
     longer = Molecule(molecule.symbols, 1.005 * x)
     request = AssignRequest(peaks, molecule=longer, isotopologues=True, seconds=120)
-    found = answer_assign(request)
-    assert is_right(found, 0, {name: parent.constants[name] for name in "ABC"})
+    computed = answer_assign(request)
+    assert is_right(computed, 0, {name: parent.constants[name] for name in "ABC"})
     right = 0
-    for one in found.species[1:]:
-        names = [single for single in singles if single.label == one.isotopologue]
-        off = [one.constants[name] - names[0].top.constants[name] for name in "ABC"]
-        right += bool((np.abs(off) < 5 * np.array([one.constants.uncertainties[name] for name in "ABC"])).all())
-    assert right == len(found.species) - 1  # none is wrong
+    for component in computed.species[1:]:
+        names = [single for single in singles if single.label == component.isotopologue]
+        off = [component.constants[name] - names[0].top.constants[name] for name in "ABC"]
+        right += bool((np.abs(off) < 5 * np.array([component.constants.uncertainties[name] for name in "ABC"])).all())
+    assert right == len(computed.species) - 1  # none is wrong
     assert right >= 0.8 * len(singles)
 
 
@@ -263,9 +269,9 @@ def test_spurs_are_multiples_of_a_clock() -> None:
     real = rng.uniform(6000, 18000, 300)
     comb = 50.0 * rng.choice(np.arange(121, 359), 8, replace=False)
     peaks = peak_list(np.concatenate([real, comb]), np.ones(308))
-    found = peaks.frequency_mhz[spurs(peaks)]
-    assert set(comb) <= set(found)
-    assert len(found) <= 10
+    computed = peaks.frequency_mhz[spurs(peaks)]
+    assert set(comb) <= set(computed)
+    assert len(computed) <= 10
     assert not spurs(peak_list(real, np.ones(300))).any()
 
 
@@ -293,8 +299,8 @@ def case_of(number: int) -> tuple[PeakList, dict[str, object]]:
 @pytest.mark.parametrize("number", [7, 19, 39])
 def test_lists_of_shared(number: int) -> None:
     peaks, truth = case_of(number)
-    found = answer_assign(AssignRequest(peaks, seconds=120))
-    assert is_right(found, 0, truth["species"][0])  # type: ignore[index]
+    computed = answer_assign(AssignRequest(peaks, seconds=120))
+    assert is_right(computed, 0, truth["species"][0])  # type: ignore[index]
 
 
 @pytest.mark.oracle
@@ -307,9 +313,9 @@ def test_all_lists_of_shared() -> None:
         if truth["signal_to_noise"] < 100:  # type: ignore[operator]
             continue
         total += 1
-        found = answer_assign(AssignRequest(peaks, seconds=120))
-        mains = [one for one in truth["species"] if "isotopologue_of" not in one]  # type: ignore[attr-defined]
-        right += any(is_right(found, n, mains[0]) for n in range(len(found.species)))
+        computed = answer_assign(AssignRequest(peaks, seconds=120))
+        mains = [component for component in truth["species"] if "isotopologue_of" not in component]  # type: ignore[attr-defined]
+        right += any(is_right(computed, n, mains[0]) for n in range(len(computed.species)))
     assert right >= 0.9 * total
 
 
@@ -330,11 +336,11 @@ def test_conformers_of_a_smiles_as_guesses() -> None:
     strong = i > 2.0
     peaks = peak_list(f[strong] + 0.004 * rng.normal(size=strong.sum()), i[strong], 0.004, band_mhz=BAND)
     request = AssignRequest(peaks, guess_mhz=tuple(values.ravel().tolist()), species=2, seconds=120)
-    assert [len(one.guess_mhz or ()) for one in request.each_guess] == [3] * len(values)
-    found = answer_assign(request)
-    assert len(found.species) == 2
-    assert is_right(found, 0, truths[0])
-    assert is_right(found, 1, truths[1])
+    assert [len(guess.guess_mhz or ()) for guess in request.each_guess] == [3] * len(values)
+    computed = answer_assign(request)
+    assert len(computed.species) == 2
+    assert is_right(computed, 0, truths[0])
+    assert is_right(computed, 1, truths[1])
 
 
 @pytest.mark.parametrize(

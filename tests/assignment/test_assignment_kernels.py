@@ -74,12 +74,12 @@ def plain_roots(field: Field, lines: Floats, companions: Floats, seeds: Floats, 
     jj, energy = parts(lines)
     further_jj, further = parts(companions)
     energy, out = energy[points], set()
-    for one, two, three in itertools.permutations(range(len(f)), 3):
-        if np.ptp(height[[one, two, three]]) >= RATIO:
+    for first, two, three in itertools.permutations(range(len(f)), 3):
+        if np.ptp(height[[first, two, three]]) >= RATIO:
             continue
         determinant = jj[0] * energy[:, 1] - jj[1] * energy[:, 0]  # Cramer's rule of f = jj s + E d for two lines
-        s_at = (f[one] * energy[:, 1] - f[two] * energy[:, 0]) / determinant
-        d_at = (jj[0] * f[two] - jj[1] * f[one]) / determinant
+        s_at = (f[first] * energy[:, 1] - f[two] * energy[:, 0]) / determinant
+        d_at = (jj[0] * f[two] - jj[1] * f[first]) / determinant
         third = jj[2] * s_at + energy[:, 2] * d_at
         for n in np.flatnonzero((third[:-1] - f[three]) * (third[1:] - f[three]) < 0):
             w = (f[three] - third[n]) / (third[n + 1] - third[n])
@@ -102,26 +102,26 @@ def test_roots_are_those_of_a_plain_loop() -> None:
     """Of three families; the top that made the lines is among the roots."""
     field = field_of()
     chosen = families(field.table, BOUNDS, (8000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 60)
-    chosen = [one for one in chosen if one.kind == 1][:3]
+    chosen = [family for family in chosen if family.kind == 1][:3]
     right, total = 0, 0
     for family in chosen:
-        own = frequencies(TOP, family.lines)
+        exact = frequencies(TOP, family.lines)
         seeds = np.unique(
             [
-                *(int(np.argmin(np.abs(field.peaks.frequency_mhz - line))) for line in own),
+                *(int(np.argmin(np.abs(field.peaks.frequency_mhz - line))) for line in exact),
                 *range(0, len(field.peaks), 25),
             ]
         )
-        found = roots_of(field, family, seeds, 2)
+        computed = roots_of(field, family, seeds, 2)
         change = field.jj[field.table.upper[family.lines]] - field.jj[field.table.lower[family.lines]]
         lines = family.lines[np.argsort(-np.abs(change), kind="stable")]
         expected = plain_roots(field, lines, family.companions, seeds, 2)
-        compiled = {(int(h), int(m), *np.round(10 * np.array(top)).astype(int).tolist()) for h, m, *top in found}
+        compiled = {(int(h), int(m), *np.round(10 * np.array(top)).astype(int).tolist()) for h, m, *top in computed}
         # a crossing and its return between two looks, four points of κ apart, are seen by the plain loop alone
         assert compiled <= expected
         assert len(compiled) >= 0.97 * len(expected)
         total += len(expected)
-        right += any(np.abs(top / TOP - 1).max() < 1e-3 for top in found[:, 2:])
+        right += any(np.abs(top / TOP - 1).max() < 1e-3 for top in computed[:, 2:])
     assert right == len(chosen)
     assert total >= 3
 

@@ -36,18 +36,20 @@ def test_lines_are_those_of_line_list(values: tuple[float, ...]) -> None:
     lines = rotor.api.line_list(top, temperature_k=2.0, jmax=JMAX, range_mhz=(6000, 18000), min_lgint=None)
     columns = lines.columns
     seen = field_of()
-    found = predict(seen, np.array(values), 2.0, 4000)
+    prediction = predict(seen, np.array(values), 2.0, 4000)
     names = ("j_upper", "ka_upper", "kc_upper", "j_lower", "ka_lower", "kc_lower")
     known = {tuple(row): n for n, row in enumerate(np.column_stack([columns[name] for name in names]).tolist())}
     table = seen.table
-    labels = np.column_stack([table.quanta[table.upper[found.row]], table.quanta[table.lower[found.row]]]).tolist()
-    strongest = np.argsort(-found.expected)[:150]
+    labels = np.column_stack(
+        [table.quanta[table.upper[prediction.row]], table.quanta[table.lower[prediction.row]]]
+    ).tolist()
+    strongest = np.argsort(-prediction.expected)[:150]
     pairs = [(n, known[tuple(labels[n])]) for n in strongest.tolist()]
     mine, theirs = np.array(pairs).T
     # 20 kHz: interpolation, and distortion to first order alone; the widths of peaks are five times that
-    np.testing.assert_allclose(found.frequency[mine], lines.frequency_mhz[theirs], atol=0.02)
+    np.testing.assert_allclose(prediction.frequency[mine], lines.frequency_mhz[theirs], atol=0.02)
     intensity = np.log(10.0) * columns["lgint"][theirs]
-    difference = found.expected[mine] - intensity
+    difference = prediction.expected[mine] - intensity
     assert np.ptp(difference) < 0.2  # 1 - exp(-hν/kT) is taken to first order: 0.13 between 6 and 18 GHz at 2 K
 
 
@@ -86,11 +88,11 @@ def test_families_determine_three_constants() -> None:
     """Each family's lines have independent derivatives for some top of the sample, and it predicts other lines."""
     bounds = Bounds(np.array([1000.0, 500, 400]), np.array([5000.0, 2000, 1500]))
     table = rigid_table(JMAX)
-    found = families(table, bounds, (6000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 50)
-    assert len(found) == 50
-    assert found[0].share >= found[-1].share
-    for one in found:
-        change = table.quanta[table.upper[one.lines], 0] - table.quanta[table.lower[one.lines], 0]
+    families_ = families(table, bounds, (6000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 50)
+    assert len(families_) == 50
+    assert families_[0].share >= families_[-1].share
+    for entry in families_:
+        change = table.quanta[table.upper[entry.lines], 0] - table.quanta[table.lower[entry.lines], 0]
         assert (change != 0).any()  # Q branches alone say nothing of A + C
-        assert len(one.companions) >= 4
-        assert not set(one.lines.tolist()) & set(one.companions.tolist())
+        assert len(entry.companions) >= 4
+        assert not set(entry.lines.tolist()) & set(entry.companions.tolist())

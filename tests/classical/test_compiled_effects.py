@@ -25,7 +25,7 @@ from rotor.geometry.rotations import uniform
 
 MOMENTS, MOMENTUM = np.array([1.0, 1.4, 2.0]), np.array([0.6, -0.3, 0.8])
 TIMES = np.array([0.2, 1.0, 1.1, 3.0])
-OF_PLACE = {
+PLACE_EFFECTS = {
     "constant, body": ConstantTorque([0.1, 0.2, -0.1]),
     "constant, space": ConstantTorque([0.1, 0.2, -0.1], "space"),
     "drive": PeriodicDrive([0.2, 0.0, 0.1], 1.3, 0.4),
@@ -35,7 +35,7 @@ OF_PLACE = {
     "pivot": GravityAboutPivot(1.2, [0.1, 0.0, 0.6], [0.0, 0.0, -1.0]),
     "impulse": FluidImpulse([1.0, -0.5, 0.3], [1.0, 2.0, 3.0]),
 }
-EVERY = OF_PLACE | {
+ALL_EFFECTS = PLACE_EFFECTS | {
     "linear drag": LinearDrag([[0.1, 0.3, 0.0], [-0.2, 0.2, 0.0], [0.0, 0.1, 0.3]]),
     "quadratic drag": QuadraticDrag([0.1, 0.2, 0.3]),
 }
@@ -62,50 +62,50 @@ def both(method, effects, monkeypatch, attitude=(1.0, 0, 0, 0), moments=MOMENTS,
     return motions
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", ALL_EFFECTS)
 def test_the_compiled_torque_is_the_plain_one(name):
-    form = system_of(MOMENTS, [EVERY[name]]).compiled
+    form = system_of(MOMENTS, [ALL_EFFECTS[name]]).compiled
     rng = np.random.default_rng(3)
     for attitude, omega, time in zip(uniform(5, rng=rng), rng.normal(size=(5, 3)), rng.uniform(0, 9, 5), strict=True):
-        plain = EVERY[name].torque(time, attitude[None], omega[None])[0]
+        plain = ALL_EFFECTS[name].torque(time, attitude[None], omega[None])[0]
         compiled = torque_at(form.codes, form.parameters, time, tuple(attitude), tuple(omega))
         assert np.allclose(compiled, plain, rtol=0, atol=2e-15)  # round-off of numbers of size 1
 
 
 @pytest.mark.parametrize("order", [2, 4])
 def test_kicks_and_drifts_are_those_of_the_plain_form(order, monkeypatch):
-    effects = [*OF_PLACE.values(), SpinningRotor([0.2, 0.0, 0.5])]
+    effects = [*PLACE_EFFECTS.values(), SpinningRotor([0.2, 0.0, 0.5])]
     attitude = uniform(3, rng=np.random.default_rng(1))
     momenta = np.random.default_rng(2).normal(size=(3, 3))
     method = SymmetricTopSplitting(0.01, order)
     compiled, plain = both(
         method, effects, monkeypatch, attitude, [[1.0, 1.4, 2.0], [2.0, 1.0, 1.4], [1, 1, 1]], momenta
     )
-    for one, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
-        assert np.allclose(one, other, rtol=0, atol=1e-14)  # the same operations; sums may be fused
+    for first, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
+        assert np.allclose(first, other, rtol=0, atol=1e-14)  # the same operations; sums may be fused
     assert np.allclose(compiled.energy, plain.energy, rtol=0, atol=1e-13)
     assert compiled.steps == plain.steps
 
 
 @pytest.mark.parametrize("options", [{"tolerance": 1e-9}, {"fixed_step": 0.07}])
 def test_the_lie_group_method_is_that_of_the_plain_form(options, monkeypatch):
-    effects = [*EVERY.values(), SpinningRotor([0.2, 0.0, 0.5])]
+    effects = [*ALL_EFFECTS.values(), SpinningRotor([0.2, 0.0, 0.5])]
     compiled, plain = both(LieRungeKutta(**options), effects, monkeypatch)
     assert compiled.steps == plain.steps
-    for one, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
+    for first, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
         assert np.allclose(
-            one, other, rtol=0, atol=1e-12
+            first, other, rtol=0, atol=1e-12
         )  # steps chosen from sums in another order: 1e-16/step², times 100
 
 
 def test_a_body_that_rolls_is_that_of_the_plain_form(monkeypatch):
     """Inertia and torque of the contact, with other torques and an inner momentum; about 1e3 smaller numbers than their parts."""
-    effects = [ROLLING, EVERY["linear drag"], EVERY["drive"], SpinningRotor([0.2, 0.0, 0.5])]
+    effects = [ROLLING, ALL_EFFECTS["linear drag"], ALL_EFFECTS["drive"], SpinningRotor([0.2, 0.0, 0.5])]
     compiled, plain = both(LieRungeKutta(1e-9), effects, monkeypatch, uniform(2, rng=np.random.default_rng(5)))
     assert compiled.steps == plain.steps > 10
-    for one, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
+    for first, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
         assert np.allclose(
-            one, other, rtol=0, atol=1e-12
+            first, other, rtol=0, atol=1e-12
         )  # steps chosen from sums in another order: 1e-16/step², times 100
 
 
@@ -133,7 +133,7 @@ def test_a_linear_rotor_in_a_field_is_compiled_too(monkeypatch):
 
 def test_going_over_to_the_compiled_form_within_an_interval(monkeypatch):
     """The plain steps end in the middle of an interval; the motion goes on from there."""
-    effects, grid = [EVERY["drive"], EVERY["linear drag"]], [0.0, 40.0, 60.0]
+    effects, grid = [ALL_EFFECTS["drive"], ALL_EFFECTS["linear drag"]], [0.0, 40.0, 60.0]
     monkeypatch.setattr(lie_runge_kutta, "PLAIN_STEPS", np.inf)
     plain = integrate(LieRungeKutta(1e-11), MOMENTS, MOMENTUM, grid, effects=effects)
     monkeypatch.setattr(lie_runge_kutta, "PLAIN_STEPS", 7)
@@ -152,15 +152,15 @@ def test_what_is_called_at_every_step_is_not_compiled(monkeypatch):
     assert compiled(TimedTorque(lambda t: [t, 0, 0])) is None
     assert compiled(ConstantTorque([0.1, 0, 0]), ChangingInertia(lambda t: [1.0, 1.0, 1.0 + t])) is None
     monkeypatch.setattr(splitting, "WORTH_LOADING", 0)
-    one, two = (
+    first, two = (
         integrate(SymmetricTopSplitting(0.1), [1, 1, 1], [0, 0, 0], [0, 1.0], effects=[kind([0.1, 0, 0])])
         for kind in (ConstantTorque, Doubled)
     )
-    assert np.allclose(two.momentum[-1], 2.0 * one.momentum[-1], rtol=1e-12)  # rounding of ten steps
+    assert np.allclose(two.momentum[-1], 2.0 * first.momentum[-1], rtol=1e-12)  # rounding of ten steps
 
 
 def test_few_steps_do_not_load_the_compiled_form(monkeypatch):
-    effects = [EVERY["dipole"]]
+    effects = [ALL_EFFECTS["dipole"]]
     method, system = SymmetricTopSplitting(0.1), system_of(MOMENTS, effects)
     path = np.zeros((2, 1, 7))
     assert not method.follow_compiled(system, np.array([0.0, 1.0]), np.array([10]), path)
@@ -168,7 +168,7 @@ def test_few_steps_do_not_load_the_compiled_form(monkeypatch):
 
 
 def test_blocks_of_bodies_in_a_field_move_as_each_alone():
-    rng, effects = np.random.default_rng(7), list(OF_PLACE.values())
+    rng, effects = np.random.default_rng(7), list(PLACE_EFFECTS.values())
     moments = np.array([[1.0, 1.4, 2.0], [2.0, 1.0, 1.4], [1.4, 2.0, 1.0]])[np.arange(130) % 3]
     momenta, attitudes = rng.normal(size=(130, 3)), uniform(130, rng=rng)
     alone = integrate(SymmetricTopSplitting(0.02), moments, momenta, [0.3, 1.3], attitudes, effects)
@@ -177,7 +177,7 @@ def test_blocks_of_bodies_in_a_field_move_as_each_alone():
     assert np.allclose(many[0], alone.momentum[:, -1], rtol=0, atol=5e-14)  # 50 steps of rounding of numbers up to 4
     assert np.allclose(many[1], alone.attitude[:, -1], rtol=0, atol=5e-14)
     single = propagate_driven(moments, momenta, attitudes, 0.02, 50, effects, 0.3)
-    assert all(np.array_equal(one, other) for one, other in zip(many, single, strict=True))
+    assert all(np.array_equal(first, other) for first, other in zip(many, single, strict=True))
 
 
 def test_a_crowd_in_a_field_is_of_order_two_and_keeps_its_energy():
@@ -195,12 +195,21 @@ def test_a_crowd_in_a_field_is_of_order_two_and_keeps_its_energy():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 9, [EVERY["linear drag"]]), "integrate"),
+        (
+            lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 9, [ALL_EFFECTS["linear drag"]]),
+            "integrate",
+        ),
         (lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 9, [SpinningRotor([0, 0, 1])]), "integrate"),
         (lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 9, [Doubled([0, 0, 1])]), "integrate"),
-        (lambda: propagate_driven(MOMENTS, MOMENTUM, [1, 0, 0, 0], 0.1, 9, [EVERY["dipole"]]), r"shape \(n, 3\)"),
-        (lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 0, [EVERY["dipole"]]), "at least one step"),
-        (lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 5.0, 9, [EVERY["dipole"]]), "take a shorter step"),
+        (lambda: propagate_driven(MOMENTS, MOMENTUM, [1, 0, 0, 0], 0.1, 9, [ALL_EFFECTS["dipole"]]), r"shape \(n, 3\)"),
+        (
+            lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 0.1, 0, [ALL_EFFECTS["dipole"]]),
+            "at least one step",
+        ),
+        (
+            lambda: propagate_driven(MOMENTS, [MOMENTUM], [1, 0, 0, 0], 5.0, 9, [ALL_EFFECTS["dipole"]]),
+            "take a shorter step",
+        ),
     ],
 )
 def test_refusals_of_blocks(make, message):

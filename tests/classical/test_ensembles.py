@@ -218,9 +218,9 @@ def test_streaming_does_not_depend_on_threads_and_says_how_far_it_is():
     ],
 )
 def test_wrong_input(options, said):
-    given = {"moments": TOPS["asymmetric"], "kt": KT, "times": [0.0, 1.0], "molecules": 10, "rng": rng()} | options
+    settings = {"moments": TOPS["asymmetric"], "kt": KT, "times": [0.0, 1.0], "molecules": 10, "rng": rng()} | options
     with pytest.raises(ValueError, match=said):
-        free_gas_correlations(**given)
+        free_gas_correlations(**settings)
 
 
 def test_other_wrong_input():

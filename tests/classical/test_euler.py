@@ -61,23 +61,23 @@ def test_linear_rotor_is_never_divided_by_zero():
 
 def test_polhode_lies_on_both_ellipsoids():
     moments, momentum = np.array([1.0, 2.0, 2.5]), np.array([0.4, -1.0, 0.7])
-    kept = euler.invariants(momentum, exp([0.1, 0.2, 0.3]), moments)
+    conserved = euler.invariants(momentum, exp([0.1, 0.2, 0.3]), moments)
     omega = euler.angular_velocity(momentum, moments)
     for semiaxes in (
-        euler.poinsot_semiaxes(moments, kept.energy),
-        euler.momentum_semiaxes(moments, kept.momentum),
+        euler.poinsot_semiaxes(moments, conserved.energy),
+        euler.momentum_semiaxes(moments, conserved.momentum),
     ):
         assert np.sum((omega / semiaxes) ** 2) == pytest.approx(1.0, abs=1e-15)  # a point of the ellipsoid
-    on_binet = momentum / euler.binet_semiaxes(moments, kept.energy)
+    on_binet = momentum / euler.binet_semiaxes(moments, conserved.energy)
     assert np.sum(on_binet**2) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_poinsot_plane_stands_at_a_fixed_distance():
     moments, momentum = np.array([1.0, 2.0, 2.5]), np.array([0.4, -1.0, 0.7])
-    kept = euler.invariants(momentum, IDENTITY, moments)
+    conserved = euler.invariants(momentum, IDENTITY, moments)
     omega = euler.angular_velocity(momentum, moments)
     # the normal of the ellipsoid at ω is along I ω = L, so the tangent plane is normal to L, at 2E/|L|
-    assert omega @ momentum / kept.momentum == pytest.approx(2 * kept.energy / kept.momentum, rel=1e-15)
+    assert omega @ momentum / conserved.momentum == pytest.approx(2 * conserved.energy / conserved.momentum, rel=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -111,13 +111,13 @@ def carlson_route(moments, momentum, times):
         sn, cn, dn, _ = ellipj(u - 2 * j * quarter, 1 - mc)
         f = u - 2 * j * quarter
         integral = 2 * j * third + f + n / 3 * sn**3 * elliprj(cn**2, dn**2, 1.0, 1 - n * sn**2)
-        own = moments[about]
+        moment = moments[about]
         drift = -g * i31 / (speed * i1 * i3) * integral + np.arctan2(np.sqrt(i2 * i31) * sn, root * cn) + j * np.pi
         parity = np.where(j % 2 == 0, 1.0, -1.0)
         amplitudes = (b13 * parity * cn, -b2 * parity * sn, b31 * dn)
         if about == 0:
             amplitudes = (b13 * dn, -b2 * parity * sn, b31 * parity * cn)
-        return g / own * t + sign * drift, np.stack(amplitudes, axis=-1)
+        return g / moment * t + sign * drift, np.stack(amplitudes, axis=-1)
 
     def pole(y):
         p0 = np.sqrt((1 + y[..., about] / g) / 2)
@@ -211,9 +211,9 @@ def test_attitude_follows_the_angular_velocity():
 def test_extreme_bodies_stay_finite_and_keep_their_invariants():
     rng = np.random.default_rng(5)
     n = 4000
-    moments, some = 10.0 ** rng.uniform(-12, 0, (n, 3)), rng.integers(0, 4, n)
-    moments[some == 1, 1] = moments[some == 1, 0] * (1.0 + 1e-12 * rng.integers(-3, 4, np.sum(some == 1)))
-    moments[some == 2, 2] = moments[some == 2, 0]
+    moments, kinds = 10.0 ** rng.uniform(-12, 0, (n, 3)), rng.integers(0, 4, n)
+    moments[kinds == 1, 1] = moments[kinds == 1, 0] * (1.0 + 1e-12 * rng.integers(-3, 4, np.sum(kinds == 1)))
+    moments[kinds == 2, 2] = moments[kinds == 2, 0]
     momenta = rng.normal(size=(n, 3)) * 10.0 ** (rng.uniform(-110, 0, (n, 3)) * (rng.uniform(size=(n, 3)) < 0.3))
     momenta[rng.uniform(size=(n, 3)) < 0.1] = 0.0
     m, q = free_motion(moments, momenta).at([0.0, 1.0, 1e8])

@@ -17,15 +17,15 @@ TARGET_RAD = 1e-14
 
 def taylor(moments, momentum, t, bits=240, order=90):
     """L and q at time t by Taylor series of Euler's equations in fixed point (about 70 digits), q = 1 at the start."""
-    one = 1 << bits
+    unity = 1 << bits
 
     def fixed(x):
-        ratio = mp.mpf(x) * one
+        ratio = mp.mpf(x) * unity
         return int(mp.nint(ratio))
 
     with mp.workprec(2 * bits):
         inverse = [fixed(1 / mp.mpf(float(i))) for i in moments]
-        m, q = [fixed(float(x)) for x in momentum], [one, 0, 0, 0]
+        m, q = [fixed(float(x)) for x in momentum], [unity, 0, 0, 0]
         speed = mp.sqrt(sum((mp.mpf(float(a)) / mp.mpf(float(i))) ** 2 for a, i in zip(momentum, moments, strict=True)))
         steps = int(mp.ceil(mp.mpf(float(t)) * speed / mp.mpf("0.2")))
         h = fixed(mp.mpf(float(t)) / steps)
@@ -52,7 +52,7 @@ def taylor(moments, momentum, t, bits=240, order=90):
             for a in range(3):
                 ws[a].append(ms[a][-1] * inverse[a] >> bits)
         m, q = [horner(s, h, bits) for s in ms], [horner(s, h, bits) for s in qs]
-    return [mp.mpf(x) / one for x in m], [mp.mpf(x) / one for x in q]
+    return [mp.mpf(x) / unity for x in m], [mp.mpf(x) / unity for x in q]
 
 
 def horner(series, h, bits):
@@ -106,8 +106,8 @@ def errors(bodies, periods, rng):
     moments, momenta = (np.array(x) for x in zip(*bodies, strict=True))
     motion, out = free_motion(moments, momenta), np.empty((len(bodies), len(periods)))
     for b, (i, m) in enumerate(bodies):
-        one, truth = free_motion(i, m), Truth(i, m)
-        span = one.period if np.isfinite(one.period) else 2 * np.pi / one.turning_rate
+        item, truth = free_motion(i, m), Truth(i, m)
+        span = item.period if np.isfinite(item.period) else 2 * np.pi / item.turning_rate
         for k, n in enumerate(periods):
             t = float((n + rng.uniform()) * span)
             out[b, k] = angle(truth.at(t)[1], motion.at(t)[1][b])

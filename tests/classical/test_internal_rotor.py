@@ -27,8 +27,8 @@ def lagrange(body, momentum, p, angle, times):
         slope = sum(0.5 * n * v * np.sin(n * y[4]) for n, v in body.barriers.items())
         return [*np.cross(y[:3], velocity[:3]), -slope, velocity[3]]
 
-    found = solve_ivp(rate, (times[0], times[-1]), [*momentum, p, angle], "DOP853", times, rtol=1e-12, atol=1e-12)
-    return found.y.T
+    solution = solve_ivp(rate, (times[0], times[-1]), [*momentum, p, angle], "DOP853", times, rtol=1e-12, atol=1e-12)
+    return solution.y.T
 
 
 def test_the_motion_is_that_of_lagranges_equations():
@@ -36,8 +36,8 @@ def test_the_motion_is_that_of_lagranges_equations():
     expected = lagrange(BODY, *START, times)
     errors = []
     for step in (0.04, 0.02):
-        found = turning_motion(BODY, *START, times, step)
-        path = np.column_stack([found.momentum[:, 0], found.p[:, 0], found.angle[:, 0]])
+        motion = turning_motion(BODY, *START, times, step)
+        path = np.column_stack([motion.momentum[:, 0], motion.p[:, 0], motion.angle[:, 0]])
         errors.append(np.abs(path - expected).max())
     assert errors[1] < 0.1
     assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.3)  # order 2
@@ -48,19 +48,19 @@ def test_energy_stays_within_the_step_and_momentum_in_space():
     times = np.linspace(0, 60, 61)
     swings = []
     for step in (0.04, 0.02):
-        found = turning_motion(BODY, *START, times, step)
-        swings.append(np.ptp(found.energy))
-        assert np.abs(found.momentum_in_space - found.momentum_in_space[0]).max() < 1e-11
+        motion = turning_motion(BODY, *START, times, step)
+        swings.append(np.ptp(motion.energy))
+        assert np.abs(motion.momentum_in_space - motion.momentum_in_space[0]).max() < 1e-11
     assert swings[0] / swings[1] == pytest.approx(4.0, abs=0.5)
-    early, late = found.energy[:30].mean(), found.energy[30:].mean()
+    early, late = motion.energy[:30].mean(), motion.energy[30:].mean()
     assert abs(late - early) < 0.3 * swings[1]  # bounded, without drift
 
 
 def test_without_a_barrier_it_is_the_gyrostat():
     free = TurningTop(BODY.moments, BODY.axis, BODY.own)
     times = np.linspace(0, 10, 6)
-    found = turning_motion(free, *START, times, 0.01)
-    assert np.ptp(found.p) == 0
+    motion = turning_motion(free, *START, times, 0.01)
+    assert np.ptp(motion.p) == 0
     axis = free.rest_axes.T @ free.axis
     gyrostat = integrate(
         LieRungeKutta(1e-12),
@@ -69,9 +69,9 @@ def test_without_a_barrier_it_is_the_gyrostat():
         times,
         effects=[SpinningRotor(START[1] * axis)],
     )
-    assert np.abs(found.momentum[:, 0] @ free.rest_axes - gyrostat.momentum).max() < 1e-3
+    assert np.abs(motion.momentum[:, 0] @ free.rest_axes - gyrostat.momentum).max() < 1e-3
     seen = rotate(
-        found.attitude[:, 0], np.broadcast_to(free.rest_axes[:, 0], (6, 3))
+        motion.attitude[:, 0], np.broadcast_to(free.rest_axes[:, 0], (6, 3))
     )  # the same material axis in space
     start = free.rest_axes  # the gyrostat began with its own axes along those of space
     expected = rotate(gyrostat.attitude, np.broadcast_to([1.0, 0.0, 0.0], (6, 3))) @ start.T
@@ -86,8 +86,8 @@ def test_behind_a_high_barrier_the_body_is_rigid():
     for barrier in (1e3, 1.6e4):
         stiff = TurningTop(BODY.moments, BODY.axis, BODY.own, {3: barrier})
         p = stiff.own * float(stiff.axis @ (momentum / stiff.moments))  # α' = 0
-        found = turning_motion(stiff, momentum, p, 0.0, times, 0.3 / np.sqrt(barrier))
-        errors.append(np.abs(found.momentum[:, 0] - rigid).max())
+        motion = turning_motion(stiff, momentum, p, 0.0, times, 0.3 / np.sqrt(barrier))
+        errors.append(np.abs(motion.momentum[:, 0] - rigid).max())
     assert errors[0] < 0.05
     assert errors[1] < errors[0] / 8  # falls as 1/V
 
@@ -96,8 +96,8 @@ def test_without_rotation_it_is_a_pendulum():
     body = TurningTop(BODY.moments, BODY.axis, BODY.own, {3: 6.0})
     amplitude = 0.9  # of 3α, radian
     times = np.linspace(0, 12, 601)
-    found = turning_motion(body, np.zeros(3), 0.0, amplitude / 3, times, 0.02)
-    angle = found.angle[:, 0]
+    motion = turning_motion(body, np.zeros(3), 0.0, amplitude / 3, times, 0.02)
+    angle = motion.angle[:, 0]
     falls = np.flatnonzero((angle[:-1] > 0) & (angle[1:] <= 0))
     crossings = times[falls] + (times[1] - times[0]) * angle[falls] / (angle[falls] - angle[falls + 1])
     exact = 4 * ellipk(np.sin(amplitude / 2) ** 2) / np.sqrt(4.5 * 6.0 / body.reduced_moment)  # V'' = 9 V3/2
@@ -109,11 +109,11 @@ def test_equipartition_in_a_gas_stays():
     kt, rng = 4.0, np.random.default_rng(5)
     momentum, p, angle = BODY.thermal(kt, 4000, rng=rng)
     times = np.array([0.0, 2.0, 4.0])
-    found = turning_motion(BODY, momentum, p, angle, times, 0.05)
-    slip = found.p * BODY.angle_rate(found.momentum, found.p)
+    motion = turning_motion(BODY, momentum, p, angle, times, 0.05)
+    slip = motion.p * BODY.angle_rate(motion.momentum, motion.p)
     error = slip.std(axis=1) / np.sqrt(4000)
     assert (np.abs(slip.mean(axis=1) - kt) < 4 * error).all()
-    assert (np.abs(found.energy.mean(axis=1) - found.energy.mean()) < 0.02).all()
+    assert (np.abs(motion.energy.mean(axis=1) - motion.energy.mean()) < 0.02).all()
     cold = turning_motion(BODY, momentum, np.zeros(4000), angle, times, 0.05)
     warm = cold.p * BODY.angle_rate(cold.momentum, cold.p)
     assert warm.mean(axis=1)[0] == 0.0
@@ -129,6 +129,6 @@ def test_equipartition_in_a_gas_stays():
     ],
 )
 def test_bodies_that_cannot_be_are_refused(change, text):
-    given = {"moments": [8.0, 40.0, 44.0], "axis": [1.0, 0, 0], "own": 3.0, "barriers": {3: 1.0}} | change
+    settings = {"moments": [8.0, 40.0, 44.0], "axis": [1.0, 0, 0], "own": 3.0, "barriers": {3: 1.0}} | change
     with pytest.raises(ValueError, match=text):
-        TurningTop(**given)
+        TurningTop(**settings)

@@ -46,11 +46,11 @@ ATTRACTORS = [
 @pytest.mark.parametrize(("rate", "start", "expected", "divergence", "dimension"), ATTRACTORS)
 def test_published_attractors(rate, start, expected, divergence, dimension):
     time = {-8.8: 5000.0, -5.38: 10_000.0, -0.625: 30_000.0}[divergence]  # the fast attractors average sooner
-    found = lyapunov_exponents(Flow(rate, np.array(start)), time=time, transient=300.0)
-    assert np.allclose(found.values, expected, atol=0.01)  # as stated with them
-    assert abs(np.sum(found.values) - divergence) < 1e-6
-    assert found.divergence == pytest.approx(divergence, abs=1e-9)
-    assert found.kaplan_yorke == pytest.approx(dimension, abs=0.01)
+    exponents = lyapunov_exponents(Flow(rate, np.array(start)), time=time, transient=300.0)
+    assert np.allclose(exponents.values, expected, atol=0.01)  # as stated with them
+    assert abs(np.sum(exponents.values) - divergence) < 1e-6
+    assert exponents.divergence == pytest.approx(divergence, abs=1e-9)
+    assert exponents.kaplan_yorke == pytest.approx(dimension, abs=0.01)
 
 
 def test_compiled_and_plain_routes_agree():
@@ -70,9 +70,9 @@ def test_compiled_and_plain_routes_agree():
 
 def test_the_unstable_axis_grows_at_the_closed_rate():
     moments, momentum = [1.0, 2.0, 3.0], [0.0, 2.0, 0.0]
-    found = lyapunov_exponents(body_flow(moments, momentum), time=60.0, transient=20.0, segments=2)
+    exponents = lyapunov_exponents(body_flow(moments, momentum), time=60.0, transient=20.0, segments=2)
     sigma = growth_rate(moments, 2.0)
-    assert np.allclose(found.values, [sigma, 0.0, -sigma], atol=1e-9)  # the fixed point's own exponents
+    assert np.allclose(exponents.values, [sigma, 0.0, -sigma], atol=1e-9)  # the fixed point's own exponents
 
 
 def test_free_tumbling_is_not_chaotic():
@@ -86,20 +86,20 @@ def test_free_tumbling_is_not_chaotic():
 def test_damped_top_contracts_at_its_drag():
     moments = np.array([1.0, 2.0, 4.0])
     drag = np.array([0.1, 0.4, 0.2])
-    found = lyapunov_exponents(body_flow(moments, [0.0, 0.0, 0.0], [LinearDrag(drag)]), time=40.0, segments=2)
-    assert np.allclose(np.sort(found.values), np.sort(-drag / moments), atol=1e-9)
+    exponents = lyapunov_exponents(body_flow(moments, [0.0, 0.0, 0.0], [LinearDrag(drag)]), time=40.0, segments=2)
+    assert np.allclose(np.sort(exponents.values), np.sort(-drag / moments), atol=1e-9)
 
 
 def test_exponents_with_attitude_carry_the_zero_of_the_quaternion():
     """A pendulum upside down leaves at √(m g l/I), its seven exponents pair up, and |q| adds one zero."""
     weight = GravityAboutPivot(1.0, [0.0, 0.0, 0.5], [0.0, 0.0, -10.0])
     upright = body_flow([2.0, 1.0, 0.5], [0, 0, 0], [weight], exp([0.0, 0, 0]))
-    found = lyapunov_exponents(upright, time=8.0, count=7, segments=2, transient=0.0)
-    assert np.allclose(found.values[:2], [np.sqrt(5.0), np.sqrt(2.5)], atol=0.02)  # alignment over 0.8 only
-    assert np.allclose(found.values, -found.values[::-1], atol=1e-6)
-    assert abs(found.values[2]) < 0.5  # the free turn about the vertical: a shear, log t / t with t = 4
-    assert abs(found.values[3]) < 1e-6
-    assert abs(np.sum(found.values)) < 1e-6
+    exponents = lyapunov_exponents(upright, time=8.0, count=7, segments=2, transient=0.0)
+    assert np.allclose(exponents.values[:2], [np.sqrt(5.0), np.sqrt(2.5)], atol=0.02)  # alignment over 0.8 only
+    assert np.allclose(exponents.values, -exponents.values[::-1], atol=1e-6)
+    assert abs(exponents.values[2]) < 0.5  # the free turn about the vertical: a shear, log t / t with t = 4
+    assert abs(exponents.values[3]) < 1e-6
+    assert abs(np.sum(exponents.values)) < 1e-6
 
 
 def test_driven_body_is_followed_at_its_own_time():
@@ -107,8 +107,8 @@ def test_driven_body_is_followed_at_its_own_time():
     effects = [PeriodicDrive([1.0, 0, 0], 1.0), LinearDrag([0.5, 0.5, 0.5])]
     flow = body_flow([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], effects)
     assert flow.timed
-    found = lyapunov_exponents(flow, time=20.0, segments=2)
-    assert np.allclose(found.values, -0.5, atol=1e-6)  # central differences of a linear flow
+    exponents = lyapunov_exponents(flow, time=20.0, segments=2)
+    assert np.allclose(exponents.values, -0.5, atol=1e-6)  # central differences of a linear flow
 
 
 def test_quadratic_form_is_found_and_refused():
@@ -164,24 +164,26 @@ def test_refusals():
 @pytest.mark.parametrize("time", [100.0, 1000.0, 10_000.0])
 @pytest.mark.parametrize("transient", [0.0, 300.0])
 def test_exponents_of_a_free_top_are_zero_within_their_errors(time, transient):
-    found = lyapunov_exponents(body_flow([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]), time=time, transient=transient)
-    assert np.all(np.abs(found.values) < 1.5 * found.errors)  # a shear grows as t: one bias, and the spread beside it
-    assert found.kaplan_yorke == 3.0  # all count as zero: the spectrum of a flow that keeps volumes
-    assert found.errors[0] < 20.0 * np.log(time) / time  # and the errors do not hide everything
+    exponents = lyapunov_exponents(body_flow([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]), time=time, transient=transient)
+    assert np.all(
+        np.abs(exponents.values) < 1.5 * exponents.errors
+    )  # a shear grows as t: one bias, and the spread beside it
+    assert exponents.kaplan_yorke == 3.0  # all count as zero: the spectrum of a flow that keeps volumes
+    assert exponents.errors[0] < 20.0 * np.log(time) / time  # and the errors do not hide everything
 
 
 def test_the_bias_is_counted_for_segments_side_by_side_too():
     flow = body_flow([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     timed = Flow(flow.rate, flow.start, timed=True)  # not the compiled loop
-    found = lyapunov_exponents(timed, time=200.0, segments=4, tolerance=1e-9)
-    assert np.all(np.abs(found.values) < 1.5 * found.errors)
-    assert found.bias == pytest.approx(np.log(6.0) / 50.0)  # from a fifth of a segment to six fifths
+    exponents = lyapunov_exponents(timed, time=200.0, segments=4, tolerance=1e-9)
+    assert np.all(np.abs(exponents.values) < 1.5 * exponents.errors)
+    assert exponents.bias == pytest.approx(np.log(6.0) / 50.0)  # from a fifth of a segment to six fifths
 
 
 def test_the_bias_does_not_hide_chaos():
-    found = lyapunov_exponents(Flow(leipnik_newton, np.array([0.349, 0.0, -0.160])), time=2000.0, transient=200.0)
-    assert found.values[0] > 10.0 * found.errors[0]
-    assert abs(found.values[1]) < 3.0 * found.errors[1]  # along the orbit
+    exponents = lyapunov_exponents(Flow(leipnik_newton, np.array([0.349, 0.0, -0.160])), time=2000.0, transient=200.0)
+    assert exponents.values[0] > 10.0 * exponents.errors[0]
+    assert abs(exponents.values[1]) < 3.0 * exponents.errors[1]  # along the orbit
 
 
 def linear_flow(rng):
@@ -215,12 +217,14 @@ def test_closed_forms_are_within_the_stated_errors(make):
     for seed in range(20):
         rng = np.random.default_rng([27, seed])
         flow, exact = make(rng)
-        found = lyapunov_exponents(
+        exponents = lyapunov_exponents(
             flow, time=10 ** rng.uniform(2, 3.5), transient=rng.choice([0.0, 20.0]), segments=8,
             interval=rng.uniform(0.2, 2.0), tolerance=10 ** rng.uniform(-11, -5),
         )  # fmt: skip
-        assert np.all(np.abs(found.values - exact) <= found.rounding + found.truncation + 2.0 * found.spread), seed
-        assert found.budget.numerical <= 2.5 * found.bias + found.budget.rounding.value + 1e-4
+        assert np.all(
+            np.abs(exponents.values - exact) <= exponents.rounding + exponents.truncation + 2.0 * exponents.spread
+        ), seed
+        assert exponents.budget.numerical <= 2.5 * exponents.bias + exponents.budget.rounding.value + 1e-4
 
 
 def test_the_errors_of_chaos_cover_it():
@@ -228,9 +232,11 @@ def test_the_errors_of_chaos_cover_it():
     flow = Flow(leipnik_newton, np.array([0.349, 0.0, -0.160]))
     whole = lyapunov_exponents(flow, time=40_000.0, transient=300.0, tolerance=1e-8)
     starts = orbit(flow, 300.0 + 37.0 * np.arange(40), 1e-8)
-    parts = [lyapunov_exponents(Flow(leipnik_newton, one), time=640.0, transient=5.0, tolerance=1e-8) for one in starts]
+    parts = [
+        lyapunov_exponents(Flow(leipnik_newton, start), time=640.0, transient=5.0, tolerance=1e-8) for start in starts
+    ]
     departures = np.array(
-        [(one.values[0] - whole.values[0]) / np.hypot(one.spread[0], whole.spread[0]) for one in parts]
+        [(part.values[0] - whole.values[0]) / np.hypot(part.spread[0], whole.spread[0]) for part in parts]
     )
     assert np.mean(np.abs(departures) <= 2.04) > 0.84  # 0.95 less three deviations of a count of 40
     assert 0.6 < np.std(departures) < 1.5
@@ -238,11 +244,11 @@ def test_the_errors_of_chaos_cover_it():
 
 def test_an_accuracy_is_met_by_a_longer_time():
     flow = Flow(leipnik_newton, np.array([0.349, 0.0, -0.160]))
-    found = lyapunov_exponents(flow, time=200.0, transient=300.0, accuracy=0.04)
-    shorter = lyapunov_exponents(flow, time=found.time / 2, transient=300.0)
-    assert found.time > 200.0
-    assert found.reached <= 0.04 < shorter.reached
-    assert found.budget.line().startswith("errors of growth rates: ")
+    exponents = lyapunov_exponents(flow, time=200.0, transient=300.0, accuracy=0.04)
+    shorter = lyapunov_exponents(flow, time=exponents.time / 2, transient=300.0)
+    assert exponents.time > 200.0
+    assert exponents.reached <= 0.04 < shorter.reached
+    assert exponents.budget.line().startswith("errors of growth rates: ")
     with pytest.raises(ValueError, match="cannot be given: the error after a time of 1024 "):
         lyapunov_exponents(Flow(leipnik_newton, flow.start), time=1.0, segments=2, accuracy=1e-9)
 

@@ -109,8 +109,8 @@ def test_start_is_half_a_degree_off_the_intermediate_axis():
 def test_table_keeps_the_invariants_and_departure_sees_a_fault():
     motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     table = sampled(motion, np.linspace(0, 100, 50))
-    kept = invariant_drift(table, motion)
-    assert max(kept.energy, kept.momentum, kept.space_momentum) < 1e-14  # round-off of some ten operations
+    drift = invariant_drift(table, motion)
+    assert max(drift.energy, drift.momentum, drift.space_momentum) < 1e-14  # round-off of some ten operations
     bent = MotionTable(table.times, table.momentum, np.broadcast_to(IDENTITY, (50, 4)), table.energy)
     assert invariant_drift(bent, motion).space_momentum > 0.1
     with pytest.raises(ValueError, match="one body"):

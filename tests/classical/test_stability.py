@@ -194,7 +194,7 @@ def test_the_growth_rate_is_rounded_as_stated():
         if rng.random() < 0.3:
             moments[1] = moments[0] * (1 + 10 ** rng.uniform(-15, -3))
         with mpmath.workdps(50):
-            low, middle, high = (mpmath.mpf(one) for one in np.sort(moments))
+            low, middle, high = (mpmath.mpf(moment) for moment in np.sort(moments))
             true = momentum / middle * mpmath.sqrt((high - middle) * (middle - low) / (low * high))
             apart = abs(mpmath.mpf(float(stab.growth_rate(moments, momentum))) - true)
             assert apart <= ROUNDING * true

@@ -134,14 +134,14 @@ def test_info_marks_the_temperatures_that_are_beyond_the_series(call, monkeypatc
 
 def test_two_ways_to_the_same_dipole(call, folder):
     (folder / "w.xyz").write_text(WATER_XYZ, encoding="utf-8")
-    found = []
+    results = []
     for option in (["--dipole", "0,0,1.8546"], ["--dipole-abc", "0,1.8546,0"]):
         code, out, _ = call("spectrum", "w.xyz", *option, "--jmax", "5", "--json", "-")
         assert code == 0
-        found.append(json.loads(out))
-    assert np.allclose(np.abs(found[0]["dipole_abc_debye"]), [0, 1.8546, 0], atol=1e-12)  # round-off of the axes
-    assert len(found[0]["lines"]) == len(found[1]["lines"]) > 10
-    assert found[0]["lines"][0] == pytest.approx(found[1]["lines"][0], rel=1e-12)  # round-off of the axes
+        results.append(json.loads(out))
+    assert np.allclose(np.abs(results[0]["dipole_abc_debye"]), [0, 1.8546, 0], atol=1e-12)  # round-off of the axes
+    assert len(results[0]["lines"]) == len(results[1]["lines"]) > 10
+    assert results[0]["lines"][0] == pytest.approx(results[1]["lines"][0], rel=1e-12)  # round-off of the axes
 
 
 def test_estimated_dipole_is_said_loudly(call, folder):
@@ -217,12 +217,12 @@ def test_q_and_vibrational_factor(call):
 # JSON
 
 
-def numbers_of(thing):
-    if isinstance(thing, dict):
-        thing = list(thing.values())
-    if isinstance(thing, list):
-        return [number for item in thing for number in numbers_of(item)]
-    return [thing] if isinstance(thing, float) else []
+def numbers_of(value):
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        return [number for item in value for number in numbers_of(item)]
+    return [value] if isinstance(value, float) else []
 
 
 @pytest.mark.parametrize("source", ["water", "CO", "CH3CN", "CH4"])
@@ -557,10 +557,10 @@ def test_provenance_is_one_line_at_the_end_and_whole_when_asked_for(call):
 
 def test_hitran_records_are_written(call, tmp_path):
     assert call("spectrum", "CO", "--hitran", "co.hitran", "--hitran-id", "5:1", "--jmax", "20")[0] == 0
-    found = rotor.read(str(tmp_path / "co.hitran"))
-    assert set(found.molecule.tolist()) == {5}
+    content = rotor.read(str(tmp_path / "co.hitran"))
+    assert set(content.molecule.tolist()) == {5}
     lines = rotor.api.line_list(rotor.read("CO"), temperature_k=296, jmax=20)
-    assert found.wavenumber_cm == pytest.approx(lines.frequency_mhz / 29979.2458, abs=6e-7)  # six decimals
+    assert content.wavenumber_cm == pytest.approx(lines.frequency_mhz / 29979.2458, abs=6e-7)  # six decimals
     for extra in (("--hitran-id", "x"), ("--hitran-id", "5", "--temperature", "300"), ()):
         code, _, err = call("spectrum", "CO", "--hitran", "b.hitran", *extra)
         assert code == 2

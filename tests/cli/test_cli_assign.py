@@ -34,10 +34,10 @@ def test_command_scene_and_python_agree(call: Call, peaks_csv: Path) -> None:
     )  # fmt: skip
     assert code == 0
     assert "species 1, certain" in shown
-    found = json.loads(Path("a.json").read_text())
+    content = json.loads(Path("a.json").read_text())
     answer = answer_assign(AssignRequest(read_peaks(peaks_csv, BAND)))
     for key, value in json.loads(json.dumps(answer.facts())).items():
-        assert found[key] == value
+        assert content[key] == value
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
     assert len(Path("a.lin").read_text().splitlines()) == len(answer.species[0].lines)
 
@@ -103,8 +103,8 @@ def test_a_spectrum_on_a_grid(suffix: str, tmp_path: Path) -> None:
         np.savetxt(path, np.column_stack([grid, x]), delimiter=",", fmt="%.4f")
     peaks = read_peaks(path)
     f, _ = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
-    apart = np.array([np.abs(f - one).min() for one in peaks.frequency_mhz])
-    alone = np.array([np.sort(np.abs(f - one))[1] > 0.3 for one in peaks.frequency_mhz])
+    apart = np.array([np.abs(f - peak).min() for peak in peaks.frequency_mhz])
+    alone = np.array([np.sort(np.abs(f - peak))[1] > 0.3 for peak in peaks.frequency_mhz])
     assert (apart[alone] < 4 * peaks.uncertainty_mhz[alone] + 0.001).mean() > 0.97
     assert is_right(answer_assign(AssignRequest(peaks, seconds=120)), 0, TRUTH)
 

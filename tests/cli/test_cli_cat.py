@@ -111,27 +111,27 @@ def test_the_lines_that_are_left_go_to_tables(call, tmp_path):
     assert [float(row.split(",")[0]) for row in rows[1:]] == inside.tolist()
     import duckdb
 
-    found = duckdb.sql(f"select frequency_mhz, error_mhz from '{tmp_path / 'a.parquet'}'").fetchall()
-    assert [row[0] for row in found] == inside.tolist()
+    computed = duckdb.sql(f"select frequency_mhz, error_mhz from '{tmp_path / 'a.parquet'}'").fetchall()
+    assert [row[0] for row in computed] == inside.tolist()
 
 
 def test_a_comparison_counts_and_measures(call, tmp_path):
     whole = read_cat(OCS)
     write_cat(whole.take(slice(2, None)), tmp_path / "less.cat")
     _, out, _ = call("cat", OCS, "--compare", "less.cat", "--json", "-")
-    found = json.loads(out)["compared"]
-    assert (found["matched"], found["missing"], found["extra"]) == (len(whole) - 2, 2, 0)
-    assert found["frequency_mhz"]["largest"] == 0
-    assert [line["quanta_upper"] for line in found["missing_lines"]] == [[1], [2]]
+    content = json.loads(out)["compared"]
+    assert (content["matched"], content["missing"], content["extra"]) == (len(whole) - 2, 2, 0)
+    assert content["frequency_mhz"]["largest"] == 0
+    assert [line["quanta_upper"] for line in content["missing_lines"]] == [[1], [2]]
     _, out, _ = call("cat", "less.cat", "--compare", OCS)
     assert "only there: all lines" in out
 
 
 def test_a_catalogue_meets_its_prediction(call):
     _, out, _ = call("cat", OCS, "--compare", str(SAMPLES / "ocs" / "ocs.int"), "--json", "-")
-    found = json.loads(out)["compared"]
-    assert (found["matched"], found["missing"], found["extra"]) == (100, 0, 0)
-    assert found["frequency_mhz"]["largest"] < 1.1e-4  # four decimals
+    content = json.loads(out)["compared"]
+    assert (content["matched"], content["missing"], content["extra"]) == (100, 0, 0)
+    assert content["frequency_mhz"]["largest"] < 1.1e-4  # four decimals
     _, out, err = call("cat", OCS, "--compare", "OCS", "--json", "-")
     assert err.startswith("note: OCS: predicted at 300 K with Q = 1028.6")
     assert json.loads(out)["compared"]["frequency_mhz"]["largest"] < 1.0  # other constants: H differs by 1e-11 MHz
@@ -183,11 +183,11 @@ def test_every_option_and_key_is_documented(call):
 def test_a_prediction_has_the_temperature_and_the_range_of_the_catalogue(call, tmp_path):
     assert call("spectrum", "OCS", "--temperature", "75", "--range", "100:400GHz", "--cat", "cold.cat")[0] == 0
     _, out, err = call("cat", "cold.cat", "--compare", "OCS", "--json", "-")
-    found = json.loads(out)["compared"]
+    content = json.loads(out)["compared"]
     assert "predicted at 75 K" in err
-    assert (found["temperature_k"], found["temperature_source"]) == (75.0, "cold.cat.provenance.json")
-    assert (found["missing"], found["extra"]) == (0, 0)
-    assert found["lgint"]["largest"] < 1.01e-4  # printed to four decimals
+    assert (content["temperature_k"], content["temperature_source"]) == (75.0, "cold.cat.provenance.json")
+    assert (content["missing"], content["extra"]) == (0, 0)
+    assert content["lgint"]["largest"] < 1.01e-4  # printed to four decimals
     (tmp_path / "cold.cat.provenance.json").unlink()
     _, out, err = call("cat", "cold.cat", "--compare", "OCS", "--json", "-")
     assert json.loads(out)["compared"]["temperature_k"] == 300.0
@@ -210,10 +210,10 @@ def test_a_comparison_is_drawn_as_a_mirror_with_differences():
     from rotor.plots.comparison import comparison_figure
 
     whole = read_cat(OCS)
-    found = compare(whole, read_cat(OCS).take(slice(5, None)))
-    figure = comparison_figure(found, names=("measured.cat", "SO2"))
+    comparison = compare(whole, read_cat(OCS).take(slice(5, None)))
+    figure = comparison_figure(comparison, names=("measured.cat", "SO2"))
     above, below = figure.axes
-    sticks = [np.array(one.get_segments()) for one in above.collections]
+    sticks = [np.array(collection.get_segments()) for collection in above.collections]
     tips = [segments[:, 1, 1] for segments in sticks]
     assert [len(t) for t in tips] == [len(whole) - 5, 5, len(whole) - 5]  # matched, only above, matched below
     assert (tips[0] > 0).all()

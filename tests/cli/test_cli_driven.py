@@ -56,7 +56,7 @@ def test_the_contract_names_every_effect_and_parameter():
     text = CONTRACT.read_text(encoding="utf-8")
     rows = {line.split("|")[1].strip(" `"): line.split("|")[2] for line in text.splitlines() if line.startswith("| `")}
     for name, kind in package_effects().items():
-        assert all(f"`{one.last}`" in rows[name] for one in all_fields(kind).values()), name
+        assert all(f"`{field.last}`" in rows[name] for field in all_fields(kind).values()), name
 
 
 def test_drag_slows_a_sphere_as_the_closed_form_says(call):

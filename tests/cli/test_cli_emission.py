@@ -99,8 +99,8 @@ def test_a_catalogue_is_a_source_like_the_molecule_it_was_made_from(call, tmp_pa
         ):
             assert mine[key] == pytest.approx(theirs[key], rel=rel)  # LGINT has 4 decimals
         assert (mine["upper"], mine["g_upper"]) == (theirs["upper"], theirs["g_upper"])
-    given = json.loads(call("emission", "hc3n.cat", "--partition", "300=1374.1,30=137.7", *same)[1])
-    assert given["molecules"][0]["q"] == pytest.approx(137.7, rel=1e-12)
+    content = json.loads(call("emission", "hc3n.cat", "--partition", "300=1374.1,30=137.7", *same)[1])
+    assert content["molecules"][0]["q"] == pytest.approx(137.7, rel=1e-12)
     (tmp_path / "catdir.cat").write_text("     0 HC3N 1 3.1380 3.0130 2.8368 2.5360 2.2353 1.9349 1.6350 1\n")
     code, out, err = call("emission", "hc3n.cat", "--partition", "catdir.cat", *same)
     assert (code, err) == (0, "")

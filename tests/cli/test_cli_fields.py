@@ -20,7 +20,7 @@ from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
 BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")
 SHORT = ("--pulse", "1e13 W/cm2, 50 fs", "--points", "51", "--temperature", "0", "--tolerance", "1e-4")
-OF_COMMAND = {"rotor_version", "command", "input", "files"}
+COMMAND_KEYS = {"rotor_version", "command", "input", "files"}
 
 
 def rows(path: str) -> list[list[str]]:
@@ -51,7 +51,7 @@ def test_stark_writes_what_the_library_computes(call):
     answer = answer_stark(
         StarkRequest(read("OCS"), tuple(np.linspace(0, 200, 5).tolist()), j_highest=1, tolerance_mhz=1e-4)
     )
-    assert set(content) - OF_COMMAND == {*answer.facts(), "states"}
+    assert set(content) - COMMAND_KEYS == {*answer.facts(), "states"}
     for key, value in plain(answer.facts()).items():
         assert content[key] == value, key
     assert [row["energy_mhz"] for row in content["states"]] == answer.states.energy_mhz.tolist()
@@ -78,18 +78,20 @@ def test_stark_writes_lines_spectra_mixtures_and_tables(call):
         "--lobes", "l.png", "--spectrum", "s.csv", "--coefficients", "c.csv", "--mixture", "m.csv", "--deflection", "d.csv",
     )  # fmt: skip
     assert (code, err) == (0, "")
-    found = field_lines(read("OCS"), np.linspace(0, 5, 6), j_highest=1, light="perpendicular", temperature_k=2.0).lobes(
-        "1", "0"
-    )
+    computed = field_lines(
+        read("OCS"), np.linspace(0, 5, 6), j_highest=1, light="perpendicular", temperature_k=2.0
+    ).lobes("1", "0")
     table = rows("l.csv")
-    assert table[0] == list(found.columns)
-    assert [float(line[1]) for line in table[1:]] == found.frequency_mhz.tolist()
+    assert table[0] == list(computed.columns)
+    assert [float(line[1]) for line in table[1:]] == computed.frequency_mhz.tolist()
     assert rows("c.csv")[0][:5] == ["upper", "upper_m", "lower", "lower_m", "c1_mhz_per_kv_per_cm"]
     assert rows("d.csv")[0] == ["field_kv_per_cm", "mu_eff_debye 0 M0", "mu_eff_debye 1 M0", "mu_eff_debye 1 M1"]
     assert rows("m.csv")[0][:3] == ["field_kv_per_cm", "energy_mhz", "mu_eff_debye"]
     spectrum = np.array(rows("s.csv")[1:], dtype=float)
     strongest = spectrum[np.argmax(spectrum[:, 1]), 0]
-    assert strongest == pytest.approx(found.frequency_mhz[-1], abs=2.5)  # the spread: 2 % of a shift of 62 MHz, twice
+    assert strongest == pytest.approx(
+        computed.frequency_mhz[-1], abs=2.5
+    )  # the spread: 2 % of a shift of 62 MHz, twice
     assert Path("l.png").stat().st_size > 10_000
 
 
@@ -123,13 +125,13 @@ def test_stark_with_the_spin_of_a_nucleus(call):
 
 @pytest.mark.slow
 def test_workers_change_no_number(call):
-    found = []
+    results = []
     for workers in ("1", "2"):
         arguments = ("H2O", "--field", "0,100", "--states", "J<=1", "--tilt", "30", "--intensity", "1e11 W/cm2")
         code, out, err = call("stark", *arguments, "--workers", workers, "--json", "-")
         assert (code, err) == (0, "")
-        found.append(json.loads(out)["states"])
-    assert found[0] == found[1]
+        results.append(json.loads(out)["states"])
+    assert results[0] == results[1]
 
 
 def test_align_writes_what_the_library_computes(call):
@@ -145,7 +147,7 @@ def test_align_writes_what_the_library_computes(call):
         observables=("cos2theta", "cos2theta_2d"), classical_molecules=200,
     )  # fmt: skip
     answer = answer_align(request)
-    assert set(content) - OF_COMMAND == {*answer.facts(), "trace"}
+    assert set(content) - COMMAND_KEYS == {*answer.facts(), "trace"}
     for key, value in plain(answer.facts()).items():
         assert content[key] == value, key
     assert [row["cos2theta"] for row in content["trace"]] == answer.table.columns["cos2theta"].tolist()
@@ -281,7 +283,7 @@ def test_zeeman_writes_what_the_library_computes(call):
     assert "μ_N" in out
     content = json.loads(Path("a.json").read_text())
     answer = answer_zeeman(ZeemanRequest(read("m.toml"), (0.0, 0.01, 0.02), j_highest=1, hyperfine=True))
-    assert set(content) - OF_COMMAND == {*answer.facts(), "states"}
+    assert set(content) - COMMAND_KEYS == {*answer.facts(), "states"}
     for key, value in plain(answer.facts()).items():
         assert content[key] == value, key
     assert content["nuclear_g"]["14N"] == pytest.approx(0.4037, abs=1e-3)  # μ/(μ_N I), shielding aside
@@ -333,7 +335,7 @@ def test_wrong_input_of_zeeman(call, arguments, message):
 
 def test_m_and_its_negative_are_one_row_with_three_dipole_components(call):
     """M and -M coincide by time reversal; "mixed" is for fields at an angle alone."""
-    given = (
+    options = (
         "stark",
         "--constants",
         "A=10 B=6 C=4 GHz",
@@ -344,8 +346,8 @@ def test_m_and_its_negative_are_one_row_with_three_dipole_components(call):
         "--states",
         "J<=1",
     )
-    code, out, err = call(*given)
+    code, out, err = call(*options)
     assert code == 0, err
     assert "mixed" not in out
     assert not any(line.split()[3:4] == ["-1"] for line in out.splitlines())
-    assert "mixed" in call(*given, "--tilt", "30")[1]
+    assert "mixed" in call(*options, "--tilt", "30")[1]

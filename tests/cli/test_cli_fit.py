@@ -238,7 +238,7 @@ def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     (folder / "co.par").write_text(tied)
     call("fit", "co.par", "--json", "tied.json")
     content = json.loads((folder / "tied.json").read_text(encoding="utf-8"))
-    assert [one["name"] for one in content["parameters"]] == ["B", "-D"]
+    assert [parameter["name"] for parameter in content["parameters"]] == ["B", "-D"]
     assert content["constants_mhz"]["H"] / content["constants_mhz"]["D"] == pytest.approx(
         1.6e-7 / 0.17, rel=1e-12
     )  # the ratio of the file
@@ -280,7 +280,7 @@ def test_trying_choosing_suggesting_and_resampling(call, folder):
     code, out, _ = call(*common, "--choose", "H,L", "--suggest", "H", "--bootstrap", "20", "--json", "choose.json")
     assert code == 0
     content = json.loads((folder / "choose.json").read_text(encoding="utf-8"))
-    assert [one["name"] for one in content["chosen"]] == ["H"]
+    assert [constant["name"] for constant in content["chosen"]] == ["H"]
     assert len(content["bootstrap_errors"]) == 3
     assert content["suggestions"] == []  # every line of the range is measured
 
@@ -325,8 +325,13 @@ def test_a_family_file_becomes_a_structure(call, folder):
     assert code == 0, err
     assert "CO" in out
     content = json.loads((folder / "o.json").read_text(encoding="utf-8"))
-    assert [one.name for one in read_family("ocs.toml").family.species] == ["parent", "C=13C", "S=34S", "O=18O"]
-    rs = {one["name"]: one["value"] for one in content["rs"]["values"]}
+    assert [component.name for component in read_family("ocs.toml").family.species] == [
+        "parent",
+        "C=13C",
+        "S=34S",
+        "O=18O",
+    ]
+    rs = {value["name"]: value["value"] for value in content["rs"]["values"]}
     assert rs == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published
     assert content["r0"]["degrees_of_freedom"] == 2
     top = rotor.read(str(folder / "o.xyz"))
@@ -404,13 +409,13 @@ def test_pictures_of_a_fit_and_of_a_molecule_are_the_same_file_each_time(call, f
         call("fit", "co.csv", "--constants", CO, "--free", "B,D", "--plot", f"fit_{name}.svg")
         call("structure", "ocs.toml", "--plot", f"molecule_{name}.svg")
     for kind in ("fit", "molecule"):
-        one, two = ((folder / f"{kind}_{name}.svg").read_text() for name in ("one", "two"))
-        assert one.replace("one.svg", "two.svg") == two  # the command in the metadata apart
-        assert "(Obs. − calc.) / error" in one or "1.15" in one
+        first, two = ((folder / f"{kind}_{name}.svg").read_text() for name in ("one", "two"))
+        assert first.replace("one.svg", "two.svg") == two  # the command in the metadata apart
+        assert "(Obs. − calc.) / error" in first or "1.15" in first
 
 
 def test_the_family_of_samples_gives_the_published_structure(call, folder):
     code, out, err = call("structure", str(SAMPLES / "ocs.toml"), "--method", "rs", "--json", "-")
     assert code == 0, err
-    values = {one["name"]: one["value"] for one in json.loads(out)["rs"]["values"]}
+    values = {value["name"]: value["value"] for value in json.loads(out)["rs"]["values"]}
     assert values == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published

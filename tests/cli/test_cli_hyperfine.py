@@ -28,7 +28,7 @@ def test_levels_by_the_cheapest_method(call):
     exact = content(call, *words)
     cheap = content(call, *words, "--hyperfine-method", "auto", "--hyperfine-tolerance", "1 MHz")
     assert (exact["hyperfine"]["method"], cheap["hyperfine"]["method"]) == ("exact", "first-order")
-    energies = [sorted(one["energy_mhz"] for one in each["levels"]) for each in (exact, cheap)]
+    energies = [sorted(level["energy_mhz"] for level in each["levels"]) for each in (exact, cheap)]
     apart = [abs(a - b) for a, b in zip(*energies, strict=True)]
     assert 0 < max(apart) < cheap["hyperfine"]["estimate_mhz"] < 1.0
 
@@ -38,12 +38,12 @@ def test_emission_of_components_adds_up_to_the_line_without_spins(call):
     words = ("emission", "HCN", "--range", SPLIT, "--column", "1e10", "--excitation", "10")
     whole, split = content(call, *words), content(call, *words, "--hyperfine")
     (line,), parts = whole["lines"], split["lines"]
-    assert [one["upper"] for one in parts] == ["1 1", "1 2", "1 0"]
-    assert sum(one["integrated_k_km_s"] for one in parts) == pytest.approx(
+    assert [part["upper"] for part in parts] == ["1 1", "1 2", "1 0"]
+    assert sum(part["integrated_k_km_s"] for part in parts) == pytest.approx(
         line["integrated_k_km_s"], rel=1e-3
     )  # 1.5 MHz of ν
     assert split["molecules"][0]["q"] == pytest.approx(3 * whole["molecules"][0]["q"], rel=1e-9)  # the factor 2I+1
-    mean = np.average([one["frequency_mhz"] for one in parts], weights=[one["optical_depth"] for one in parts])
+    mean = np.average([part["frequency_mhz"] for part in parts], weights=[part["optical_depth"] for part in parts])
     assert mean == pytest.approx(line["frequency_mhz"], abs=0.05)  # MHz: spin-rotation and second order
     assert split["molecules"][0]["hyperfine"]["method"] == "exact"
     assert whole["molecules"][0]["hyperfine"] is None
@@ -70,9 +70,9 @@ def test_raman_lines_with_spins(call):
 def test_thermo_counts_the_functions_of_spins(call):
     words = ("thermo", "HCN", "--temperature", "1,300")
     whole, split = content(call, *words), content(call, *words, "--hyperfine")
-    for one, many in zip(whole["functions"], split["functions"], strict=True):
-        assert many["q_rot"] == pytest.approx(3 * one["q_rot"], rel=1e-6)  # δ/kT = 2e-4 at 1 K, its square
-        assert many["cv_over_r"] == pytest.approx(one["cv_over_r"], rel=1e-6)
+    for function, many in zip(whole["functions"], split["functions"], strict=True):
+        assert many["q_rot"] == pytest.approx(3 * function["q_rot"], rel=1e-6)  # δ/kT = 2e-4 at 1 K, its square
+        assert many["cv_over_r"] == pytest.approx(function["cv_over_r"], rel=1e-6)
     assert split["hyperfine"]["spin_functions"] == 3
     assert split["spin_factor"] == pytest.approx(3 * whole["spin_factor"])
     assert "Q counts 3 functions of the spins" in call(*words, "--hyperfine")[1]
@@ -135,11 +135,12 @@ def test_wrong_input_is_one_line_and_exit_code_2(call, words, why):
 def test_isotopologues_have_the_constants_of_spins_that_their_nuclei_have(call):
     """Of bare geometry and given constants: 14N stays, turned with the axes; 15N has no quadrupole moment."""
     words = ("isotopologues", "HCN", "--spin-constants", "chi_aa(14N)=-4.7 MHz", "--each", "C=13C", "--each", "N=15N")
-    found = {
-        one["substituted"].popitem()[1]: one["spin_constants_mhz"] for one in content(call, *words)["isotopologues"]
+    computed = {
+        isotopologue["substituted"].popitem()[1]: isotopologue["spin_constants_mhz"]
+        for isotopologue in content(call, *words)["isotopologues"]
     }
-    assert found["13C"] == pytest.approx({"chi_aa(14N)": -4.7}, rel=1e-12)  # rounding: the axis stays
-    assert found["15N"] is None
+    assert computed["13C"] == pytest.approx({"chi_aa(14N)": -4.7}, rel=1e-12)  # rounding: the axis stays
+    assert computed["15N"] is None
     printed = call("isotopologues", "HCN", "--each", "C=13C")[1]
     assert "constants of spins (MHz)" in printed
     assert "chi_aa(14N)" in printed

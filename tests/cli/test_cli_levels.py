@@ -155,19 +155,19 @@ def test_labels_of_the_diagram_do_not_overlap(tmp_path, monkeypatch):
 
 def test_spin_constants_split_levels(call, folder):
     """E(F) = -χ Y(F): N = 1 of one spin 1 has F = 0 at -χ/2, F = 1 at χ/4, F = 2 at -χ/20 (H. B. G. Casimir), to first order."""
-    given = ("--constants", "B=44315.9757 MHz", "--spin-constants", "chi_aa(14N)=-4.7 MHz")
-    code, out, _ = call("levels", *given, "--jmax", "1", "--json", "-")
+    options = ("--constants", "B=44315.9757 MHz", "--spin-constants", "chi_aa(14N)=-4.7 MHz")
+    code, out, _ = call("levels", *options, "--jmax", "1", "--json", "-")
     content = json.loads(out)
     assert code == 0
     assert content["quantum_numbers"] == ["n", "f"]
-    energy = {(one["n"], one["f"]): one["energy_mhz"] for one in content["levels"]}
+    energy = {(level["n"], level["f"]): level["energy_mhz"] for level in content["levels"]}
     assert len(energy) == 4
-    of_f = [energy[1, f] - 2 * 44315.9757 for f in (0, 1, 2)]
-    assert of_f == pytest.approx(
+    splittings = [energy[1, f] - 2 * 44315.9757 for f in (0, 1, 2)]
+    assert splittings == pytest.approx(
         [4.7 / 2, -4.7 / 4, 4.7 / 20], abs=2e-4
     )  # second order: χ²/B = 5e-4 MHz, times less than 0.4
-    assert "N from 0 to 1" in call("levels", *given, "--jmax", "1")[1]
-    assert "J from 0 to 1" in call("levels", *given[:2], "--jmax", "1")[1]
+    assert "N from 0 to 1" in call("levels", *options, "--jmax", "1")[1]
+    assert "J from 0 to 1" in call("levels", *options[:2], "--jmax", "1")[1]
 
 
 def test_levels_with_the_spins_of_the_library(call, folder):
@@ -187,7 +187,7 @@ def test_overlapping_levels_of_spins_have_one_label(limits, expected):
     table = answer_levels(LevelsRequest(top, jmax=1, effects=effects_of(top, True))).table
     figure = levels_figure(table, top, unit="MHz", view=View(vertical=limits))
     texts = {text.get_text() for text in figure.axes[0].texts if "$1_{0,1}" in text.get_text()}
-    assert texts == {one if isinstance(one, str) else f"$1_{{0,1}}, F{{=}}{one}$" for one in expected}
+    assert texts == {label if isinstance(label, str) else f"$1_{{0,1}}, F{{=}}{label}$" for label in expected}
 
 
 def test_ammonia_counts_from_the_lowest_level_that_exists_and_says_which(call):

@@ -46,7 +46,9 @@ def test_catalogue_added_listed_and_shown(call, folder):
     assert "16 lines from 2 sources" in out
     code, out, _ = call("catalogue", "list", "--catalogue", catalogue, "--json", "-")
     species = json.loads(out)["species"]
-    assert [(one["name"], one["tag"], one["lines"], one["licence"]) for one in species] == [
+    assert [
+        (component["name"], component["tag"], component["lines"], component["licence"]) for component in species
+    ] == [
         ("XYW", 99502, 8, "free"),
         ("XYZ", 99501, 8, "free"),
     ]
@@ -57,7 +59,7 @@ def test_catalogue_added_listed_and_shown(call, folder):
     assert len(lines) == 8
     assert len((folder / "l.csv").read_text().splitlines()) == 9
     direct = read_cat_species(folder / "cats" / "c099501.cat")
-    assert [one["frequency_mhz"] for one in lines] == direct.frequency_mhz.tolist()
+    assert [line["frequency_mhz"] for line in lines] == direct.frequency_mhz.tolist()
 
 
 def test_faults_of_a_catalogue(call, folder):
@@ -89,7 +91,7 @@ def test_identify_names_the_species_that_is_there(call, folder):
     )
     assert (code, err) == (0, "")
     content = json.loads(out)
-    assert [one["species"] for one in content["species"]] == ["XYZ"]
+    assert [component["species"] for component in content["species"]] == ["XYZ"]
     assert content["velocity_km_s"] == pytest.approx(3.0, abs=0.5)
     assert content["unidentified"] == []
     assert plot.stat().st_size > 5000
@@ -103,12 +105,12 @@ def test_identify_names_the_species_that_is_there(call, folder):
 def test_fit_of_a_source(call, folder):
     files = [str(folder / name) for name in ("f.csv", "f_profile.csv", "f.pdf")]
     code, out, err = call(
-        "emission", "XYZ", "XYW", "--fit", str(folder / "s.txt"), "--catalogue", made(call, folder), "--shared", "velocity,width",
+        "emission", "XYZ", "XYW", "--fit", str(folder / "s.txt"), "--catalogue", observed_file(call, folder), "--shared", "velocity,width",
         "--json", "-", "--csv", files[0], "--profile-csv", files[1], "--plot", files[2],
     )  # fmt: skip
     assert (code, err) == (0, "")
     content = json.loads(out)
-    rows = {one["name"]: one for one in content["parameters"]}
+    rows = {parameter["name"]: parameter for parameter in content["parameters"]}
     for name, exact in (
         ("XYZ column_per_cm2", 2e15),
         ("XYZ excitation_k", 80.0),
@@ -128,7 +130,7 @@ def test_fit_of_a_source(call, folder):
     )
 
 
-def made(call, folder: Path) -> str:
+def observed_file(call, folder: Path) -> str:
     path = str(folder / "a.rotorcat")
     call("catalogue", "add", str(folder / "cats"), "--catalogue", path)
     return path

@@ -47,8 +47,8 @@ def test_heights_are_those_of_the_lines() -> None:
     lines = known_lines()
     fit = fit_intensities(lines, peak_list(f, i, 0.001, band_mhz=BAND))
     heights = fit.heights(lines)
-    at = [int(np.argmin(np.abs(lines.frequency_mhz - one))) for one in f]
-    single = np.array([np.sort(np.abs(f - one))[1] > 0.3 for one in f])
+    at = [int(np.argmin(np.abs(lines.frequency_mhz - frequency))) for frequency in f]
+    single = np.array([np.sort(np.abs(f - frequency))[1] > 0.3 for frequency in f])
     np.testing.assert_allclose(heights[at][single], i[single], rtol=0.1)
 
 
@@ -70,7 +70,7 @@ def test_a_type_with_peaks_by_chance_is_absent() -> None:
 
 
 def test_wrong_constants_have_few_lines_with_a_peak() -> None:
-    right, wrong = (int((matched(known_lines(factor=one), spectrum())[1] >= 0).sum()) for one in (1.0, 1.01))
+    right, wrong = (int((matched(known_lines(factor=factor), spectrum())[1] >= 0).sum()) for factor in (1.0, 1.01))
     assert right > 60
     assert wrong < right / 6
     with pytest.raises(ValueError, match="at least 5 are needed"):
@@ -84,7 +84,7 @@ def test_rows_of_right_constants_have_a_peak_in_the_middle() -> None:
         lines = known_lines(2.0, factor, (0.0, 1.0, 0.6))
         axes = loomis_wood_figure(lines, lines.intensity_nm2_mhz, peaks, "rows").axes[0]
         marks = [path.vertices for collection in axes.collections for path in collection.get_paths()]
-        middle = {round(float(one[:, 1].mean())) for one in marks if abs(one[0, 0]) < 0.05}
+        middle = {round(float(mark[:, 1].mean())) for mark in marks if abs(mark[0, 0]) < 0.05}
         shares.append(len(middle) / len(axes.get_yticks()))
     assert shares[0] > 0.95
     assert shares[1] < 0.2

@@ -45,10 +45,10 @@ def test_debug_shows_where_a_mistake_was_found(call):
 
 
 @pytest.mark.parametrize(
-    ("words", "found"),
+    ("words", "computed"),
     [("rotor spec", "spectrum"), ("rotor levels --uni", "--unit"), ("rotor levels formam", "formamide")],
 )
-def test_a_shell_can_complete_words(words, found):
+def test_a_shell_can_complete_words(words, computed):
     environment = os.environ | {
         "PYTHONPATH": str(PROJECT), "_ROTOR_COMPLETE": "complete_bash", "COMP_WORDS": words,
         "COMP_CWORD": str(len(words.split()) - 1),
@@ -56,7 +56,7 @@ def test_a_shell_can_complete_words(words, found):
     done = subprocess.run(
         [sys.executable, "-m", "rotor"], env=environment, capture_output=True, text=True, check=False, timeout=60
     )
-    assert done.stdout.split() == [found]
+    assert done.stdout.split() == [computed]
 
 
 @pytest.mark.parametrize("ignored", [True, False])

@@ -115,13 +115,13 @@ def test_mistakes(call, arguments, said):
 
 
 def test_vibration_of_a_spectrum(call):
-    found = []
+    results = []
     for option in ((), ("--vibration", "712x2,2097,3311 cm-1"), ("--vibrational-states", "712x2")):
         _, out, _ = call("spectrum", "HCN", *option, "--jmax", "5", "--json", "-")
-        found.append(json.loads(out)["q"]["q"])
+        results.append(json.loads(out)["q"]["q"])
     occupied = math.exp(-712 * 1.438776877 / 300)
-    assert found[2] / found[0] == pytest.approx(1 + 2 * occupied, rel=1e-9)  # digits of hc/k
-    assert found[1] / found[0] == pytest.approx((1 - occupied) ** -2, rel=5e-5)  # ν1 and ν3 add 4e-5
+    assert results[2] / results[0] == pytest.approx(1 + 2 * occupied, rel=1e-9)  # digits of hc/k
+    assert results[1] / results[0] == pytest.approx((1 - occupied) ** -2, rel=5e-5)  # ν1 and ν3 add 4e-5
 
 
 def test_a_layer_of_gas(call):

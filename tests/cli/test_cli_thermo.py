@@ -19,8 +19,8 @@ COLUMNS = [
     "temperature_k", "q_rot", "q_rot_classical", "q_rot_corrected", "energy_j_per_mol", "entropy_j_per_mol_k", "cv_over_r",
     "cv_over_r_classical", "cv_over_r_corrected",
 ]  # fmt: skip
-OF_VIBRATION = ["q_vib", "cv_vib_over_r"]
-OF_GAS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_mol", "gas_gibbs_j_per_mol_k"]
+VIBRATION_KEYS = ["q_vib", "cv_vib_over_r"]
+GAS_KEYS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_mol", "gas_gibbs_j_per_mol_k"]
 KEYS = {
     "rotational_temperatures_k", "classical_above_k", "classical_tolerance", "classical_corrections", "species",
     "species_known", "fractions", "symmetry_number_counted", "hyperfine", "spin_factor", "jmax", "relative_error", "vibrations",
@@ -41,14 +41,14 @@ def test_the_grid_of_the_contract(call, folder):
     rows = rows_of("w.csv")
     assert list(rows[0]) == COLUMNS
     assert [float(row["temperature_k"]) for row in rows] == np.linspace(10, 1000, 100).tolist()
-    found = thermodynamic_functions(rotor.read("water"), np.linspace(10, 1000, 100))
-    assert [float(row["cv_over_r"]) for row in rows] == found.cv_over_r.tolist()  # full precision
+    functions = thermodynamic_functions(rotor.read("water"), np.linspace(10, 1000, 100))
+    assert [float(row["cv_over_r"]) for row in rows] == functions.cv_over_r.tolist()  # full precision
     assert rows[0]["cv_over_r_corrected"] == ""
     assert float(rows[-1]["cv_over_r_classical"]) == 1.5
     assert (folder / "w.png").read_bytes().startswith(b"\x89PNG")
     content = json.loads((folder / "w.json").read_text(encoding="utf-8"))
     assert content["functions"][0]["q_rot_corrected"] is None
-    assert content["functions"][99]["q_rot"] == found.q_rot[99]
+    assert content["functions"][99]["q_rot"] == functions.q_rot[99]
     assert content["files"] == ["w.csv", "w.png", "w.json"]
     provenance = json.loads((folder / "w.csv.provenance.json").read_text(encoding="utf-8"))
     assert provenance["species"] == "equilibrium"
@@ -72,7 +72,7 @@ def test_json_has_the_keys_of_the_contract(call):
     )
     assert list(content["functions"][0]) == COLUMNS
     text = CONTRACT.read_text(encoding="utf-8")
-    assert all(f"`{name}`" in text for name in [*KEYS, *COLUMNS, *OF_VIBRATION, *OF_GAS])
+    assert all(f"`{name}`" in text for name in [*KEYS, *COLUMNS, *VIBRATION_KEYS, *GAS_KEYS])
 
 
 def test_q_is_that_of_info(call):
@@ -93,7 +93,7 @@ def test_gas_functions_of_water(call):
     assert code == 0
     content = json.loads(out)
     row = content["functions"][0]
-    assert list(row) == COLUMNS + OF_VIBRATION + OF_GAS
+    assert list(row) == COLUMNS + VIBRATION_KEYS + GAS_KEYS
     assert row["gas_cp_j_per_mol_k"] == pytest.approx(33.590, abs=0.01)  # the bending state's own rotation
     assert row["gas_entropy_j_per_mol_k"] == pytest.approx(188.834, abs=0.005)  # natural mass makes 0.003
     assert row["gas_enthalpy_j_per_mol"] == pytest.approx(9904, abs=1)
@@ -110,7 +110,7 @@ def test_vibration_without_gas(call):
     code, out, _ = call("thermo", "CO2", "--temperature", "300", "--vibrational-states", "667.4x2", "--json", "-")
     assert code == 0
     row = json.loads(out)["functions"][0]
-    assert list(row) == COLUMNS + OF_VIBRATION
+    assert list(row) == COLUMNS + VIBRATION_KEYS
     assert row["q_vib"] == pytest.approx(VibrationalStates((667.4,), (2,)).factor(300.0), rel=1e-12)
 
 
@@ -121,7 +121,7 @@ def test_parquet_and_csv_have_the_same_numbers(call, folder):
     assert code == 0
     table = pl.read_parquet("m.parquet")
     rows = rows_of("m.csv")
-    assert table.columns == list(rows[0]) == COLUMNS + OF_GAS
+    assert table.columns == list(rows[0]) == COLUMNS + GAS_KEYS
     for name in table.columns:
         assert [x if x is None else float(x) for x in table[name]] == [
             float(r[name]) if r[name] else None for r in rows

@@ -46,14 +46,14 @@ def values_of(top) -> dict[str, float]:
 
 @pytest.mark.parametrize("source", KINDS, ids=lambda path: f"{path.parent.parent.name}-{path.stem}")
 def test_what_is_written_is_read_as_the_same_top(source, tmp_path, capsys):
-    given, written = copy_of(source, tmp_path), tmp_path / "x.toml"
-    code = run(["convert", str(given), str(written)])
+    copy, written = copy_of(source, tmp_path), tmp_path / "x.toml"
+    code = run(["convert", str(copy), str(written)])
     if code == 2:
         assert REMEDY.search(capsys.readouterr().err)
         assert not written.exists()
         return
     assert code == 0
-    again, top = rotor.read(written), top_with_errors(str(given))
+    again, top = rotor.read(written), top_with_errors(str(copy))
     assert values_of(again) == pytest.approx(values_of(top), rel=1e-14)  # digits of a double in decimal
     assert again.spin_weights == top.spin_weights
     assert again.dipole_abc_debye == top.dipole_abc_debye
@@ -66,23 +66,23 @@ def test_what_is_written_is_read_as_the_same_top(source, tmp_path, capsys):
 
 def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path, capsys):
     """WTPL and WTMN beside a total spin are the weights of the other nuclei, also where they are as 1 to 3."""
-    given = copied("weights_of_states_i_tot", tmp_path)
-    lines = [line for line in given.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
-    given.write_text("".join(lines))
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    copy = copied("weights_of_states_i_tot", tmp_path)
+    lines = [line for line in copy.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
+    copy.write_text("".join(lines))
+    assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 2
     assert "mixes levels of nuclear-spin weights 3 and 1" in capsys.readouterr().err
-    beside = given.with_suffix(".var")
+    beside = copy.with_suffix(".var")
     file = read_par(beside)
     beside.write_bytes(format_par(replace(file, parameters=tuple(p for p in file.parameters if p.value != 1e-6))))
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 0
     assert 'weights = "other nuclei"' in (tmp_path / "x.toml").read_text()
     weights = rotor.read(tmp_path / "x.toml").states.weights
     assert weights[1].rule == "none"
     assert weights[0].to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
 
-    shutil.copy(given, tmp_path / "y.int")
+    shutil.copy(copy, tmp_path / "y.int")
     assert run(["convert", str(tmp_path / "x.toml"), str(tmp_path / "y.var")]) == 0
-    first, again = (predict_file(tmp_path / name, as_spcat=True).catalogue for name in (given.name, "y.int"))
+    first, again = (predict_file(tmp_path / name, as_spcat=True).catalogue for name in (copy.name, "y.int"))
     assert len(first) == len(again) > 200
     for name in ("frequency_mhz", "lgint", "energy_lower_cm"):
         assert getattr(again, name) == pytest.approx(
@@ -103,8 +103,8 @@ def test_weights_of_other_nuclei_are_stated_beside_a_total_spin_alone(tmp_path, 
 
 
 def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(tmp_path, capsys):
-    given = copied("dipoles_between", tmp_path)
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    copy = copied("dipoles_between", tmp_path)
+    assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 2
     said = capsys.readouterr().err
     assert "μa = 1.3 D, μb = 0.7 D" in said
     assert "leave out of the source what is named here" in said
@@ -112,8 +112,8 @@ def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(
 
 
 def test_axes_in_another_order_are_refused_with_the_state(tmp_path, capsys):
-    given = copied("near_sphere_states", tmp_path)
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    copy = copied("near_sphere_states", tmp_path)
+    assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 2
     said = capsys.readouterr().err
     assert "state 1: A = 7297.2, B = 7228.2, C = 7270.8 MHz" in said
     assert "predict from the files themselves" in said
@@ -121,12 +121,12 @@ def test_axes_in_another_order_are_refused_with_the_state(tmp_path, capsys):
 
 
 def test_what_of_the_option_line_is_lost_is_noted(tmp_path, capsys):
-    given = copied("water_diag1", tmp_path)
-    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    copy = copied("water_diag1", tmp_path)
+    assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 0
     said = capsys.readouterr().err
     assert "note: DIAG = 1, KNMAX = 20, NLINE = 0 of water_diag1.var are not part of a .toml" in said
     assert "DIAG = 3, KNMAX = 99, NLINE = 1" in said
-    file = read_par(given.with_suffix(".var"))
+    file = read_par(copy.with_suffix(".var"))
     same = replace(file, header=replace(file.header, nline=1), options=(replace(file.options[0], diag=3),))
     (tmp_path / "y.var").write_bytes(format_par(same))
     again = ConvertRequest(str(tmp_path / "y.var"), 20)
@@ -176,9 +176,9 @@ def test_levels_of_an_int_file_have_the_errors_of_spcat(tmp_path):
     (tmp_path / "a.int").write_text("maxv\n11 99001 1000.0 0 2 -9 -9 9999. 300. 1\n 1 1.0\n 111 1.0\n")
     assert run(["spectrum", str(tmp_path / "a.int"), "--egy", str(tmp_path / "a.egy")]) == 0
     levels = read_egy(tmp_path / "a.egy")
-    found = {tuple(quanta): i for i, quanta in enumerate(levels.quanta.tolist())}
+    computed = {tuple(quanta): i for i, quanta in enumerate(levels.quanta.tolist())}
     for quanta, (energy, error) in LISTED.items():
-        row = found[quanta]
+        row = computed[quanta]
         assert levels.energy_cm[row] == pytest.approx(energy, abs=1.1e-6)  # the last printed digit
         assert levels.error_cm[row] == pytest.approx(error, abs=1.1e-6)  # the last printed digit
     assert (np.asarray(levels.error_cm) > 0).sum() > 10
@@ -206,9 +206,9 @@ def test_nothing_is_written_where_levels_are_not_reached(tmp_path, monkeypatch):
         raise ValueError("no levels")
 
     monkeypatch.setattr(predict, "levels_of_file", failing)
-    given = copied("ocs", tmp_path)
+    copy = copied("ocs", tmp_path)
     before = sorted(tmp_path.iterdir())
-    assert run(["spectrum", str(given), "--egy", str(tmp_path / "a.egy"), "--cat", str(tmp_path / "a.cat")]) == 1
+    assert run(["spectrum", str(copy), "--egy", str(tmp_path / "a.egy"), "--cat", str(tmp_path / "a.cat")]) == 1
     assert sorted(tmp_path.iterdir()) == before
 
 

@@ -129,10 +129,10 @@ def test_rows_of_hapi_with_further_parameters_are_read(tmp_path):
     plain = next((ORACLES / "hitran").glob("*.par")).read_text().splitlines()[:3]
     path = tmp_path / "co.data"
     path.write_text("".join(f"{row},0.0661,-0.00125,#\n" for row in plain))
-    found = rotor.read(path)
-    assert isinstance(found, HitranLines)
-    np.testing.assert_array_equal(found.wavenumber_cm, read_hitran("\n".join([*plain, ""]).encode()).wavenumber_cm)
-    assert format_hitran(found) == path.read_bytes()
+    content = rotor.read(path)
+    assert isinstance(content, HitranLines)
+    np.testing.assert_array_equal(content.wavenumber_cm, read_hitran("\n".join([*plain, ""]).encode()).wavenumber_cm)
+    assert format_hitran(content) == path.read_bytes()
     with pytest.raises(ValueError, match="a record of HITRAN has 160"):
         read_hitran((plain[0] + "x\n").encode())
 

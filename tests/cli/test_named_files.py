@@ -57,7 +57,7 @@ def _repeated(levels, chosen) -> np.ndarray:
 def coded_energies(file: ParameterFile, light: IntensityFile, twice_f: int) -> np.ndarray:
     """The same from the codes."""
     levels = [group.levels((0, twice_f)) for group in groups_of(file, light)]
-    return np.sort(np.concatenate([_repeated(one, np.ones(len(one), dtype=bool)) for one in levels]))
+    return np.sort(np.concatenate([_repeated(level, np.ones(len(level), dtype=bool)) for level in levels]))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -79,11 +79,11 @@ def test_names_say_the_hamiltonian_of_the_codes(name):
 def test_lines_of_named_constants_are_those_of_the_files(name):
     file, light = files(name)
     top = named_top(file, light)
-    asked = replace(light, request=replace(light.request, fend=3, str0=-20.0, str1=-20.0))
-    expected = predict(file, asked).lines
+    widened = replace(light, request=replace(light.request, fend=3, str0=-20.0, str1=-20.0))
+    expected = predict(file, widened).lines
     lines = line_list(top, jmax=5, effects=effects_of(top, True), min_lgint=None, temperature_k=300.0)
     chosen = np.maximum(lines.levels.multiplicity[lines.upper], lines.levels.multiplicity[lines.lower]) <= 7
-    strong = lambda one, rows: one.strength_debye2[rows] > 1e-6  # noqa: E731
+    strong = lambda lines_, rows: lines_.strength_debye2[rows] > 1e-6  # noqa: E731
     mine, theirs = np.flatnonzero(chosen), np.arange(len(expected.frequency_mhz))
     mine, theirs = mine[strong(lines, mine)], theirs[strong(expected, theirs)]
     assert len(mine) == len(theirs) > 20
@@ -100,9 +100,9 @@ def test_codes_and_values_come_back():
     file, light = files("formamide_quad")
     again = named_parameter_file(named_top(file, light), 12)
     expected = {p.code % 10**10: p.value for p in file.parameters}
-    found = {p.code: p.value for p in again.parameters}
+    computed = {p.code: p.value for p in again.parameters}
     for code in (110010000, 110040000):
-        assert found[code] == pytest.approx(expected[code], rel=1e-14)  # factors 3/2 and 1/4
+        assert computed[code] == pytest.approx(expected[code], rel=1e-14)  # factors 3/2 and 1/4
     assert again.options[0].spind == 3
 
 

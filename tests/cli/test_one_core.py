@@ -73,10 +73,10 @@ def answers(folder, compiled=False):
     return json.loads(run.stdout)
 
 
-def differs(one, other, tolerance):
-    if isinstance(one, str) or isinstance(other, str) or len(one) != len(other):
-        return one != other
-    return any(abs(a - b) > tolerance * (1.0 + abs(a)) for a, b in zip(one, other, strict=True))
+def differs(first, other, tolerance):
+    if isinstance(first, str) or isinstance(other, str) or len(first) != len(other):
+        return first != other
+    return any(abs(a - b) > tolerance * (1.0 + abs(a)) for a, b in zip(first, other, strict=True))
 
 
 @pytest.fixture(scope="module")

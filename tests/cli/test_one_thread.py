@@ -11,7 +11,7 @@ from rotor.cli.shared import process
 
 
 @pytest.mark.parametrize(
-    ("own", "loaded", "jmax", "before", "after"),
+    ("threads", "loaded", "jmax", "before", "after"),
     [
         (True, False, None, None, "1"),
         (True, False, 100, None, "1"),
@@ -21,8 +21,8 @@ from rotor.cli.shared import process
         (False, False, 10, None, None),
     ],
 )
-def test_one_thread_is_set_before_numpy_is_loaded(monkeypatch, own, loaded, jmax, before, after):
-    monkeypatch.setattr(process, "_OWN", own)
+def test_one_thread_is_set_before_numpy_is_loaded(monkeypatch, threads, loaded, jmax, before, after):
+    monkeypatch.setattr(process, "_OWN", threads)
     monkeypatch.setattr(sys, "modules", {"numpy": sys.modules["numpy"]} if loaded else {})
     monkeypatch.setattr(os, "environ", {"OPENBLAS_NUM_THREADS": before} if before else {})
     process.one_thread_of_blas(jmax)

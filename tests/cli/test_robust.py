@@ -345,7 +345,7 @@ def test_a_sample_of_mutated_inputs_makes_no_traceback():
     spec.loader.exec_module(fuzz)
     failing, done = fuzz.fuzz(10_000_000, 300, fuzz.QUICK)
     assert done == 300
-    assert [(one.failing, one.words, one.said) for one in failing] == []
+    assert [(failure.failing, failure.words, failure.said) for failure in failing] == []
 
 
 # Long sums

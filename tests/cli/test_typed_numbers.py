@@ -62,7 +62,7 @@ def test_a_number_takes_its_unit(call, folder, command, typed, plain, other):
         code, out, err = call(*command, text, "--json", "-")
         assert code == 0, err
         answers.append({key: value for key, value in json.loads(out).items() if key != "command"})
-    with_unit, without, different = (json.dumps(_rounded(one), sort_keys=True) for one in answers)
+    with_unit, without, different = (json.dumps(_rounded(answer), sort_keys=True) for answer in answers)
     assert with_unit == without
     assert with_unit != different
 

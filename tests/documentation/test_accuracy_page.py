@@ -28,12 +28,12 @@ def program() -> ModuleType:
 def errors(program, name: str, panel: int = 0) -> dict[str, dict[str, float]]:
     """The stored errors by curve and setting."""
     curves = program.read_results()[name][panel].curves
-    return {curve: {one.setting: one.error for one in points} for curve, points in curves.items()}
+    return {curve: {point.setting: point.error for point in points} for curve, points in curves.items()}
 
 
 def test_the_page_is_made_of_the_stored_figures(program):
     assert program.PAGE.read_text(encoding="utf-8") == program.page(program.read_results())
-    assert set(program.read_results()) == {one.name for one in program.SUBJECTS}
+    assert set(program.read_results()) == {subject.name for subject in program.SUBJECTS}
 
 
 def test_every_subject_has_its_picture(program):
@@ -54,7 +54,7 @@ def test_the_sentences_hold_for_the_figures(program):
     rigid = [curve["J^2"] for curve in errors(program, "orders").values()]
     assert 500 < min(rigid) < max(rigid) < 5000  # MHz
     for curve in errors(program, "partition").values():
-        assert all(error <= 100 * float(asked) for asked, error in curve.items())  # percent
+        assert all(error <= 100 * float(setting) for setting, error in curve.items())  # percent
     steps = errors(program, "fluid_step")["step"]
     assert steps["2"] == pytest.approx(0.4, abs=0.05)
     assert steps["2"] / steps["1"] == pytest.approx(4.0, rel=0.1)  # of second order
@@ -86,7 +86,7 @@ CHEAP = ["levels", "cut", "partition", "stark", "fluid_step", "ewald", "fit"]
 @pytest.mark.parametrize("name", CHEAP)
 def test_the_errors_come_out_again(program, name):
     """Within a factor of 1.5 where they are no round-off, since another LAPACK takes other steps."""
-    subject = next(one for one in program.SUBJECTS if one.name == name)
+    subject = next(subject for subject in program.SUBJECTS if subject.name == name)
     for panel, stored in zip(subject.panels(None), program.read_results()[name], strict=True):
         assert panel.title == stored.title
         for curve, points in panel.curves.items():

@@ -50,7 +50,7 @@ def test_a_wrong_argument_is_named(call, kind, said):
 def test_rows_of_a_list_of_lines(lines):
     assert len(lines[1]) == 1
     assert lines[-1].frequency_mhz[0] == lines.frequency_mhz[-1]
-    assert [float(one.frequency_mhz[0]) for one in lines] == lines.frequency_mhz.tolist()
+    assert [float(line.frequency_mhz[0]) for line in lines] == lines.frequency_mhz.tolist()
     with pytest.raises(IndexError):
         lines[len(lines)]
     with pytest.raises(ValueError, match="count: -1"):
@@ -69,10 +69,10 @@ def test_threads_agree():
     sys.setswitchinterval(1e-5)
     try:
         with ThreadPoolExecutor(2) as pool:
-            found = list(pool.map(work, range(2)))
+            computed = list(pool.map(work, range(2)))
     finally:
         sys.setswitchinterval(switch)
-    assert all(one == work(0) for one in found)
+    assert all(entry == work(0) for entry in computed)
 
 
 def test_a_stream_that_is_closed_is_the_null_device(monkeypatch):

@@ -82,20 +82,20 @@ def results(name: str) -> dict[str, Any]:
 
 def test_figures_in_the_text_are_those_that_the_benchmarks_wrote():
     fluid = (DOCS / "fluid.md").read_text(encoding="utf-8").replace("\n", " ")
-    found = results("thermometers")
+    computed = results("thermometers")
     drifts = [
-        found["drifts"][name]["energy_rms_kj_per_mol"] for name in ("symmetric top and remainder", "three rotations")
+        computed["drifts"][name]["energy_rms_kj_per_mol"] for name in ("symmetric top and remainder", "three rotations")
     ]
-    long = next(row["energy_rms_kj_per_mol"] for row in found["runs"] if row["step_fs"] == 2.0)
+    long = next(row["energy_rms_kj_per_mol"] for row in computed["runs"] if row["step_fs"] == 2.0)
     assert (
         f"rms of the energy is {drifts[0]:.2f} kJ/mol with this drift and {drifts[1]:.2f} with three rotations" in fluid
     )
     assert f"Over 80 ps it is {long:.2f}" in fluid
 
     cost = results("free_motion")
-    one, many, most = (cost[f"setting up {n} bodies, each"] for n in (1, 1000, 100_000))
+    single, many, most = (cost[f"setting up {n} bodies, each"] for n in (1, 1000, 100_000))
     for page, text in (("validation/speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
-        stated = f"{one / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
+        stated = f"{single / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
         assert stated in (DOCS / page).read_text(encoding="utf-8")
 
 
@@ -109,8 +109,8 @@ def test_the_sizes_of_dependencies_are_those_of_the_installed_files():
     for names, sizes in rows:
         packages = [name for name in names.strip().split(", ") if name in pinned]
         stated = re.findall(r"(?:^|, )(?:(\w+) )?(\d+)(?=,|$)", sizes.strip())
-        own = [float(size) for name, size in stated if not name]
-        for name, size in [*zip(packages, own, strict=False), *((n, float(s)) for n, s in stated if n in pinned)]:
+        total = [float(size) for name, size in stated if not name]
+        for name, size in [*zip(packages, total, strict=False), *((n, float(s)) for n, s in stated if n in pinned)]:
             if installed(name, pinned[name]) is not None and name not in ("rich", "pydantic"):  # with what they need
                 assert installed(name, pinned[name]) == pytest.approx(size, abs=0.6 + 0.02 * size), name  # whole MB
                 compared += 1
@@ -120,10 +120,10 @@ def test_the_sizes_of_dependencies_are_those_of_the_installed_files():
 def installed(name: str, version: str) -> float | None:
     """MB of the files of a distribution with what pip compiled; None where it is not there or is another release."""
     try:
-        found = importlib.metadata.distribution(name)
+        computed = importlib.metadata.distribution(name)
     except importlib.metadata.PackageNotFoundError:
         return None
-    if found.version != version:
+    if computed.version != version:
         return None
-    files = (Path(str(found.locate_file(one))) for one in found.files or [])
-    return sum(one.stat().st_size for one in files if one.is_file()) / 1e6
+    files = (Path(str(computed.locate_file(file))) for file in computed.files or [])
+    return sum(file.stat().st_size for file in files if file.is_file()) / 1e6

@@ -14,7 +14,7 @@ import rotor
 ROOT = PROJECT / "rotor"
 MOST_WITHOUT = 3  # parameters that a function may have without sections
 PUBLIC = {
-    getattr(thing, "__qualname__", "") for thing in (getattr(rotor, name) for name in rotor.__all__) if callable(thing)
+    getattr(item, "__qualname__", "") for item in (getattr(rotor, name) for name in rotor.__all__) if callable(item)
 }
 MODULES = [path for path in sorted(ROOT.rglob("*.py")) if path.relative_to(ROOT).parts[0] != "cli"]
 
@@ -43,15 +43,17 @@ def functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionD
     for node in public + members:
         if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) or node.name.startswith("_"):
             continue
-        if not any(ast.unparse(one).endswith("overload") for one in node.decorator_list):
+        if not any(ast.unparse(decorator).endswith("overload") for decorator in node.decorator_list):
             yield node
 
 
 def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
     """Names in the order of the signature, without self and cls."""
-    given = function.args
-    named = [*given.posonlyargs, *given.args, *filter(None, [given.vararg]), *given.kwonlyargs]
-    return [one.arg for one in [*named, *filter(None, [given.kwarg])] if one.arg not in ("self", "cls")]
+    arguments = function.args
+    named = [*arguments.posonlyargs, *arguments.args, *filter(None, [arguments.vararg]), *arguments.kwonlyargs]
+    return [
+        argument.arg for argument in [*named, *filter(None, [arguments.kwarg])] if argument.arg not in ("self", "cls")
+    ]
 
 
 def sections(docstring: str) -> dict[str, str]:
@@ -68,18 +70,20 @@ def described(section: str) -> list[str]:
 
 def faults(function: ast.FunctionDef | ast.AsyncFunctionDef, is_public: bool = True) -> list[str]:
     """Missing sections of a function of the public face, and sections that disagree with the signature of any function."""
-    found, names = sections(ast.get_docstring(function) or ""), parameters(function)
+    computed, names = sections(ast.get_docstring(function) or ""), parameters(function)
     out = []
     if is_public and len(names) > MOST_WITHOUT:
         returns = function.returns is not None and ast.unparse(function.returns) != "None"
         expected = ("Parameters", "Returns") if returns else ("Parameters",)
-        out += [f"no section {name}" for name in expected if name not in found]
-    if "Parameters" in found:
-        entries = described(found["Parameters"])
+        out += [f"no section {name}" for name in expected if name not in computed]
+    if "Parameters" in computed:
+        entries = described(computed["Parameters"])
         out += [f"{name} is not described" for name in names if name not in entries]
         out += [f"{name} is described but not a parameter" for name in entries if name not in names]
-    lists = [name for name in ("Parameters", "Returns", "Raises") if name in found]
-    out += [f"text after {name} without a heading" for name in lists if re.search(r"\n\n(?=\S)", found[name].rstrip())]
+    lists = [name for name in ("Parameters", "Returns", "Raises") if name in computed]
+    out += [
+        f"text after {name} without a heading" for name in lists if re.search(r"\n\n(?=\S)", computed[name].rstrip())
+    ]
     return out
 
 

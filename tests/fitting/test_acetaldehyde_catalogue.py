@@ -73,8 +73,8 @@ def test_constants_of_the_fit_give_lines_of_the_catalogue_with_its_labels():
         )
     }
     rows = np.loadtxt(ORACLES / "ch3cho.txt")
-    found = [energies[tuple(row[:5])] - energies[tuple(row[5:])] for row in rows[:, :10].astype(int).tolist()]
-    missed = np.abs(np.array(found) - rows[:, 10])
+    computed = [energies[tuple(row[:5])] - energies[tuple(row[5:])] for row in rows[:, :10].astype(int).tolist()]
+    missed = np.abs(np.array(computed) - rows[:, 10])
     between = rows[:, 4] != rows[:, 9]  # two lines that a resonance of v_t = 0, K = 10 with v_t = 1, K = 3 allows
     assert between.sum() == 2
     assert missed[between].max() < 3 * rows[between, 11].min()

@@ -79,9 +79,9 @@ def test_standard_errors_cover_the_truth_as_often_as_they_should():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_starts_up_to_ten_per_cent_off_end_at_the_same_place(fitted, share, seed):
     start = perturbed(TRUE, share, seed)
-    found = fit_lines(fitted.lines, start, parameters(start, list(TRUE.values)))
-    assert found.converged, found.reason
-    assert (found.values - fitted.values) / fitted.errors == pytest.approx(0.0, abs=1e-3)  # ten times the tolerance
+    fit = fit_lines(fitted.lines, start, parameters(start, list(TRUE.values)))
+    assert fit.converged, fit.reason
+    assert (fit.values - fitted.values) / fitted.errors == pytest.approx(0.0, abs=1e-3)  # ten times the tolerance
 
 
 def test_a_fit_far_from_the_lines_never_says_that_it_is_done(fitted):
@@ -128,8 +128,8 @@ def test_the_covariance_goes_into_errors_of_lines(fitted):
     ]
     from rotor.quantum.estimates.uncertainty import level_spread, line_errors
 
-    found = line_errors(level_spread(top, levels, fitted.covariance), *(np.atleast_1d(end) for end in ends))
-    assert found[0] == pytest.approx(fitted.calculated_errors_mhz[i], rel=1e-6)  # levels solved twice
+    computed = line_errors(level_spread(top, levels, fitted.covariance), *(np.atleast_1d(end) for end in ends))
+    assert computed[0] == pytest.approx(fitted.calculated_errors_mhz[i], rel=1e-6)  # levels solved twice
 
 
 # Hard cases
@@ -164,7 +164,7 @@ def test_the_undetermined_constants_of_a_symmetric_top_are_named_and_left_alone(
     lines = synthetic(constants, jmax=8, count=1000, dipole=(1.0, 0, 0), error=0.002)
     start = constants.replace(A=150000.0, B=9200.0)
     fit = fit_lines(lines, start, parameters(start, ["A", "B", "DJ", "DJK", "DK"]))
-    assert {one.text for one in fit.statistics.undetermined} == {"A", "DK"}
+    assert {combination.text for combination in fit.statistics.undetermined} == {"A", "DK"}
     assert fit.converged
     assert "not determined by these lines and left at the start: A; DK" in fit.reason or "DK; A" in fit.reason
     assert fit.constants["A"] == 150000.0
@@ -197,9 +197,10 @@ def test_a_misassigned_line_is_reported_not_dropped():
     out = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)), FitOptions(reject_above=200.0))
     assert np.flatnonzero(~out.used).tolist() == [17]
     assert any("line 18" in text and "more than 200 errors off" in text for text in out.notes)
-    for one in (bent, out):
+    for lines_ in (bent, out):
         pulls = [
-            (one.constants[name] - value) / one.constants.uncertainties[name] for name, value in TRUE.values.items()
+            (lines_.constants[name] - value) / lines_.constants.uncertainties[name]
+            for name, value in TRUE.values.items()
         ]
         assert np.abs(pulls).max() < 4.0  # eight normal draws; Cauchy's loss costs 5 % in the errors
     assert "DOES NOT COUNT" in report_text(out)
@@ -209,11 +210,11 @@ def test_lines_without_an_error_are_left_out_openly_or_given_one():
     lines = synthetic(TRUE)
     error = lines.error_mhz.copy()
     error[:2] = 0.0
-    some = assignments(ASYMMETRIC, lines.upper, lines.lower, lines.frequency_mhz, error)
-    fit = fit_lines(some, TRUE, parameters(TRUE, ["A", "B", "C"]))
+    subset = assignments(ASYMMETRIC, lines.upper, lines.lower, lines.frequency_mhz, error)
+    fit = fit_lines(subset, TRUE, parameters(TRUE, ["A", "B", "C"]))
     assert np.flatnonzero(~fit.used).tolist() == [0, 1]
     assert sum("its error is 0" in text for text in fit.notes) == 2
-    assert fit_lines(some, TRUE, parameters(TRUE, ["A", "B", "C"]), FitOptions(default_error_mhz=0.01)).used.all()
+    assert fit_lines(subset, TRUE, parameters(TRUE, ["A", "B", "C"]), FitOptions(default_error_mhz=0.01)).used.all()
     none = assignments(ASYMMETRIC, lines.upper, lines.lower, lines.frequency_mhz, 0.0)
     with pytest.raises(ValueError, match="every line has an error of 0"):
         fit_lines(none, TRUE, parameters(TRUE, ["A"]))
@@ -282,8 +283,8 @@ def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path
 
 def test_ties_keep_ratios_and_differences():
     start = TRUE.replace(C=TRUE["B"] - 800.0)
-    made = parameters(start, ["A", "B", "DeltaJ"], ties=["C = B - 800", "deltaJ = 0.2*DeltaJ"])
-    fit = fit_lines(synthetic(TRUE), start, made, FitOptions(poor_rms=1e9))
+    parameters_ = parameters(start, ["A", "B", "DeltaJ"], ties=["C = B - 800", "deltaJ = 0.2*DeltaJ"])
+    fit = fit_lines(synthetic(TRUE), start, parameters_, FitOptions(poor_rms=1e9))
     assert fit.constants["B"] - fit.constants["C"] == pytest.approx(800.0, rel=1e-12)  # round-off
     assert fit.constants["deltaJ"] / fit.constants["DeltaJ"] == pytest.approx(0.2, rel=1e-12)  # the same
     assert fit.constants.uncertainties["C"] == pytest.approx(fit.constants.uncertainties["B"], rel=1e-12)  # the same
@@ -299,8 +300,8 @@ def test_wavenumbers_and_megahertz_weigh_by_their_errors():
         lines.error_mhz,
         wavenumber=np.arange(len(lines)) % 2 == 0,
     )
-    one, other = (fit_lines(seen, TRUE, parameters(TRUE, list(TRUE.values))) for seen in (lines, mixed))
-    assert one.values == pytest.approx(other.values, rel=1e-12)  # the mark changes the print alone
+    first, other = (fit_lines(seen, TRUE, parameters(TRUE, list(TRUE.values))) for seen in (lines, mixed))
+    assert first.values == pytest.approx(other.values, rel=1e-12)  # the mark changes the print alone
     assert other.rms_mhz(True) == pytest.approx(
         other.rms_mhz() / 29979.2458, rel=0.5
     )  # half of the lines each, 60 draws
@@ -322,13 +323,13 @@ def test_a_robust_loss_is_smooth_and_bends(loss):
 
 
 def test_merging_keeps_blends_and_says_what_was_twice():
-    one = assignments(("j",), [[1], [2]], [[0], [1]], [100.0, 200.0], 0.1, blend=[0, 0])
+    blend = assignments(("j",), [[1], [2]], [[0], [1]], [100.0, 200.0], 0.1, blend=[0, 0])
     other = assignments(("j",), [[2], [3]], [[1], [2]], [200.0, 300.0], 0.1, blend=[5, 6])
-    both, notes = merged(one, other)
+    both, notes = merged(blend, other)
     assert both.upper[:, 0].tolist() == [1, 2, 3]
     assert both.blend.tolist() == [0, 0, 2]
     assert notes == ["1 line is in both, once in the result, the first: 2 - 1"]
-    assert duplicates(merged(one, assignments(("j",), [[1]], [[0]], [101.0], 0.1))[0]) == [(0, 2)]
+    assert duplicates(merged(blend, assignments(("j",), [[1]], [[0]], [101.0], 0.1))[0]) == [(0, 2)]
 
 
 @pytest.mark.parametrize(
@@ -340,9 +341,9 @@ def test_merging_keeps_blends_and_says_what_was_twice():
     ],
 )
 def test_impossible_numbers_are_refused(change, message):
-    given = {"upper": [[1], [2]], "lower": [[0], [1]], "frequency_mhz": [100.0, 200.0], "error_mhz": [0.1, 0.1]}
+    content = {"upper": [[1], [2]], "lower": [[0], [1]], "frequency_mhz": [100.0, 200.0], "error_mhz": [0.1, 0.1]}
     with pytest.raises(ValueError, match=message):
-        assignments(("j",), **{**given, **change})
+        assignments(("j",), **{**content, **change})
 
 
 @pytest.mark.parametrize(
@@ -389,7 +390,7 @@ def test_the_constants_that_the_lines_call_for_are_chosen():
 
 
 def test_leaving_out_and_adding_are_judged(fitted):
-    trials = {one.name: one for one in try_constants(fitted, ["DeltaJ", "PhiJ", "A"])}
+    trials = {trial.name: trial for trial in try_constants(fitted, ["DeltaJ", "PhiJ", "A"])}
     assert set(trials) == {"DeltaJ", "PhiJ"}
     assert not trials["DeltaJ"].better
     assert trials["DeltaJ"].chance < 1e-10
@@ -397,7 +398,7 @@ def test_leaving_out_and_adding_are_judged(fitted):
     assert trials["PhiJ"].error_ratio < 3.5  # a constant that is 0
 
 
-def test_a_suggested_line_does_what_was_said_of_it(fitted):
+def test_a_suggested_line_lowers_the_errors_as_stated(fitted):
     """Measure the suggested line: the error of the constant falls by the ratio foretold."""
     levels = solve_levels(Top(fitted.constants), 12)
     upper = np.array([[12, 12, 0], [8, 1, 8]])
@@ -494,6 +495,6 @@ def test_components_of_spins_of_a_catalogue_are_put_at_their_mean(shared):
     rows = (catalogue.tag < 0) & (catalogue.quanta_upper[:, :3] == [1, 0, 1]).all(axis=1)
     rows &= (catalogue.quanta_lower[:, :3] == [0, 0, 0]).all(axis=1)
     mean = np.average(catalogue.frequency_mhz[rows], weights=10 ** catalogue.lgint[rows])
-    found = (lines.upper == [1, 0, 1]).all(axis=1) & (lines.lower == [0, 0, 0]).all(axis=1)
+    computed = (lines.upper == [1, 0, 1]).all(axis=1) & (lines.lower == [0, 0, 0]).all(axis=1)
     assert rows.sum() == 3
-    assert lines.frequency_mhz[found] == pytest.approx(mean, rel=1e-12)  # round-off
+    assert lines.frequency_mhz[computed] == pytest.approx(mean, rel=1e-12)  # round-off

@@ -47,7 +47,7 @@ SYMMETRIC = Constants(A=9000.0, B=3000.0, DJ=0.001, DJK=0.01)
 
 def with_f(levels: tuple[tuple[int, int, int], ...]) -> np.ndarray:
     """Labels N Ka Kc F of all F with a spin of 1."""
-    return np.array([(*one, f) for one in levels for f in range(abs(one[0] - 1), one[0] + 2)])
+    return np.array([(*level, f) for level in levels for f in range(abs(level[0] - 1), level[0] + 2)])
 
 
 def nitrogen_lines(constants: TopConstants) -> Assignments:
@@ -85,8 +85,8 @@ def test_n_of_0_among_large_blocks(monkeypatch):
     monkeypatch.setattr(contracted, "_WIDE", np.inf)
     model = top_levels(constants, labels)
     assert [type(blocks) for _, blocks in model.parts] == [ContractedLevels]
-    found, derivatives = model.levels(values)
-    assert found == pytest.approx(energies, abs=1e-6)  # TOLERANCE_MHZ of the contraction
+    computed, derivatives = model.levels(values)
+    assert computed == pytest.approx(energies, abs=1e-6)  # TOLERANCE_MHZ of the contraction
     assert derivatives == pytest.approx(slopes, abs=1e-6)  # likewise, of numbers up to 10
 
 
@@ -102,8 +102,8 @@ def test_an_a_priori_value_of_0_stays(folder):
     assert fit.errors[-1] == pytest.approx(0.05, rel=1e-3)  # derivatives at 1e-30 MHz are round-off
     unknown = fit_of_lines("lines.csv", top, free)
     assert unknown.parameters.start[-1] != 0.0
-    found = answer_fit(unknown).fit
-    assert abs(abs(found.values[-1]) - 15) < 4 * found.errors[-1]
+    answer = answer_fit(unknown).fit
+    assert abs(abs(answer.values[-1]) - 15) < 4 * answer.errors[-1]
 
 
 def test_a_new_start_leaves_a_priori_values_where_they_are():
@@ -126,12 +126,12 @@ def test_the_var_file_holds_what_is_not_determined():
     assert len(fit.statistics.undetermined) == 2
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        file, other = (named_file(one, "", variances=True) for one in (fit, held))
+        file, other = (named_file(result, "", variances=True) for result in (fit, held))
     errors = {p.code: p.error for p in file.parameters}
     assert errors[1000] == errors[2000] == FIXED
     assert "nan" not in file.rest
     names = ("B", "DJ", "DJK")
-    ours, theirs = (constants_covariance(one).of(names) for one in (file, other))
+    ours, theirs = (constants_covariance(named).of(names) for named in (file, other))
     assert ours.names == theirs.names == names
     assert np.sqrt(np.diag(ours.matrix_mhz2)) == pytest.approx(held.errors, rel=1e-6)  # 7 decimals of correlations
     assert ours.correlations == pytest.approx(theirs.correlations, abs=1e-6)  # likewise
@@ -140,7 +140,7 @@ def test_the_var_file_holds_what_is_not_determined():
 
 def state_lines(constants: TopConstants) -> Assignments:
     """Lines within each of three states that nothing couples, which know nothing of their energies."""
-    labels = np.array([(*one, v) for v in range(3) for one in LEVELS])
+    labels = np.array([(*level, v) for v in range(3) for level in LEVELS])
     energies = top_levels(constants, labels).levels(np.array(list(constants.values.values())))[0]
     pairs = [(i, k) for i in range(len(labels)) for k in range(i) if labels[i, 3] == labels[k, 3]]
     up, low = np.array(pairs).T
@@ -157,10 +157,10 @@ def test_the_var_file_holds_what_is_not_determined_of_states(ties):
     known = ["A", "B", "A[1]", "B[1]", "C[1]", "B[2]"] if ties else ["A", "B", "C", "A[1]", "B[1]", "C[1]", "B[2]"]
     held = fit_lines(lines, start, parameters(start, known, ties=ties[1:]))
     fit = fit_lines(lines, start, parameters(start, [*known, "E[1]", *(["E[2]"] if not ties else [])], ties=ties))
-    assert {one.text for one in fit.statistics.undetermined} == ({"E[1]"} if ties else {"E[1]", "E[2]"})
+    assert {combination.text for combination in fit.statistics.undetermined} == ({"E[1]"} if ties else {"E[1]", "E[2]"})
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        file, other = (named_file(one, "", variances=True) for one in (fit, held))
+        file, other = (named_file(result, "", variances=True) for result in (fit, held))
     assert {p.error for p in file.parameters if p.code in (11, 22)} == {FIXED}
     assert covariance_by_code(file) == pytest.approx(covariance_by_code(other), rel=1e-4, abs=1e-12)  # of 7 decimals
 
@@ -170,9 +170,11 @@ def test_the_var_file_of_spfits_input_holds_what_is_not_determined(folder):
     start = TopConstants(Top.from_constants("A=9000 B=3000 C=2500", states=states), False)
     fit = fit_lines(state_lines(start), start, parameters(start, ["A", "B", "C", "E[1]"]))
     write_assigned_lines(fit.lines, "case.lin")
-    asked = spfit_input(named_file(fit, "", variances=False), read_lin("case.lin", 4))
-    other = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
-    ours, theirs = named_file(fit, "", variances=True), fitted_file(asked, other, variances=True)
+    fit_input = spfit_input(named_file(fit, "", variances=False), read_lin("case.lin", 4))
+    other = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
+    ours, theirs = named_file(fit, "", variances=True), fitted_file(fit_input, other, variances=True)
     assert [p.error for p in theirs.parameters if p.code == 11] == [FIXED]
     assert covariance_by_code(theirs) == pytest.approx(covariance_by_code(ours), rel=1e-4, abs=1e-12)  # of 7 decimals
 
@@ -195,8 +197,8 @@ def test_the_table_tells_held_from_not_determined():
 
 def test_the_covariance_of_the_others_is_written(folder):
     fit, held = symmetric_fit("A B DJ DJK"), symmetric_fit("B DJ DJK")
-    found = covariance_of_determined(fit.parameters, fit.statistics)
-    assert found.matrix_mhz2 == pytest.approx(held.covariance.matrix_mhz2, rel=1e-6)
+    computed = covariance_of_determined(fit.parameters, fit.statistics)
+    assert computed.matrix_mhz2 == pytest.approx(held.covariance.matrix_mhz2, rel=1e-6)
     write_assigned_lines(symmetric_lines(), "lines.csv")
     answer = answer_fit(fit_of_lines("lines.csv", Top.from_constants(SYMMETRIC), ["A", "B", "DJ", "DJK"]))
     write_fitted_toml(answer, "fitted.toml")

@@ -91,19 +91,19 @@ def test_signs_of_k_and_m_are_one():
 
 def lines_file(path, top, fields, noise, unit="field_kv_per_cm", scale=1.0, only=lambda row: True):
     """Lines of J ≤ 2 in some fields as a .csv, with noise in MHz."""
-    found = field_lines(top, fields, j_highest=2, tolerance_mhz=1e-6)
+    lines = field_lines(top, fields, j_highest=2, tolerance_mhz=1e-6)
     names = ("j",) if top.kind == "linear" else ("j", "ka", "kc")
     rng = np.random.default_rng(5)
     with Path(path).open("w", newline="") as handle:
         writer = csv.writer(handle)
         heads = [f"{name}_{side}" for side in ("upper", "lower") for name in (*names, "m")]
         writer.writerow([*heads, unit, "frequency_mhz", "error_mhz"])
-        for i in range(len(found)):
-            if found.upper[i] != found.lower[i] and found.strength_debye2[i] > 0.01:
-                upper, lower = found.upper[i].split(), found.lower[i].split()
-                labels = [*upper, found.upper_m[i], *lower, found.lower_m[i]]
-                frequency = found.frequency_mhz[i] + noise * rng.normal()
-                writer.writerow([*labels, found.field_kv_per_cm[i] * scale, f"{frequency:.6f}", noise])
+        for i in range(len(lines)):
+            if lines.upper[i] != lines.lower[i] and lines.strength_debye2[i] > 0.01:
+                upper, lower = lines.upper[i].split(), lines.lower[i].split()
+                labels = [*upper, lines.upper_m[i], *lower, lines.lower_m[i]]
+                frequency = lines.frequency_mhz[i] + noise * rng.normal()
+                writer.writerow([*labels, lines.field_kv_per_cm[i] * scale, f"{frequency:.6f}", noise])
     return str(path)
 
 

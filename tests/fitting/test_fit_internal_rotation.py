@@ -54,9 +54,9 @@ def test_butynoic_acid_comes_out_as_westerfit_has_it():
     fit = fit_lines(lines, constants, parameters(constants, list(WESTERFIT)))
     assert fit.converged
     assert fit.rms_mhz() < 2.66e-3  # 2.65 kHz of an independent calculation, of 89 lines
-    found = dict(zip(fit.parameters.names, fit.values, strict=True))
+    by_name = dict(zip(fit.parameters.names, fit.values, strict=True))
     for name, (_, published, error) in WESTERFIT.items():
-        assert abs(found[name] - published) < error  # one standard error: its last step had not ended
+        assert abs(by_name[name] - published) < error  # one standard error: its last step had not ended
 
 
 def test_derivatives_by_every_constant_are_those_of_finite_differences():

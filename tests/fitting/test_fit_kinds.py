@@ -187,17 +187,19 @@ LARGE = {
 def check(folder, kind: Kind, share: float, seed: int = 1) -> None:
     """The fit from the start so far off converges to the true constants, signs of couplings apart, within 4 standard errors."""
     true = write_case(folder, "case", kind, share, seed)
-    asked = read_fit(folder / "case.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = read_fit(folder / "case.par")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
     assert fit.converged, fit.reason
     assert not fit.statistics.undetermined
     expected = 5 / np.sqrt(2 * len(fit.lines))  # five times the spread of the rms of so many normal errors
     assert fit.weighted_rms == pytest.approx(1.0, abs=expected + 0.02)
-    found = fitted_file(asked, fit, variances=True).parameters
-    for one, given, column in zip(found, true.parameters, asked.columns, strict=True):
+    computed = fitted_file(fit_input, fit, variances=True).parameters
+    for entry, parameter, column in zip(computed, true.parameters, fit_input.columns, strict=True):
         if column >= 0:
-            assert abs(abs(one.value) - abs(given.value)) < 4 * one.error, (
-                one.label
+            assert abs(abs(entry.value) - abs(parameter.value)) < 4 * entry.error, (
+                entry.label
             )  # 4 σ: 1e-3 of all seeds and constants
 
 
@@ -214,7 +216,7 @@ def test_names_of_shared_levels_do_not_depend_on_where_the_fit_began():
     """J = 49: two levels share a function of the ground state and one of the highest by halves, and a small step exchanges their names."""
     kind = KINDS[FAST[0]]
     file = parameter_file(replace(kind, options=kind.options.replace(" 0 40 ", " 0 60 ")))
-    energy = next(i for i, one in enumerate(file.parameters) if one.label.strip() == "E2")
+    energy = next(i for i, parameter in enumerate(file.parameters) if parameter.label.strip() == "E2")
 
     def with_energy(value):
         rows = list(file.parameters)
@@ -222,7 +224,10 @@ def test_names_of_shared_levels_do_not_depend_on_where_the_fit_began():
         return replace(file, parameters=tuple(rows))
 
     before, after = with_energy(287500.0), with_energy(287750.0)
-    labels, values = np.array([[49, 15, 34, 0], [49, 14, 35, 2]]), np.array([one.value for one in after.parameters])
+    labels, values = (
+        np.array([[49, 15, 34, 0], [49, 14, 35, 2]]),
+        np.array([parameter.value for parameter in after.parameters]),
+    )
     fresh, from_before = FileLevels.of(after, labels), FileLevels.of(before, labels)
     energies = fresh.levels(values)[0]
     assert from_before.levels(values)[0] == pytest.approx(energies, abs=1e-3)  # MHz, round-off of 1e7
@@ -252,8 +257,10 @@ def test_most_searches_for_three_states_in_resonance_find_the_way_and_the_others
     converged = 0
     for seed in range(1, 9):
         write_case(tmp_path, "case", KINDS[FAST[0]], share, seed)
-        asked = read_fit(tmp_path / "case.par")
-        fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+        fit_input = read_fit(tmp_path / "case.par")
+        fit = fit_lines(
+            fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+        )
         converged += fit.converged
         if fit.converged:
             check(tmp_path, KINDS[FAST[0]], share, seed)
@@ -299,14 +306,14 @@ TWO_CHLORINES = Kind(
 def test_wrong_lines_that_are_rejected_do_not_send_the_search_elsewhere(tmp_path, turned):
     """A single χ_ab counts by its square: the search keeps the sign of the start, though the wrong lines make the first rms large."""
     write_case(tmp_path, "x", KINDS["chlorine and nitrogen, half-integer F"], 1e-6)
-    asked = read_fit(tmp_path / "x.par")
-    seen = asked.lines.frequency_mhz.copy()
+    fit_input = read_fit(tmp_path / "x.par")
+    seen = fit_input.lines.frequency_mhz.copy()
     seen[::50] += 3.0  # 150 errors: a weighted rms of 20 until they are out
-    lines, options = replace(asked.lines, frequency_mhz=seen), replace(asked.options, reject_above=8.0)
-    place = asked.parameters.names.index("Xab_Cl")
-    start = asked.parameters.start.copy()
+    lines, options = replace(fit_input.lines, frequency_mhz=seen), replace(fit_input.options, reject_above=8.0)
+    place = fit_input.parameters.names.index("Xab_Cl")
+    start = fit_input.parameters.start.copy()
     start[place] *= turned
-    fit = fit_lines(lines, None, asked.parameters.moved(start), options, model=asked.model)
+    fit = fit_lines(lines, None, fit_input.parameters.moved(start), options, model=fit_input.model)
     assert fit.converged, fit.reason
     assert sorted(fit.left_out) == list(range(0, len(lines), 50))
     assert np.sign(fit.values[place]) == turned
@@ -319,8 +326,8 @@ def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
     values = np.array([p.value for p in file.parameters])
     labels = np.array([[4, 0, 4, 4, -4], [5, 1, 5, 5, -5], [4, 0, 4, 4, 4], [5, 1, 5, 5, 5], [4, 0, 4, 4, -1]])
     energies, slopes = FileLevels.of(file, labels).levels(values)
-    whole, of_whole = FileLevels.of(file, labels[2:4]).levels(values)
-    assert energies[:2] == pytest.approx(whole - of_whole[:, 4:] @ values[4:], rel=1e-14)  # round-off
+    whole, whole_slopes = FileLevels.of(file, labels[2:4]).levels(values)
+    assert energies[:2] == pytest.approx(whole - whole_slopes[:, 4:] @ values[4:], rel=1e-14)  # round-off
     assert energies[4] == energies[0]  # F = -1 is minus F1
     assert not slopes[[0, 1, 4], 4:].any()
     assert slopes[2:4, 4:].all()
@@ -344,11 +351,11 @@ def test_levels_of_large_blocks_are_those_of_the_whole_matrix(monkeypatch):
     monkeypatch.setattr(contracted, "_LARGE", 100)
     model = FileLevels.of(file, labels)
     assert isinstance(model.solved[0].blocks, contracted.ContractedLevels)
-    found, slopes = model.levels(values)
+    computed, slopes = model.levels(values)
     monkeypatch.setattr(contracted, "_LARGE", 10**9)
-    whole, of_whole = FileLevels.of(file, labels).levels(values)
-    assert found == pytest.approx(whole, abs=contracted.TOLERANCE_MHZ)  # what is left out is below it
-    assert np.abs(slopes - of_whole).max(axis=0) == pytest.approx(0, abs=1e-6 * np.abs(of_whole).max())  # v²/W²
+    whole, whole_slopes = FileLevels.of(file, labels).levels(values)
+    assert computed == pytest.approx(whole, abs=contracted.TOLERANCE_MHZ)  # what is left out is below it
+    assert np.abs(slopes - whole_slopes).max(axis=0) == pytest.approx(0, abs=1e-6 * np.abs(whole_slopes).max())  # v²/W²
 
 
 _TWO_STATES = "11 590000.0 E\n200001 -1048.0 Ga\n10011 -30.0 dA\n"
@@ -368,34 +375,36 @@ def test_a_file_with_resolved_and_unresolved_lines_is_fitted(tmp_path):
     low = FileLevels.of(file, np.array([[2, 0, 2, 2, -2]])).levels(values)[0][0]
     zero = f"{'  2  0  2  2 -2 -1':<36} {low:.4f} 0.02\n"
     start = start_of(replace(file, header=replace(file.header, nline=200)), 1e-3, rng)
-    asked = spfit_input(start, read_lin((text + zero).encode(), 5))
-    assert "13 lines with F below 0: the last 4 parameters (NXPAR) do not count for them" in asked.notes
-    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
+    fit_input = spfit_input(start, read_lin((text + zero).encode(), 5))
+    assert "13 lines with F below 0: the last 4 parameters (NXPAR) do not count for them" in fit_input.notes
+    fit = fit_lines(fit_input.lines, None, fit_input.parameters, fit_input.options, model=fit_input.model)
     assert fit.converged, fit.reason
     assert fit.lines.from_zero.sum() == 1
     assert fit.weighted_rms == pytest.approx(1.0, abs=0.4)  # 93 normal errors
-    for one, given in zip(fitted_file(asked, fit, variances=True).parameters, file.parameters, strict=True):
-        assert abs(one.value - given.value) < 4 * one.error  # 4 σ
+    for item, parameter in zip(fitted_file(fit_input, fit, variances=True).parameters, file.parameters, strict=True):
+        assert abs(item.value - parameter.value) < 4 * item.error  # 4 σ
 
 
-def test_a_suggested_line_of_a_file_with_spins_does_what_was_said_of_it(tmp_path):
+def test_a_suggested_line_of_a_file_with_spins_lowers_the_errors_as_stated(tmp_path):
     """Lines that are not among the measured ones, of their kinds; the first one, measured, reduces the error as foretold."""
     write_case(tmp_path, "case", replace(TWO_CHLORINES, nxpar=0), 1e-4)
-    asked = read_fit(tmp_path / "case.par")
-    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
-    upper, lower = unmeasured_lines(asked.file, asked.lines)
+    fit_input = read_fit(tmp_path / "case.par")
+    fit = fit_lines(fit_input.lines, None, fit_input.parameters, fit_input.options, model=fit_input.model)
+    upper, lower = unmeasured_lines(fit_input.file, fit_input.lines)
     pairs = {(*u, *d) for u, d in zip(upper.tolist(), lower.tolist(), strict=True)}
-    measured = {(*u, *d) for u, d in zip(asked.lines.upper.tolist(), asked.lines.lower.tolist(), strict=True)}
+    measured = {(*u, *d) for u, d in zip(fit_input.lines.upper.tolist(), fit_input.lines.lower.tolist(), strict=True)}
     assert not pairs & measured
     assert {tuple(u - d) for u, d in zip(upper, lower, strict=True)} <= {
-        tuple(change) for change in asked.lines.upper - asked.lines.lower
+        tuple(change) for change in fit_input.lines.upper - fit_input.lines.lower
     }
-    rising = asked.lines.take(np.flatnonzero(asked.lines.upper[:, 0] > asked.lines.lower[:, 0]))
-    assert unmeasured_lines(asked.file, rising)[0][:, 0].max() == rising.upper[:, 0].max()
-    best = suggest_lines(fit, "X-1", upper, lower, error_mhz=ERROR_MHZ, model=asked.model)[0]
-    more = assignments(asked.lines.names, [best.upper], [best.lower], best.frequency_mhz, ERROR_MHZ)
-    again = fit_lines(merged(asked.lines, more)[0], None, asked.parameters, asked.options, model=asked.model)
-    column = asked.parameters.names.index("X-1")
+    rising = fit_input.lines.take(np.flatnonzero(fit_input.lines.upper[:, 0] > fit_input.lines.lower[:, 0]))
+    assert unmeasured_lines(fit_input.file, rising)[0][:, 0].max() == rising.upper[:, 0].max()
+    best = suggest_lines(fit, "X-1", upper, lower, error_mhz=ERROR_MHZ, model=fit_input.model)[0]
+    more = assignments(fit_input.lines.names, [best.upper], [best.lower], best.frequency_mhz, ERROR_MHZ)
+    again = fit_lines(
+        merged(fit_input.lines, more)[0], None, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
+    column = fit_input.parameters.names.index("X-1")
     assert best.error_ratio < 1
     assert again.errors[column] / fit.errors[column] == pytest.approx(
         best.error_ratio, rel=1e-4

@@ -40,14 +40,14 @@ def _rows(jmax: int = 12) -> list[list[str]]:
 
 def _merged(rows: list[list[str]]) -> list[list[str]]:
     """Two neighbours above 5 GHz that are not resolved are measured at their mean."""
-    made = [list(row) for row in sorted(rows, key=lambda row: float(row[6])) if float(row[6]) > 5000]
+    records = [list(row) for row in sorted(rows, key=lambda row: float(row[6])) if float(row[6]) > 5000]
     last = -1
-    for place, (first, second) in enumerate(pairwise(made)):
+    for place, (first, second) in enumerate(pairwise(records)):
         low, high = float(first[6]), float(second[6])
         if place > last and 0 < high - low < 0.5:
             first[6] = second[6] = f"{(low + high) / 2:.4f}"
             last = place + 1  # a third one is resolved
-    return made
+    return records
 
 
 def _lin(rows: list[list[str]]) -> str:
@@ -121,15 +121,15 @@ def test_rejected_lines_stay_rejected(folder: Path, suffix: str):
     first, second = (json.loads(Path(name).read_text()) for name in ("1.json", "2.json"))
     assert first["line_count"] == second["line_count"]
     assert first["lines_used"] == second["lines_used"] == first["line_count"] - 1
-    for one, other in zip(first["parameters"], second["parameters"], strict=True):
-        assert one["value"] == pytest.approx(other["value"], abs=1e-6)  # the same lines with the same weights
+    for parameter, other in zip(first["parameters"], second["parameters"], strict=True):
+        assert parameter["value"] == pytest.approx(other["value"], abs=1e-6)  # the same lines with the same weights
     assert any("it is marked as excluded" in note for note in second["notes"])
     names = ("j", "ka", "kc")
-    kept, again = (read_assigned_lines(f"{name}.{suffix}", names)[0] for name in ("kept", "again"))
-    assert kept.is_excluded.sum() == again.is_excluded.sum() == 1
-    assert kept.frequency_mhz[kept.is_excluded].tolist() == [5603.0]
+    saved, again = (read_assigned_lines(f"{name}.{suffix}", names)[0] for name in ("kept", "again"))
+    assert saved.is_excluded.sum() == again.is_excluded.sum() == 1
+    assert saved.frequency_mhz[saved.is_excluded].tolist() == [5603.0]
     everything, _ = read_assigned_lines(f"wrong.{suffix}", names)
-    assert sorted(kept.frequency_mhz.tolist()) == sorted(everything.frequency_mhz.tolist())
+    assert sorted(saved.frequency_mhz.tolist()) == sorted(everything.frequency_mhz.tolist())
 
 
 def test_spfit_does_not_read_what_is_excluded(folder: Path):

@@ -38,11 +38,11 @@ QUARTIC = ["A", "B", "DeltaJ", "DeltaJK", "DeltaK", "deltaJ"]
 def lines_of(top: Top, names: tuple[str, ...], count: int, jmax: int = 8, error: float = 0.01, **more) -> Assignments:
     """Lines with normal noise, drawn from all of them."""
     rng = np.random.default_rng(2)
-    found = line_list(top, jmax=jmax, min_lgint=None, q=1.0, **more)
-    chosen = rng.choice(len(found), size=min(count, len(found)), replace=False)
-    labels = np.stack([found.levels.quanta[name] for name in names], axis=1)
-    seen = found.frequency_mhz[chosen] + error * rng.normal(size=len(chosen))
-    return assignments(names, labels[found.upper[chosen]], labels[found.lower[chosen]], seen, error)
+    transitions = line_list(top, jmax=jmax, min_lgint=None, q=1.0, **more)
+    chosen = rng.choice(len(transitions), size=min(count, len(transitions)), replace=False)
+    labels = np.stack([transitions.levels.quanta[name] for name in names], axis=1)
+    seen = transitions.frequency_mhz[chosen] + error * rng.normal(size=len(chosen))
+    return assignments(names, labels[transitions.upper[chosen]], labels[transitions.lower[chosen]], seen, error)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +78,8 @@ def test_what_is_tied_to_a_constant_that_is_left_out_follows_it(tied):
 
 def test_the_promise_is_that_of_the_linear_model_beside_ties(lines, tied):
     alone, _ = promised(tied, ["PhiK"])
-    found = next(one for one in try_constants(tied, ["PhiK"]))
-    assert alone[0] == pytest.approx(chi_squared(tied) - chi_squared(found.fit), rel=0.02)  # nearly linear
+    computed = next(trial for trial in try_constants(tied, ["PhiK"]))
+    assert alone[0] == pytest.approx(chi_squared(tied) - chi_squared(computed.fit), rel=0.02)  # nearly linear
 
 
 def test_a_model_is_built_up_beside_ties_and_a_priori_errors(lines):
@@ -87,7 +87,7 @@ def test_a_model_is_built_up_beside_ties_and_a_priori_errors(lines):
     priors = {"deltaJ": 1e-6}
     base = parameters(start, ["A", "B", "C", "deltaJ"], ties=TIES[:1], priors_mhz=priors)
     fit, steps = choose_constants(lines, start, base, ["DeltaJ", "DeltaJK", "DeltaK"])
-    assert {one.name for one in steps} == {"DeltaJ", "DeltaJK", "DeltaK"}
+    assert {step.name for step in steps} == {"DeltaJ", "DeltaJK", "DeltaK"}
     whole = with_names(start, ["DeltaJ", "DeltaJK", "DeltaK"])
     free = parameters(whole, list(fit.parameters.names), ties=TIES[:1], priors_mhz=priors)
     direct = fit_lines(lines, whole, free, FitOptions(poor_rms=1e9))
@@ -135,7 +135,7 @@ def test_a_default_error_is_the_error_of_a_line_in_every_report(half):
 def test_suggested_lines_have_the_error_that_the_fit_used(call, folder, lines):
     write_assigned_lines(lines, "stated.csv")
     write_assigned_lines(replace(lines, error_mhz=np.where(np.arange(len(lines)) < 60, 0.0, 0.01)), "none.csv")
-    found = []
+    results = []
     for name in ("stated", "none"):
         code, _, err = call(
             "fit", f"{name}.csv", "--constants", "A=8572.06 B=3640.11 C=2790.97 MHz", "--free", "A,B,C", "--default-error",
@@ -143,15 +143,15 @@ def test_suggested_lines_have_the_error_that_the_fit_used(call, folder, lines):
         )  # fmt: skip
         assert code == 0, err
         content = json.loads((folder / f"{name}.json").read_text())
-        found.append(content["suggestions"])
-        assert {one["error_mhz"] for one in content["lines"]} == {0.01}
-    assert found[0] == found[1]
+        results.append(content["suggestions"])
+        assert {line["error_mhz"] for line in content["lines"]} == {0.01}
+    assert results[0] == results[1]
 
 
 def test_the_bootstrap_has_no_error_for_what_is_not_determined():
-    one = assignments(("j",), [[1]] * 4, [[0]] * 4, [115271.2, 115271.3, 115271.1, 115271.25], 0.1)
+    measurements = assignments(("j",), [[1]] * 4, [[0]] * 4, [115271.2, 115271.3, 115271.1, 115271.25], 0.1)
     start = Constants(B=57635.6, D=0.0)
-    fit = fit_lines(one, start, parameters(start, ["B", "D"]))
+    fit = fit_lines(measurements, start, parameters(start, ["B", "D"]))
     assert not np.isfinite(fit.errors).all()
     _, spread = bootstrap(fit, 5, np.random.default_rng(0))
     assert np.isfinite(spread).tolist() == np.isfinite(fit.errors).tolist()
@@ -162,17 +162,17 @@ def test_samples_that_do_not_converge_are_drawn_again(lines, monkeypatch):
 
     start = TRUE
     fit = fit_lines(lines, start, parameters(start, ["A", "B", "C"]))
-    real, made = resampling.fit_lines, list[Fit]()
+    real, fits = resampling.fit_lines, list[Fit]()
 
-    def every_other(*given, **more):
-        made.append(replace(real(*given, **more), converged=len(made) % 2 == 0))
-        return made[-1]
+    def every_other(*arguments, **more):
+        fits.append(replace(real(*arguments, **more), converged=len(fits) % 2 == 0))
+        return fits[-1]
 
     monkeypatch.setattr(resampling, "fit_lines", every_other)
     values, _ = bootstrap(fit, 4, np.random.default_rng(0))
-    assert len(made) == 7
-    assert values.tolist() == [one.values.tolist() for one in made[::2]]
-    monkeypatch.setattr(resampling, "fit_lines", lambda *given, **more: replace(made[0], converged=False))
+    assert len(fits) == 7
+    assert values.tolist() == [fit.values.tolist() for fit in fits[::2]]
+    monkeypatch.setattr(resampling, "fit_lines", lambda *arguments, **more: replace(fits[0], converged=False))
     with pytest.raises(ValueError, match=r"only 0 of 20 samples .*0 determine fewer, 20 do not"):
         bootstrap(fit, 2, np.random.default_rng(0))
 

@@ -146,13 +146,15 @@ def test_the_codes_of_names_make_the_same_levels(kind):
     )
     levels = solve_levels(constants.top, 1 if kind == "states and spins" else 3, effects=constants.effects)
     total = sorted(set((levels.multiplicity - 1).tolist()))
-    found = [levels_in_blocks(group, total) for group in groups_for_fit(file)]
+    computed = [levels_in_blocks(group, total) for group in groups_for_fit(file)]
     inside = levels.rotational <= 1  # of higher N the two lists do not have the same F
     ours = sorted(zip((levels.multiplicity - 1)[inside], levels.energy_mhz[inside], strict=True))
     theirs = sorted(
         pair
-        for one in found
-        for pair in zip((one.multiplicity - 1)[one.rotational <= 1], one.energy_mhz[one.rotational <= 1], strict=True)
+        for entry in computed
+        for pair in zip(
+            (entry.multiplicity - 1)[entry.rotational <= 1], entry.energy_mhz[entry.rotational <= 1], strict=True
+        )
     )
     if kind == "symmetric":  # both signs of K are one row here and one row there
         assert len(ours) == len(theirs)
@@ -168,8 +170,10 @@ def test_the_same_fit_as_from_spfits_files(case):
     file = named_file(fit, "case", variances=False)
     start, matrix = named_parameters(TopConstants(rotor.read("start.toml"), True), "", 9)
     begin = tuple(p.__class__(p.code, s.value, 1e36) for p, s in zip(file.parameters, start.parameters, strict=True))
-    asked = spfit_input(file.__class__("", file.header, file.options, begin), read_lin("case.lin", 5))
-    other = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = spfit_input(file.__class__("", file.header, file.options, begin), read_lin("case.lin", 5))
+    other = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
     values = matrix @ np.array(list(fit.named.values.values()))
     assert np.abs((values - other.values) / other.errors).max() < 1e-6  # where either search ends
     covariance = matrix @ fit.covariance.matrix_mhz2 @ matrix.T
@@ -252,9 +256,9 @@ def test_orders_of_constants():
 def test_ties_of_names_with_brackets():
     constants = named("states and spins")
     ties = ["A[1] = A - 10", "chi_bb-cc(14N)=-0.25*chi_aa(14N)", "G_a[0,1] = 2*G_c[1,0]"]
-    made = parameters(constants, ["A", "chi_aa(14N)", "G_c[0,1]"], ties=ties)
-    found = dict(zip(made.constant_names, made.constants_of(np.array([9.0, 4.0, 3.0])), strict=True))
-    assert (found["A[1]"], found["chi_bb-cc(14N)"], found["G_a[0,1]"]) == (-1.0, -1.0, 6.0)
+    parameters_ = parameters(constants, ["A", "chi_aa(14N)", "G_c[0,1]"], ties=ties)
+    by_name = dict(zip(parameters_.constant_names, parameters_.constants_of(np.array([9.0, 4.0, 3.0])), strict=True))
+    assert (by_name["A[1]"], by_name["chi_bb-cc(14N)"], by_name["G_a[0,1]"]) == (-1.0, -1.0, 6.0)
 
 
 def test_the_command(case, call):

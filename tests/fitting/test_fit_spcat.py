@@ -42,9 +42,11 @@ KINDS = ORACLES / "kinds"
 
 
 def fitted(par, lin):
-    asked = spfit_input(par, lin)
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
-    return asked, fit
+    fit_input = spfit_input(par, lin)
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
+    return fit_input, fit
 
 
 def text_of(path: Path) -> str:
@@ -56,10 +58,12 @@ def printed_correlations(text: str) -> dict[tuple[int, int], float]:
     return {(int(i), int(j)): float(c) for i, j, c in re.findall(r"\s+(\d+)\s+(\d+)\s+(-?\d\.\d{6})", tail)}
 
 
-def compare(asked, fit, variances, report: str) -> None:
+def compare(fit_input, fit, variances, report: str) -> None:
     """Constants within 0.01 σ, errors to 4 digits, correlations to the print, every line counted that SPFIT counted."""
-    ours = fitted_file(asked, fit, variances=True).parameters
-    free = [i for i, column in enumerate(asked.columns) if column >= 0 and not asked.file.parameters[i].constrained]
+    ours = fitted_file(fit_input, fit, variances=True).parameters
+    free = [
+        i for i, column in enumerate(fit_input.columns) if column >= 0 and not fit_input.file.parameters[i].constrained
+    ]
     for i in free:
         theirs = variances.parameters[i]
         assert abs(ours[i].value - theirs.value) < 0.01 * theirs.error
@@ -68,8 +72,8 @@ def compare(asked, fit, variances, report: str) -> None:
         )  # nine digits are printed; the issue asks for four
 
     printed = printed_correlations(report)
-    independent = [asked.columns[i] for i, p in enumerate(asked.file.parameters) if not p.constrained]
-    numbers = independent if max(i for i, _ in printed) == len(independent) else [asked.columns[i] for i in free]
+    independent = [fit_input.columns[i] for i, p in enumerate(fit_input.file.parameters) if not p.constrained]
+    numbers = independent if max(i for i, _ in printed) == len(independent) else [fit_input.columns[i] for i in free]
     for (i, j), value in printed.items():
         a, b = numbers[i - 1], numbers[j - 1]
         if a >= 0 and b >= 0:
@@ -81,8 +85,10 @@ def compare(asked, fit, variances, report: str) -> None:
 @pytest.mark.parametrize("name", FITS)
 def test_published_fits_come_out_as_spfit_has_them(shared: Path, name: str):
     folder = next((shared / "reference" / "fits").glob(f"*/{name}.par")).parent
-    asked = read_fit(folder / f"{name}.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = read_fit(folder / f"{name}.par")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
     rms, mhz, wavenumbers = FITS[name]
     assert fit.converged, fit.reason
     assert fit.weighted_rms == pytest.approx(rms, abs=6e-6)  # half of the last digit printed
@@ -90,13 +96,13 @@ def test_published_fits_come_out_as_spfit_has_them(shared: Path, name: str):
     if wavenumbers:
         assert fit.rms_mhz(wavenumber=True) == pytest.approx(wavenumbers, abs=6e-6)  # five decimals are printed
     results = folder / "v2008_results"
-    compare(asked, fit, read_par(results / f"{name}.var"), text_of(results / f"{name}.fit"))
+    compare(fit_input, fit, read_par(results / f"{name}.var"), text_of(results / f"{name}.fit"))
 
 
 @pytest.mark.oracle
 def test_formaldehyde_has_its_published_rms(shared: Path):
-    asked = read_fit(shared / "reference" / "fits" / "h2co_cdms" / "ch2o.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
+    fit_input = read_fit(shared / "reference" / "fits" / "h2co_cdms" / "ch2o.par")
+    fit = fit_lines(fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options)
     assert len(fit.lines) == 274
     assert fit.used.all()
     assert fit.weighted_rms == pytest.approx(0.560, abs=6e-4)  # as published
@@ -108,31 +114,36 @@ def test_starts_up_to_ten_per_cent_off_end_at_spfits_minimum(shared: Path, name:
     folder = shared / "reference" / "spfit" / name
     lin = folder / f"{name}.lin"
     lines = read_lin(lin) if lin.exists() else read_lin(gzip.decompress((folder / f"{name}.lin.gz").read_bytes()))
-    asked, fit = fitted(read_par(folder / f"{name}.par.start"), lines)
+    fit_input, fit = fitted(read_par(folder / f"{name}.par.start"), lines)
     case = json.loads((folder / "case.json").read_text())
     assert fit.converged, fit.reason
     assert fit.weighted_rms == pytest.approx(case["rms_history"][-1][2], abs=6e-6)  # half of the last digit printed
-    assert len(fit.minimum.iterations) <= abs(asked.file.header.nitr)
-    ours = {p.code: p for p in fitted_file(asked, fit, variances=True).parameters}
-    for one in case["parameters"]:
-        assert abs(ours[one["code"]].value - one["truth"]) < 3 * ours[one["code"]].error
-    compare(asked, fit, read_par(folder / f"{name}.var"), text_of(folder / f"{name}.fit.gz"))
+    assert len(fit.minimum.iterations) <= abs(fit_input.file.header.nitr)
+    ours = {p.code: p for p in fitted_file(fit_input, fit, variances=True).parameters}
+    for parameter in case["parameters"]:
+        assert abs(ours[parameter["code"]].value - parameter["truth"]) < 3 * ours[parameter["code"]].error
+    compare(fit_input, fit, read_par(folder / f"{name}.var"), text_of(folder / f"{name}.fit.gz"))
 
 
 @pytest.mark.oracle
 def test_the_var_file_is_the_one_that_spfit_writes(shared: Path):
     """V of the correlations too, but for the signs of its columns, which have no bearing."""
     folder = shared / "reference" / "fits" / "h2s"
-    asked = read_fit(folder / "h2s.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
+    fit_input = read_fit(folder / "h2s.par")
+    fit = fit_lines(fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options)
     ours, theirs = (
         np.array([float(x) for x in re.findall(r"-?\d+\.\d{7}", rest)])
-        for rest in (fitted_file(asked, fit, variances=True).rest, read_par(folder / "v2008_results" / "h2s.var").rest)
+        for rest in (
+            fitted_file(fit_input, fit, variances=True).rest,
+            read_par(folder / "v2008_results" / "h2s.var").rest,
+        )
     )
     assert len(ours) == 35 * 36 / 2
     assert np.abs(np.abs(ours) - np.abs(theirs)).max() < 3e-7  # seven decimals are printed
-    assert error_factor(fit, asked.file.header) == 1.0
-    assert str(error_factor(fit, replace(asked.file.header, frac=0.0))) == "0.0"  # not -0.0, which a file would show
+    assert error_factor(fit, fit_input.file.header) == 1.0
+    assert (
+        str(error_factor(fit, replace(fit_input.file.header, frac=0.0))) == "0.0"
+    )  # not -0.0, which a file would show
 
 
 TWO_STATES = b"""two states, one spin
@@ -200,18 +211,20 @@ def test_levels_that_a_file_does_not_have_are_refused():
 
 @pytest.mark.oracle
 @pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "ch3cn_MeCN" else one for one in FITS]
+    "name", [pytest.param(fit, marks=pytest.mark.slow) if fit == "ch3cn_MeCN" else fit for fit in FITS]
 )
 def test_errors_of_predicted_lines_are_those_of_spcat(shared: Path, name: str):
     """From errors and correlations of the .var: one state, several states, spins; hyperfine components too."""
     results = next((shared / "reference" / "fits").glob(f"*/{name}.par")).parent / "v2008_results"
-    made = predict(read_par(results / f"{name}.var"), read_int(results.parent / f"{name}.int"), as_spcat=True).catalogue
+    prediction = predict(
+        read_par(results / f"{name}.var"), read_int(results.parent / f"{name}.int"), as_spcat=True
+    ).catalogue
     theirs = read_cat(results / f"{name}.cat")
 
     def labels(catalogue):
         return np.concatenate([catalogue.quanta_upper, catalogue.quanta_lower], axis=1).tolist()
 
-    ours = dict(zip(map(tuple, labels(made)), made.error_mhz.tolist(), strict=True))
+    ours = dict(zip(map(tuple, labels(prediction)), prediction.error_mhz.tolist(), strict=True))
     predicted = [
         (ours[tuple(q)], e) for q, e, t in zip(labels(theirs), theirs.error_mhz, theirs.tag, strict=True) if t > 0
     ]
@@ -236,21 +249,23 @@ def test_fits_of_a_triplet_and_of_a_bent_state_come_out_as_spfit_has_them(tmp_pa
     """A .var of SPFIT as the start, each free constant 1e-6 off: ties, an a-priori error of 1e-19, an energy from zero (N = -1)."""
     folder = KINDS / name
     theirs = read_par(folder / f"{name}.var")
-    made, factor = [], 1.0
+    parameters, factor = [], 1.0
     for p in theirs.parameters:
         fixed = p.error == 1e-19
         factor = factor if p.constrained else 1.0 if fixed else 1 + 1e-6
-        made.append(replace(p, value=p.value * factor, error=1e-19 if fixed else 1e-37 if p.constrained else 1e36))
-    start = replace(theirs, parameters=tuple(made), rest="")
+        parameters.append(
+            replace(p, value=p.value * factor, error=1e-19 if fixed else 1e-37 if p.constrained else 1e36)
+        )
+    start = replace(theirs, parameters=tuple(parameters), rest="")
     lines = read_lin(folder / f"{name}.lin", len(names_of_quanta(format_of(start, groups_for_fit(start)))))
-    asked, fit = fitted(start, lines)
+    fit_input, fit = fitted(start, lines)
     assert fit.converged, fit.reason
     assert fit.used.all()
-    ours = fitted_file(asked, fit, variances=True)
+    ours = fitted_file(fit_input, fit, variances=True)
     for mine, other in zip(ours.parameters, theirs.parameters, strict=True):
         assert abs(mine.value - other.value) < 0.01 * other.error  # the issue's limit
         assert mine.error == pytest.approx(other.error, rel=1e-6)  # derivatives at a step of less than 0.01 of an error
-    mine, other = (np.array([float(x) for x in re.findall(r"-?\d+\.\d{7}", one.rest)]) for one in (ours, theirs))
+    mine, other = (np.array([float(x) for x in re.findall(r"-?\d+\.\d{7}", row.rest)]) for row in (ours, theirs))
     if len(other):  # the samples of the package have them only where a prediction needs them
         assert np.abs(np.abs(mine) - np.abs(other)).max() < 1e-6  # seven decimals are printed
     whole = np.flatnonzero(fit.lines.from_zero)
@@ -261,12 +276,15 @@ def test_fits_of_a_triplet_and_of_a_bent_state_come_out_as_spfit_has_them(tmp_pa
 @pytest.mark.oracle
 def test_a_radical_with_three_protons_ends_at_spfits_minimum():
     """Where SPFIT ends when its iterations go on: 22 parameters, total spin of two protons, ten quantum numbers, blends, ties."""
-    asked = read_fit(KINDS / "h2coh" / "fit.par", KINDS / "h2coh" / "fit.lin")
-    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
+    fit_input = read_fit(KINDS / "h2coh" / "fit.par", KINDS / "h2coh" / "fit.lin")
+    fit = fit_lines(fit_input.lines, None, fit_input.parameters, fit_input.options, model=fit_input.model)
     assert fit.converged, fit.reason
     assert fit.used.all()
     assert fit.weighted_rms == pytest.approx(0.71369, abs=5e-6)  # five decimals are printed
-    ours, theirs = fitted_file(asked, fit, variances=True).parameters, read_par(KINDS / "h2coh" / "fit.var").parameters
+    ours, theirs = (
+        fitted_file(fit_input, fit, variances=True).parameters,
+        read_par(KINDS / "h2coh" / "fit.var").parameters,
+    )
     compared = 0
     for mine, other in zip(ours, theirs, strict=True):
         if not other.constrained and other.error > 1e-30:
@@ -282,10 +300,10 @@ def test_lines_of_a_file_with_spins_are_drawn_anew():
     """The bootstrap with the file's own levels; a-priori errors of 1e18 MHz are none."""
     folder = KINDS / "oc33s"
     theirs = read_par(folder / "oc33s.var")
-    made = tuple(replace(p, error=1e-19 if p.error == 1e-19 else 1e18) for p in theirs.parameters)
-    asked, fit = fitted(replace(theirs, parameters=made, rest=""), read_lin(folder / "oc33s.lin", 3))
+    parameters = tuple(replace(p, error=1e-19 if p.error == 1e-19 else 1e18) for p in theirs.parameters)
+    fit_input, fit = fitted(replace(theirs, parameters=parameters, rest=""), read_lin(folder / "oc33s.lin", 3))
     assert fit.degrees_of_freedom == 23 - 7
-    _, spread = bootstrap(fit, 12, np.random.default_rng(1), model=asked.model)
+    _, spread = bootstrap(fit, 12, np.random.default_rng(1), model=fit_input.model)
     assert spread[0] < 1e-15  # held by its a-priori error
     ratio = spread[1:] / fit.scaled_errors[1:]
     assert 0.3 < np.median(ratio) < 3.0  # deviations of 12 samples are good to a fifth, 23 lines to another
@@ -295,11 +313,15 @@ def test_lines_of_a_file_with_spins_are_drawn_anew():
 @pytest.mark.oracle
 def test_levels_of_two_chlorines_and_two_states_are_spfits():
     """ClClO2 with all spins: blocks of some 1,000 functions, F below 0, frequencies as SPFIT prints them."""
-    asked = read_fit(KINDS / "clclo2_spins" / "clclo2.par")
-    model = asked.model(np.unique(np.concatenate([asked.lines.upper, asked.lines.lower]), axis=0))
+    fit_input = read_fit(KINDS / "clclo2_spins" / "clclo2.par")
+    model = fit_input.model(np.unique(np.concatenate([fit_input.lines.upper, fit_input.lines.lower]), axis=0))
     assert isinstance(model.solved[0].blocks, ContractedLevels)
-    labels, places = np.unique(np.concatenate([asked.lines.upper, asked.lines.lower]), axis=0, return_inverse=True)
-    energies, _ = model.levels(asked.parameters.constants_of(asked.parameters.start))
-    calculated = energies[places.reshape(-1)[: len(asked.lines)]] - energies[places.reshape(-1)[len(asked.lines) :]]
+    labels, places = np.unique(
+        np.concatenate([fit_input.lines.upper, fit_input.lines.lower]), axis=0, return_inverse=True
+    )
+    energies, _ = model.levels(fit_input.parameters.constants_of(fit_input.parameters.start))
+    calculated = (
+        energies[places.reshape(-1)[: len(fit_input.lines)]] - energies[places.reshape(-1)[len(fit_input.lines) :]]
+    )
     assert len(labels) > 100
-    assert calculated == pytest.approx(asked.lines.frequency_mhz, abs=1e-5)  # five decimals are printed
+    assert calculated == pytest.approx(fit_input.lines.frequency_mhz, abs=1e-5)  # five decimals are printed

@@ -30,10 +30,10 @@ HEAD = "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_
 
 def lines_of(constants: Constants, error: float = 0.003, shift: float = 0.0) -> Assignments:
     """Lines to J = 6 with normal noise."""
-    made = line_list(rotor.Top.from_constants(constants, dipole_abc_debye=(1, 1, 0)), jmax=6, min_lgint=None, q=1.0)
-    labels = np.stack([made.levels.quanta[name] for name in ("j", "ka", "kc")], axis=1)
-    noise = error * np.random.default_rng(7).normal(size=len(made)) + shift
-    return assignments(("j", "ka", "kc"), labels[made.upper], labels[made.lower], made.frequency_mhz + noise, error)
+    lines = line_list(rotor.Top.from_constants(constants, dipole_abc_debye=(1, 1, 0)), jmax=6, min_lgint=None, q=1.0)
+    labels = np.stack([lines.levels.quanta[name] for name in ("j", "ka", "kc")], axis=1)
+    noise = error * np.random.default_rng(7).normal(size=len(lines)) + shift
+    return assignments(("j", "ka", "kc"), labels[lines.upper], labels[lines.lower], lines.frequency_mhz + noise, error)
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +77,11 @@ def test_an_interrupt_of_many_fits_leaves_what_is_done(seen, monkeypatch):
     def interrupted_at(last: int):
         count = [0]
 
-        def fitted(*given, **more) -> Fit:
+        def fitted(*arguments, **more) -> Fit:
             count[0] += 1
             if count[0] == last:
                 raise KeyboardInterrupt
-            return fit_lines(*given, **more)
+            return fit_lines(*arguments, **more)
 
         return fitted
 
@@ -91,10 +91,10 @@ def test_an_interrupt_of_many_fits_leaves_what_is_done(seen, monkeypatch):
     assert np.allclose(spread, values.std(axis=0, ddof=1))
     monkeypatch.setattr(choose, "fit_lines", interrupted_at(9))
     start = Constants(A=5213.0, B=1897.0, C=1402.0)
-    found, steps = choose_constants(seen, start, ["A", "B", "C"], ["DeltaJ", "DeltaJK", "deltaJ", "deltaK"])
-    assert not found.converged
-    assert found.minimum.status == INTERRUPTED
-    assert found.reason == f"interrupted after {len(steps)} steps of the choice"
+    computed, steps = choose_constants(seen, start, ["A", "B", "C"], ["DeltaJ", "DeltaJK", "deltaJ", "deltaK"])
+    assert not computed.converged
+    assert computed.minimum.status == INTERRUPTED
+    assert computed.reason == f"interrupted after {len(steps)} steps of the choice"
 
 
 def test_a_search_passes_an_interrupt_on_where_it_is_one_of_many(seen):
@@ -134,8 +134,8 @@ def test_ties_and_a_priori_errors_go_into_spfits_files_and_come_back(seen):
     )
     from rotor.formats.spcat.text.lin import read_lin
 
-    asked = spfit_input(file, read_lin(text.encode(), 3))
-    again = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
+    fit_input = spfit_input(file, read_lin(text.encode(), 3))
+    again = fit_lines(fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options)
     for name in ("A", "B", "C", "DeltaK", "deltaK"):
         if name in fit.constants:
             assert abs(again.constants[name] - fit.constants[name]) < 1e-3 * fit.constants.uncertainties[name]
@@ -153,8 +153,8 @@ def test_a_var_file_has_the_correlations_of_held_parameters_too(seen):
     assert covariance is not None
     for name in fit.parameters.names:
         row = [covariance.names.index(n) for n in ("B", name)]
-        own = [fit.covariance.names.index(n) for n in ("B", name)]
-        theirs, ours = covariance.matrix_mhz2[np.ix_(row, row)], fit.covariance.matrix_mhz2[np.ix_(own, own)]
+        columns = [fit.covariance.names.index(n) for n in ("B", name)]
+        theirs, ours = covariance.matrix_mhz2[np.ix_(row, row)], fit.covariance.matrix_mhz2[np.ix_(columns, columns)]
         assert np.allclose(theirs, ours, rtol=1e-5, atol=1e-6 * abs(ours[0, 1]))  # seven digits in the file
 
 
@@ -165,15 +165,17 @@ def test_a_held_parameter_of_a_par_file_stays_in_the_var(tmp_path):
         "   100  5.7E+004 1.0E+035 /B\n   200 -1.835E-001 1.0E-037 /-D\n   300  1.7E-007 1.0E+035 /H\n"
     )
     top = rotor.Top.from_constants("B=57635.96804 D=0.1835053 H=1.7e-7 MHz", dipole_abc_debye=(0.1, 0, 0))
-    made = line_list(top, jmax=20, min_lgint=None, q=1.0)
-    j = made.levels.quanta["j"]
-    rows = zip(j[made.upper].tolist(), j[made.lower].tolist(), made.frequency_mhz.tolist(), strict=True)
+    lines = line_list(top, jmax=20, min_lgint=None, q=1.0)
+    j = lines.levels.quanta["j"]
+    rows = zip(j[lines.upper].tolist(), j[lines.lower].tolist(), lines.frequency_mhz.tolist(), strict=True)
     (tmp_path / "co.lin").write_text("".join(f"{u:3d}{low:3d}{'':30s} {f:15.4f} 0.003\n" for u, low, f in rows))
     from rotor.formats.spcat.fits.fit_input import read_fit
 
-    asked = read_fit(tmp_path / "co.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, replace(asked.options, poor_rms=1e9))
-    rest = fitted_file(asked, fit, variances=True).rest
+    fit_input = read_fit(tmp_path / "co.par")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, replace(fit_input.options, poor_rms=1e9)
+    )
+    rest = fitted_file(fit_input, fit, variances=True).rest
     numbers = [rest[i : i + 10] for i in range(0, len(rest.strip()), 10)]
     assert len(numbers) == 6  # B, -D, H
     assert [float(x) for x in numbers[1:3]] == [0.0, 1.0]  # -D with B, and with itself
@@ -242,8 +244,8 @@ def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tm
     rows = []
     for v, b in ((0, 1897.2265), (1, 1890.0)):
         deltas = TRUE["deltaJ"] * (0.8 if v else 1.0)
-        for one in lines_with_v(lines_of(TRUE.replace(B=b, DeltaJK=0.0, deltaJ=deltas)), v):
-            rows.append(one)
+        for lines in lines_with_v(lines_of(TRUE.replace(B=b, DeltaJK=0.0, deltaJ=deltas)), v):
+            rows.append(lines)
     (tmp_path / "two.lin").write_text("".join(rows))
     header = TWO_STATES.replace("   8   30", f"   8 {len(rows):4d}")
     (tmp_path / "two.par").write_text(header)
@@ -330,7 +332,7 @@ def test_lengths_beside_bonds_do_not_lie_on_atoms():
     figure = structure_figure(chain, values=values)
     axes = figure.axes[0]
     figure.canvas.draw()
-    texts = [one for one in axes.texts if "(" in one.get_text()]
+    texts = [text for text in axes.texts if "(" in text.get_text()]
     assert len(texts) == 4
     circles = [patch.get_window_extent() for patch in axes.patches]
     assert not any(text.get_window_extent().overlaps(circle) for text in texts for circle in circles)

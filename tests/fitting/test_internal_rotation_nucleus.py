@@ -96,26 +96,26 @@ def direct_product(frame, sigma):
         rotation = rotation + RAM["Dab"] * (axes[0] @ axes[1] + axes[1] @ axes[0])
         f, barrier, coupling = RAM["F"], RAM["V3"], RAM["rho"] * axes[0]
     m = 3.0 * np.arange(-WAVES, WAVES + 1) + sigma
-    p, one = np.diag(m), np.eye(len(m))
-    hindering = barrier / 2 * (one - (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2)
+    p, identity = np.diag(m), np.eye(len(m))
+    hindering = barrier / 2 * (identity - (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2)
 
     spin = np.array([1, 0, -1])
     raising = np.sqrt(2.0) * np.eye(3, k=1)
     ix, iy, iz = (raising + raising.T) / 2, -0.5j * (raising - raising.T), np.diag(spin.astype(float))
     pairs = [(r, c) for r in range(len(states)) for c in range(3) if states[r][2] + spin[c] == F]
-    rows, of_spin = np.array(pairs).T
+    rows, spin_index = np.array(pairs).T
 
     def lifted(left, right):
-        return left[np.ix_(rows, rows)] * right[np.ix_(of_spin, of_spin)]
+        return left[np.ix_(rows, rows)] * right[np.ix_(spin_index, spin_index)]
 
     order = [1, 2, 0]  # x, y, z = b, c, a
-    of_body = spherical(CHI[np.ix_(order, order)])
+    body_tensor = spherical(CHI[np.ix_(order, order)])
     squares = [[(u @ v + v @ u) / 2 - (2 / 3 * np.eye(3) if i == k else 0) for k, v in enumerate((ix, iy, iz))]
                for i, u in enumerate((ix, iy, iz))]  # fmt: skip
     quadrupole = [part / 2 for part in spherical(squares)]  # 2I(2I - 1) = 2
     hyperfine = np.zeros((len(rows),) * 2, dtype=complex)
     for s in range(-2, 3):
-        tensor = sum(of_body[q + 2] * matrix[s + 2, q + 2] for q in range(-2, 3))
+        tensor = sum(body_tensor[q + 2] * matrix[s + 2, q + 2] for q in range(-2, 3))
         hyperfine += (-1) ** s * lifted(tensor, quadrupole[2 - s])
     body = {"a": [0, 1, 0], "b": [1 / np.sqrt(2), 0, -1 / np.sqrt(2)], "c": [-1j / np.sqrt(2), 0, -1j / np.sqrt(2)]}
     spin_vector = [(ix - 1j * iy) / np.sqrt(2), iz, -(ix + 1j * iy) / np.sqrt(2)]
@@ -123,8 +123,8 @@ def direct_product(frame, sigma):
         for s in (-1, 0, 1):
             cosine = sum(body[letter][q + 1] * vector[s + 1, q + 1] for q in (-1, 0, 1))
             hyperfine += value * (-1) ** s * lifted((cosine @ axis + axis @ cosine) / 2, spin_vector[1 - s])
-    of_rotation = hyperfine + lifted(rotation + f * coupling @ coupling, np.eye(3))
-    whole = np.kron(of_rotation, one) - 2 * f * np.kron(lifted(coupling, np.eye(3)), p)
+    hamiltonian = hyperfine + lifted(rotation + f * coupling @ coupling, np.eye(3))
+    whole = np.kron(hamiltonian, identity) - 2 * f * np.kron(lifted(coupling, np.eye(3)), p)
     return np.linalg.eigvalsh(whole + np.kron(np.eye(len(rows)), f * p @ p + hindering))
 
 

@@ -67,15 +67,15 @@ def test_a_total_goes_through_a_file():
 def test_a_total_of_two_makes_the_levels_of_the_plain_coupling():
     """Without weights the two ways of coupling differ in names alone."""
     plain = Top.from_constants("A=9 B=3 C=2.5 GHz", spin_constants=SpinConstants.parse(CHLORINES))
-    found = [solve_levels(top, 1, effects=effects_of(top, True)) for top in (TOPS["two"], plain)]
-    assert found[0].quanta_names == ("n", "ka", "kc", "i_tot", "f")
-    energies = [np.sort(one.energy_mhz) for one in found]
+    computed = [solve_levels(top, 1, effects=effects_of(top, True)) for top in (TOPS["two"], plain)]
+    assert computed[0].quanta_names == ("n", "ka", "kc", "i_tot", "f")
+    energies = [np.sort(entry.energy_mhz) for entry in computed]
     assert energies[0] == pytest.approx(energies[1], abs=1e-8)  # round-off of energies of 1e5 MHz
 
 
 def test_q_of_ortho_and_para_is_that_without_spins():
     text = PROTONS.partition("[spins")[0].replace("oe = 0, oo = 0", "oe = 3, oo = 3")
-    tops = [top_of_file(parse_molecule_file(one)) for one in (PROTONS, text)]
+    tops = [top_of_file(parse_molecule_file(file)) for file in (PROTONS, text)]
     q = [partition_function(top, 20.0, effects=effects_of(top, top is tops[0])).q for top in tops]
     assert q[0] == pytest.approx(q[1], rel=1e-6)  # the tail of either sum
 
@@ -83,18 +83,18 @@ def test_q_of_ortho_and_para_is_that_without_spins():
 def test_components_of_ortho_and_para_add_up_to_the_lines_without_spins():
     """Weights 1, 1, 0, 0 of even I make 1, 1, 3, 3 without spins: for each rotational line the sum over its components."""
     text = PROTONS.partition("[spins")[0].replace("oe = 0, oo = 0", "oe = 3, oo = 3")
-    tops = [top_of_file(parse_molecule_file(one)) for one in (PROTONS, text)]
+    tops = [top_of_file(parse_molecule_file(file)) for file in (PROTONS, text)]
     lines = [
         line_list(top, jmax=2, min_lgint=None, q=1.0, range_mhz=(0, 3e5), effects=effects_of(top, top is tops[0]))
         for top in tops
     ]
     sums: Counter[tuple[int, ...]] = Counter()
     names = ("n", "ka", "kc")
-    for one, total, j in zip(lines, (1, 0), ("n", "j"), strict=True):
+    for line, total, j in zip(lines, (1, 0), ("n", "j"), strict=True):
         columns = [
-            one.levels.quanta[name if name != "n" else j][rows] for rows in (one.upper, one.lower) for name in names
+            line.levels.quanta[name if name != "n" else j][rows] for rows in (line.upper, line.lower) for name in names
         ]
-        for key, lgint in zip(zip(*(c.tolist() for c in columns), strict=True), one.lgint, strict=True):
+        for key, lgint in zip(zip(*(c.tolist() for c in columns), strict=True), line.lgint, strict=True):
             sums[key, total] += 10.0**lgint
     rotational = [key for key, total in sums if not total]
     assert len(rotational) >= 5
@@ -109,12 +109,18 @@ def test_the_codes_make_the_same_levels(kind):
     assert file.options[0].iax == {"two": -1}.get(kind, -6)
     levels = solve_levels(constants.top, 1 if kind == "three" else 2, effects=constants.effects)
     (group,) = groups_for_fit(file)
-    found = levels_in_blocks(group, sorted(set((levels.multiplicity - 1).tolist())))
+    computed = levels_in_blocks(group, sorted(set((levels.multiplicity - 1).tolist())))
     pairs = [
         np.array(
-            sorted(zip((one.multiplicity - 1)[one.rotational <= 1], one.energy_mhz[one.rotational <= 1], strict=True))
+            sorted(
+                zip(
+                    (labels.multiplicity - 1)[labels.rotational <= 1],
+                    labels.energy_mhz[labels.rotational <= 1],
+                    strict=True,
+                )
+            )
         )
-        for one in (levels, found)
+        for labels in (levels, computed)
     ]
     assert pairs[0] == pytest.approx(pairs[1], abs=1e-8)  # round-off of energies of 1e5 MHz
 
@@ -125,7 +131,7 @@ def test_a_total_goes_to_codes_and_comes_back(kind):
     back = named_top(read_par(format_par(named_parameter_file(top, 20))))
     assert len(back.spin_constants.totals) == len(top.spin_constants.totals)
     assert back.spin_weights == top.spin_weights
-    ours, theirs = (solve_levels(one, 1, effects=effects_of(one, True)) for one in (top, back))
+    ours, theirs = (solve_levels(molecule, 1, effects=effects_of(molecule, True)) for molecule in (top, back))
     assert np.sort(theirs.energy_mhz) == pytest.approx(np.sort(ours.energy_mhz), abs=1e-8)  # round-off of 1e5 MHz
     assert sorted(theirs.degeneracy) == sorted(ours.degeneracy)
 
@@ -197,10 +203,10 @@ def test_weights_of_other_nuclei_beside_a_pair():
     chlorines = SpinConstants.parse("chi_aa(35Cl_1)=-40 chi_aa(35Cl_2)=-40", "35Cl_1+35Cl_2")
     protons = SpinConstants.parse("C_iso(1H_1)=-.03 C_iso(1H_2)=-.03", "1H_1+1H_2")
     all_nuclei = geometry.spin_weights
-    of_protons = SpinWeights.from_mapping({"ee": 1, "eo": 3, "oe": 3, "oo": 1})
-    of_chlorines = SpinWeights.from_mapping({"ee": 3, "eo": 5, "oe": 5, "oo": 3})
-    assert of_protons.with_pair(3) == all_nuclei == of_chlorines.with_pair(1)
-    for weights, spins in ((of_protons, chlorines), (of_chlorines, protons)):
+    spin_weights = SpinWeights.from_mapping({"ee": 1, "eo": 3, "oe": 3, "oo": 1})
+    value = SpinWeights.from_mapping({"ee": 3, "eo": 5, "oe": 5, "oo": 3})
+    assert spin_weights.with_pair(3) == all_nuclei == value.with_pair(1)
+    for weights, spins in ((spin_weights, chlorines), (value, protons)):
         top = replace(geometry.with_weights(weights.to_mapping(), "given"), spin_constants=spins)
         assert len(effects_of(top, True)) > 2
         twice = replace(geometry, spin_constants=spins)

@@ -43,17 +43,19 @@ def test_madelung_constant_of_rock_salt() -> None:
 
 def test_the_sum_does_not_depend_on_alpha() -> None:
     atoms = plain.box_of({"tip4p": 27}, 14.0, seed=9)
-    found = [
+    computed = [
         RigidPotential(
             "tip4p", cutoff_angstrom=7.0, electrostatics="ewald", ewald=EwaldParameters(alpha, 12 * alpha)
         ).evaluate(atoms)
         for alpha in (0.80, 0.95)
     ]
-    assert found[0].terms_ev["fourier"] != pytest.approx(found[1].terms_ev["fourier"], rel=0.01)
-    assert found[0].energy_ev == pytest.approx(found[1].energy_ev, rel=1e-12)  # exp(-(0.8*7)²) = 2e-14
-    one, two = (e.forces_ev_per_angstrom for e in found)
-    assert np.abs(one - two).max() < 1e-11 * np.abs(one).max()  # the same
-    assert np.abs(found[0].virial_ev - found[1].virial_ev).max() < 1e-10 * np.abs(found[0].virial_ev).max()  # the same
+    assert computed[0].terms_ev["fourier"] != pytest.approx(computed[1].terms_ev["fourier"], rel=0.01)
+    assert computed[0].energy_ev == pytest.approx(computed[1].energy_ev, rel=1e-12)  # exp(-(0.8*7)²) = 2e-14
+    first, two = (e.forces_ev_per_angstrom for e in computed)
+    assert np.abs(first - two).max() < 1e-11 * np.abs(first).max()  # the same
+    assert (
+        np.abs(computed[0].virial_ev - computed[1].virial_ev).max() < 1e-10 * np.abs(computed[0].virial_ev).max()
+    )  # the same
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
@@ -61,8 +63,8 @@ def test_the_error_of_forces_is_the_predicted_one(tolerance: float) -> None:
     atoms = plain.box_of({"spce": 216}, 18.7, seed=2)
     make = {"cutoff_angstrom": 9.0, "electrostatics": "ewald"}
     exact = RigidPotential("spce", tolerance=1e-11, **make).evaluate(atoms).forces_ev_per_angstrom
-    found = RigidPotential("spce", tolerance=tolerance, **make).evaluate(atoms).forces_ev_per_angstrom
-    error = math.sqrt(np.mean(np.sum((found - exact) ** 2, axis=1))) / COULOMB_EV_ANGSTROM
+    evaluated = RigidPotential("spce", tolerance=tolerance, **make).evaluate(atoms).forces_ev_per_angstrom
+    error = math.sqrt(np.mean(np.sum((evaluated - exact) ** 2, axis=1))) / COULOMB_EV_ANGSTROM
     assert tolerance / 4 < error < 2 * tolerance  # random charges are assumed; both halves add: √2
 
 

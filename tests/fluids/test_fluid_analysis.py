@@ -22,26 +22,26 @@ def test_an_ideal_gas_has_g_of_one_for_any_number() -> None:
     for n, frames in ((2, 10_000), (40, 300)):
         edges = np.array([9.0, 10.0, 12.0])
         path = rng.uniform(-20, 20, (frames, n, 3)) * edges  # outside the cell: folded
-        found = pair_distribution(path, edges, 4.5, 9)
+        distribution = pair_distribution(path, edges, 4.5, 9)
         pairs = frames * n * (n - 1) / 2 * 4 / 3 * math.pi * np.diff(np.linspace(0, 4.5, 10) ** 3) / np.prod(edges)
-        assert np.all(np.abs(found.g - 1) < 4.5 / np.sqrt(pairs))  # Poisson: 4.5 standard errors for 18 shells
+        assert np.all(np.abs(distribution.g - 1) < 4.5 / np.sqrt(pairs))  # Poisson: 4.5 standard errors for 18 shells
         whole = (n - 1) * 4 / 3 * math.pi * 4.5**3 / np.prod(edges)
-        assert found.coordination[-1] == pytest.approx(whole, rel=4 / math.sqrt(pairs.sum()))  # four errors
+        assert distribution.coordination[-1] == pytest.approx(whole, rel=4 / math.sqrt(pairs.sum()))  # four errors
 
 
 def test_shells_of_a_face_centred_crystal() -> None:
     cell = np.array([(0, 0, 0), (0.5, 0.5, 0), (0.5, 0, 0.5), (0, 0.5, 0.5)])
     points = (np.array(list(np.ndindex(4, 4, 4)))[:, None] + cell).reshape(-1, 3) * 3.0
-    found = pair_distribution(points[None], [12.0] * 3, 4.5, 90)
+    distribution = pair_distribution(points[None], [12.0] * 3, 4.5, 90)
     for distance, neighbours in ((3 / math.sqrt(2), 12), (3.0, 18), (3 * math.sqrt(1.5), 42)):
-        assert found.coordination[found.r_angstrom > distance + 0.05][0] == neighbours
-    assert np.count_nonzero(found.g[found.r_angstrom < 3.7]) == 3
+        assert distribution.coordination[distribution.r_angstrom > distance + 0.05][0] == neighbours
+    assert np.count_nonzero(distribution.g[distribution.r_angstrom < 3.7]) == 3
 
 
 def test_the_first_peak_is_that_of_the_parabola() -> None:
-    found = pair_distribution(np.zeros((1, 2, 3)) + [[[0, 0, 0]], [[2.0, 0, 0]]][0], [10.0] * 3, 5.0, 50)
-    r = found.r_angstrom
-    shaped = type(found)(r, 3 - (r - 2.7312) ** 2, r)
+    distribution = pair_distribution(np.zeros((1, 2, 3)) + [[[0, 0, 0]], [[2.0, 0, 0]]][0], [10.0] * 3, 5.0, 50)
+    r = distribution.r_angstrom
+    shaped = type(distribution)(r, 3 - (r - 2.7312) ** 2, r)
     assert shaped.first_peak() == pytest.approx((2.7312, 3.0), rel=1e-10)  # a parabola is met to round-off
 
 
@@ -68,28 +68,28 @@ def test_displacement_of_ornstein_and_uhlenbeck() -> None:
         v = new
     t = dt * np.arange(frames)
     expected = 6 / gamma**2 * (gamma * t - 1 + np.exp(-gamma * t))
-    found = mean_square_displacement(path)[25:500:25]
+    displacement = mean_square_displacement(path)[25:500:25]
     # 400 points, three directions, 30 time units of about 2: some 15,000 samples at short times, 4,000 at long ones
-    assert np.allclose(found, expected[25:500:25], rtol=0.06)
+    assert np.allclose(displacement, expected[25:500:25], rtol=0.06)
 
 
 def test_brownian_points_diffuse_as_they_were_made_to() -> None:
     rng, d, dt = np.random.default_rng(4), 0.25, 0.1  # Å²/ps
     path = np.cumsum(rng.normal(size=(4000, 100, 3)) * math.sqrt(2 * d * dt), axis=0)
     wind = path + np.arange(4000)[:, None, None] * [0.3, 0.0, 0.0]
-    found = diffusion(wind, dt, (1.0, 4.0))
-    assert found.value == pytest.approx(
-        d * 1e-8 * 99 / 100, abs=4 * found.error
+    transport = diffusion(wind, dt, (1.0, 4.0))
+    assert transport.value == pytest.approx(
+        d * 1e-8 * 99 / 100, abs=4 * transport.error
     )  # the centre of 100 points is taken out
-    assert 0 < found.error < 0.05 * found.value
+    assert 0 < transport.error < 0.05 * transport.value
     with pytest.raises(ValueError, match="longer parts or an earlier window"):
         diffusion(wind[:200], dt, (1.0, 4.0))
 
 
 def test_endless_box_adds_the_drag_of_images() -> None:
-    found = yeh_hummer_correction(Diffusion(2e-9, 1e-10), 300.0, 1e-3, 20.0)
+    computed = yeh_hummer_correction(Diffusion(2e-9, 1e-10), 300.0, 1e-3, 20.0)
     by_hand = 2.837297 * 1.380649e-23 * 300 / (6 * math.pi * 1e-3 * 20e-10)
-    assert found.corrected - found.value == pytest.approx(by_hand, rel=1e-12)  # one formula, typed twice
+    assert computed.corrected - computed.value == pytest.approx(by_hand, rel=1e-12)  # one formula, typed twice
     assert by_hand == pytest.approx(0.3117e-9, rel=1e-3)  # by a pocket calculator
 
 

@@ -64,7 +64,7 @@ def test_a_chain_longer_than_half_the_cell_is_followed_along_its_bonds():
     cut = chain.copy()
     cut.translate([5.0, 0.0, 0.0])
     cut.wrap()
-    placed = (lambda found: found[0].positions(found[1]))(bodies_of(cut))
+    placed = (lambda computed: computed[0].positions(computed[1]))(bodies_of(cut))
     assert np.linalg.norm(placed[5] - placed[0]) == pytest.approx(5 * np.hypot(1.2, 0.1), rel=1e-12)  # round-off
 
 
@@ -82,9 +82,9 @@ def test_a_triclinic_cell():
 def test_atoms_of_molecules_may_stand_in_any_order():
     box = box_of("H2O", "H2O", "N2")
     mixed = box[[0, 3, 6, 1, 4, 7, 2, 5]]
-    one, _pose = bodies_of(box)
+    body, _pose = bodies_of(box)
     other, other_pose = bodies_of(mixed)
-    assert np.allclose(other.moments, one.moments, rtol=1e-12)  # round-off
+    assert np.allclose(other.moments, body.moments, rtol=1e-12)  # round-off
     assert abs(other.positions(other_pose) - mixed.positions).max() < 1e-12  # round-off, Å
     lists, _ = bodies_of(mixed, molecules=[[0, 3, 6], [1, 4, 7], [2, 5]])
     assert lists.order.tolist() == other.order.tolist()
@@ -94,9 +94,9 @@ def test_bonds_find_the_molecules_that_labels_name():
     box = box_of(*MIXED, spacing=4.0)
     labelled, _ = bodies_of(box)
     del box.arrays["molecule"]
-    found, _ = bodies_of(box)
-    assert found.order.tolist() == labelled.order.tolist()
-    assert found.starts.tolist() == labelled.starts.tolist()
+    computed, _ = bodies_of(box)
+    assert computed.order.tolist() == labelled.order.tolist()
+    assert computed.starts.tolist() == labelled.starts.tolist()
 
 
 def test_forces_become_force_and_torque_that_do_the_same_work():

@@ -37,22 +37,24 @@ RING = [(np.cos(k * np.pi / 3), np.sin(k * np.pi / 3), 0.0) for k in range(6)]
 CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) / np.sqrt(3)
 
 
-def made(name: str, symbols: str | list[str], places: list, charges: list[float]) -> RigidModel:
+def rigid_model(name: str, symbols: str | list[str], places: list, charges: list[float]) -> RigidModel:
     """A model of our own, every atom with a Lennard-Jones site."""
     sites = zip(symbols, places, charges, strict=True)
     return RigidModel(name, tuple(Site(s, tuple(p), q, 2.8, 40.0) for s, p, q in sites), "made for a test")
 
 
-OWN = {
-    "methane": made("methane", "CHHHH", [(0.0, 0, 0), *(1.09 * CORNERS)], [-0.4, 0.1, 0.1, 0.1, 0.1]),
-    "ring": made("ring", "CCCCCCHHHHHH", [*(1.39 * np.array(RING)), *(2.47 * np.array(RING))], [-0.1] * 6 + [0.1] * 6),
-    "bent": made("bent", ["N", "O", "Cl"], [(0.0, 0, 0), (1.15, 0, 0), (-0.8, 1.75, 0)], [0.2, -0.1, -0.1]),
+TEST_MODELS = {
+    "methane": rigid_model("methane", "CHHHH", [(0.0, 0, 0), *(1.09 * CORNERS)], [-0.4, 0.1, 0.1, 0.1, 0.1]),
+    "ring": rigid_model(
+        "ring", "CCCCCCHHHHHH", [*(1.39 * np.array(RING)), *(2.47 * np.array(RING))], [-0.1] * 6 + [0.1] * 6
+    ),
+    "bent": rigid_model("bent", ["N", "O", "Cl"], [(0.0, 0, 0), (1.15, 0, 0), (-0.8, 1.75, 0)], [0.2, -0.1, -0.1]),
 }
 
 
 @pytest.fixture(autouse=True)
 def _own_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(models, "MODELS", models.MODELS | OWN)
+    monkeypatch.setattr(models, "MODELS", models.MODELS | TEST_MODELS)
 
 
 def box(name: str, molecules: int, density: float, seed: int = 5) -> Atoms:
@@ -125,7 +127,7 @@ def test_a_scene_has_whole_molecules_isotopologues_and_momentum_at_rest() -> Non
     atoms.set_masses(masses)
     atoms.wrap()
     engine_input = engine_input_of(atoms, settings_for("spce"))
-    assert [len(one.masses) for one in engine_input.species] == [3, 3]
+    assert [len(component.masses) for component in engine_input.species] == [3, 3]
     assert np.bincount(engine_input.kinds).tolist() == [63, 1]
     lengths = np.linalg.norm(np.diff(engine_input.site_positions.reshape(64, 3, 3)[:, [1, 0, 2]], axis=1), axis=-1)
     assert np.allclose(lengths, 1.0, atol=1e-9)  # 1 Å, laid by a fit
@@ -390,8 +392,8 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
 def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_for("spce", steps=4, every=2)
     engine_input = engine_input_of(WATER, settings)
-    one, two = (list(engine_frames("lammps", engine_input, settings, cores=cores)) for cores in (1, 2))
-    for a, b in zip(one, two, strict=True):
+    first, two = (list(engine_frames("lammps", engine_input, settings, cores=cores)) for cores in (1, 2))
+    for a, b in zip(first, two, strict=True):
         assert a.potential_ev == pytest.approx(b.potential_ev, rel=1e-10)  # sums in another order
         assert np.allclose(a.positions, b.positions, atol=1e-9)  # the same
     monkeypatch.setattr("rotor.fluids.engines.lammps.input_file", lambda *a, **k: "units metal\nnonsense 1\n")

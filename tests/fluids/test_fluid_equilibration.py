@@ -67,8 +67,8 @@ def test_the_error_of_a_ratio_counts_both_series():
     spread = [
         ratio_of("r", 300 + 20 * rng.standard_normal(400), 300 + 20 * rng.standard_normal(400)) for _ in range(200)
     ]
-    scatter = np.std([one.mean for one in spread])
-    assert np.mean([one.error for one in spread]) == pytest.approx(scatter, rel=0.15)  # 5 % from 200 draws
+    scatter = np.std([estimate.mean for estimate in spread])
+    assert np.mean([estimate.error for estimate in spread]) == pytest.approx(scatter, rel=0.15)  # 5 % from 200 draws
     assert scatter == pytest.approx(20 * math.sqrt(2 / 400) / 300, rel=0.15)
 
 

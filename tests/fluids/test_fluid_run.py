@@ -36,9 +36,10 @@ def stop_after(step):
     return progress
 
 
-def same(one: FluidRecord, other: FluidRecord) -> bool:
+def same(record: FluidRecord, other: FluidRecord) -> bool:
     return all(
-        np.array_equal(a, b, equal_nan=True) for a, b in zip(one.columns.values(), other.columns.values(), strict=True)
+        np.array_equal(a, b, equal_nan=True)
+        for a, b in zip(record.columns.values(), other.columns.values(), strict=True)
     )
 
 
@@ -163,7 +164,7 @@ def test_no_space_left_is_told(folder):
 
 def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(folder, monkeypatch):
     run_fluid(box(), replace(SETTINGS, steps=14, ensemble="langevin"), FILES)
-    kept = Path("run.npz").read_bytes()
+    stored = Path("run.npz").read_bytes()
 
     def full(*paths):
         raise OSError(28, "No space left on device")
@@ -172,7 +173,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(folder, monkeypa
     monkeypatch.setattr(AseTrajectory, "__init__", lambda self, path, length=None: setattr(self, "path", Path(path)))
     with pytest.raises(RunStopped, match=r"run.npz: No space left on device at step 28.*run.npz is of step 14"):
         run_fluid(box(), replace(SETTINGS, ensemble="langevin"), FILES, resume=True)
-    assert Path("run.npz").read_bytes() == kept
+    assert Path("run.npz").read_bytes() == stored
     assert not list(Path().glob(".*"))
 
 
@@ -220,8 +221,8 @@ def test_a_box_wrapped_into_its_cell_runs_as_the_whole_one(folder):
     whole, cut = box(), box()
     cut.wrap()
     cut.positions[::3] += cut.cell.lengths()  # oxygens one cell further on: every molecule is cut
-    one, other = run_fluid(whole, SETTINGS), run_fluid(cut, SETTINGS)
-    assert abs(one.total_ev - other.total_ev).max() < 1e-9  # eV: round-off of other places of the same molecules
+    first, other = run_fluid(whole, SETTINGS), run_fluid(cut, SETTINGS)
+    assert abs(first.total_ev - other.total_ev).max() < 1e-9  # eV: round-off of other places of the same molecules
 
 
 @pytest.mark.parametrize("ensemble", ["nve", "langevin", "nose-hoover"])

@@ -23,11 +23,11 @@ KT = 300.0 * units.EV_PER_K
 
 def gas(name, copies):
     """Many molecules far from each other, at rest, turned at random."""
-    one, turns = molecule(name), rotations.uniform(copies, rng=np.random.default_rng(8))
-    centred = one.positions - one.positions.mean(axis=0)
+    single, turns = molecule(name), rotations.uniform(copies, rng=np.random.default_rng(8))
+    centred = single.positions - single.positions.mean(axis=0)
     places = rotations.rotate(turns[:, None], centred) + 20.0 * np.arange(copies)[:, None, None] * [1, 0, 0]
-    box = Atoms(one.get_chemical_symbols() * copies, places.reshape(-1, 3))
-    box.arrays["molecule"] = np.repeat(np.arange(copies), len(one))
+    box = Atoms(single.get_chemical_symbols() * copies, places.reshape(-1, 3))
+    box.arrays["molecule"] = np.repeat(np.arange(copies), len(single))
     box.calc = Free(box)
     return box
 

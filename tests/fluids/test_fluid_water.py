@@ -107,14 +107,14 @@ def frames_of(name, density_g_cm3, temperature_k, step_fs, seed, frames=60):
             dynamics.step()
             dynamics.nsteps += 1
         seen.append(dynamics.half_step_momenta())
-    found = kinetic_degrees(
+    kinetics = kinetic_degrees(
         masses=dynamics.bodies.mass, velocities=np.array([p for p, _ in seen]) / dynamics.bodies.mass[:, None],
         moments=dynamics.bodies.moments, momenta=np.array([spin for _, spin in seen]),
     )  # fmt: skip
     kt = temperature_k * units.EV_PER_K
     return KineticDegrees(
-        {f"{name}: {k}": e / kt for k, e in found.energies.items()},
-        {f"{name}: {k}": c for k, c in found.counts.items()},
+        {f"{name}: {k}": e / kt for k, e in kinetics.energies.items()},
+        {f"{name}: {k}": c for k, c in kinetics.counts.items()},
     )
 
 

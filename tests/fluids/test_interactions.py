@@ -46,9 +46,9 @@ def test_tail_of_a_switched_mixture_by_quadrature() -> None:
                     for low, high in ((r - width, r), (r, 20.0), (20.0, 400.0)):
                         energy += 2 * math.pi * n * m * quad(lambda x, f=missing: f(x) * x**2, low, high)[0]
                         pressure -= 2 / 3 * math.pi * n * m * quad(lambda x, f=slope: f(x) * x**3, low, high)[0]
-    found = tail(models, numbers, r, width)
-    assert found[0] == pytest.approx(energy, rel=1e-5)  # quadrature to 400 Å: (20/400)³ of a fraction
-    assert found[1] == pytest.approx(pressure, rel=5e-5)  # and slopes by differences
+    computed = tail(models, numbers, r, width)
+    assert computed[0] == pytest.approx(energy, rel=1e-5)  # quadrature to 400 Å: (20/400)³ of a fraction
+    assert computed[1] == pytest.approx(pressure, rel=5e-5)  # and slopes by differences
 
 
 def test_reaction_field_is_that_of_openmm() -> None:

@@ -20,13 +20,13 @@ def brute(lists: Neighbours) -> set[tuple[int, ...]]:
     """All pairs (i, j, shift) in range, each named by the larger of its two names."""
     centres, edges = lists.centres, lists.box_angstrom
     within = lists.within_angstrom.max() + lists.skin_angstrom
-    found = set()
+    numbers = set()
     for shift in itertools.product(*[range(-2, 3) if edge else range(1) for edge in edges]):
         apart = centres[None] + np.array(shift) * edges - centres[:, None]
         for i, j in np.argwhere(np.linalg.norm(apart, axis=-1) < within).tolist():
             if i != j or any(shift):
-                found.add(max((i, j, *shift), (j, i, *(-n for n in shift))))
-    return found
+                numbers.add(max((i, j, *shift), (j, i, *(-n for n in shift))))
+    return numbers
 
 
 @pytest.mark.parametrize("pbc", [(1, 1, 1), (1, 0, 1), (0, 0, 1), (0, 0, 0)])
@@ -64,23 +64,23 @@ def test_no_pair_is_lost_while_molecules_move() -> None:
         atoms.positions += drift + np.repeat(rng.normal(size=(74, 3)) * 0.03, np.bincount(labels), axis=0)
         atoms.positions += 15.0 * rng.integers(-1, 2, size=atoms.positions.shape) * (step % 3 == 0)
         fresh = RigidPotential("tip4p,argon", cutoff_angstrom=7.0).evaluate(atoms)
-        found = calc.evaluate(atoms)
-        assert found.energy_ev == pytest.approx(fresh.energy_ev, rel=1e-11), step  # round-off, energies that cancel
+        evaluated = calc.evaluate(atoms)
+        assert evaluated.energy_ev == pytest.approx(fresh.energy_ev, rel=1e-11), step  # round-off, energies that cancel
         size = np.abs(fresh.forces_ev_per_angstrom).max()
-        assert np.abs(found.forces_ev_per_angstrom - fresh.forces_ev_per_angstrom).max() < 1e-11 * size  # the same
+        assert np.abs(evaluated.forces_ev_per_angstrom - fresh.forces_ev_per_angstrom).max() < 1e-11 * size  # the same
     assert 5 < calc._neighbours.rebuilds < 20  # 0.4 Å at some 0.07 Å a step
 
 
 def test_lists_live_while_centres_stay_within_half_the_skin() -> None:
     atoms = plain.box_of({"argon": 27}, 15.0)
     calc = RigidPotential("argon", cutoff_angstrom=6.0, skin_angstrom=1.0)
-    made = []
+    lists = []
     for shift in (0.0, 0.499, 0.501, 0.0, -0.499, -0.501):  # from the last place where the list was made
         moved = atoms.copy()
         moved.positions[3, 0] += shift
         calc.evaluate(moved)
-        made.append(calc._neighbours.rebuilds)
-    assert made == [1, 1, 2, 3, 3, 4]
+        lists.append(calc._neighbours.rebuilds)
+    assert lists == [1, 1, 2, 3, 3, 4]
 
 
 def test_more_neighbours_than_one_block_holds() -> None:
@@ -88,11 +88,11 @@ def test_more_neighbours_than_one_block_holds() -> None:
     rng = np.random.default_rng(2)
     grid = np.stack(np.meshgrid(*[np.arange(11)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * 4.0
     places = grid + rng.uniform(-0.3, 0.3, size=grid.shape)
-    found = RigidPotential("argon", cutoff_angstrom=math.inf).evaluate(Atoms(["Ar"] * len(grid), positions=places))
+    evaluated = RigidPotential("argon", cutoff_angstrom=math.inf).evaluate(Atoms(["Ar"] * len(grid), positions=places))
     r2 = np.sum((places[:, None] - places[None]) ** 2, axis=-1)[np.triu_indices(len(grid), 1)]
     six = 3.405**6 / r2**3
     epsilon = 119.8 * 8.617333262e-5
-    assert found.energy_ev == pytest.approx(4 * epsilon * np.sum(six**2 - six), rel=1e-9)  # k_B to ten digits
+    assert evaluated.energy_ev == pytest.approx(4 * epsilon * np.sum(six**2 - six), rel=1e-9)  # k_B to ten digits
 
 
 def test_molecules_end_to_end_that_overlap_are_refused() -> None:

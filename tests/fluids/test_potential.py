@@ -56,7 +56,7 @@ def test_a_mixture_agrees_with_the_plain_form(method: str, width: float) -> None
         damping_per_angstrom=0.2,
         ewald=EwaldParameters(alpha, k_cut),
     )
-    found = calc.evaluate(atoms)
+    evaluated = calc.evaluate(atoms)
     dispersion, charges, forces, _ = plain.pair_terms(
         sites, edges, 7.5, width, (method, alpha if method == "ewald" else METHODS[method])
     )
@@ -70,17 +70,19 @@ def test_a_mixture_agrees_with_the_plain_form(method: str, width: float) -> None
     else:
         expected[method.replace("-", "_")] = charges
     for name, value in expected.items():
-        assert found.terms_ev[name] == pytest.approx(value, rel=1e-12, abs=0), name  # a few hundred roundings
+        assert evaluated.terms_ev[name] == pytest.approx(value, rel=1e-12, abs=0), name  # a few hundred roundings
     on_atoms = sites.weights.T @ forces
     if method == "ewald":  # the plain form leaves out the forces inside molecules: compare total force and torque
         by_molecule = np.repeat(np.arange(len(models)), [len(m.symbols) for m in models])
         for m in range(len(models)):
-            own, difference = by_molecule == m, found.forces_ev_per_angstrom - on_atoms
-            arms = atoms.positions[own] - atoms.positions[own][0]
-            assert np.abs(difference[own].sum(axis=0)).max() < 1e-12 * np.abs(on_atoms).max()  # round-off
-            assert np.abs(np.cross(arms, difference[own]).sum(axis=0)).max() < 1e-11 * np.abs(on_atoms).max()  # and Å
+            members, difference = by_molecule == m, evaluated.forces_ev_per_angstrom - on_atoms
+            arms = atoms.positions[members] - atoms.positions[members][0]
+            assert np.abs(difference[members].sum(axis=0)).max() < 1e-12 * np.abs(on_atoms).max()  # round-off
+            assert (
+                np.abs(np.cross(arms, difference[members]).sum(axis=0)).max() < 1e-11 * np.abs(on_atoms).max()
+            )  # and Å
     else:
-        assert np.abs(found.forces_ev_per_angstrom - on_atoms).max() < 1e-12 * np.abs(on_atoms).max()  # round-off
+        assert np.abs(evaluated.forces_ev_per_angstrom - on_atoms).max() < 1e-12 * np.abs(on_atoms).max()  # round-off
 
 
 def test_the_virial_is_that_of_centres_of_mass() -> None:
@@ -94,8 +96,8 @@ def test_the_virial_is_that_of_centres_of_mass() -> None:
     shift = -edges * np.rint(d / edges)
     arms = centres[m][None] - centres[m][:, None] + shift
     virial = 0.5 * np.einsum("ija,ijb->ab", forces, arms)
-    found = RigidPotential("tip4p,trappe-n2,trappe-co2,argon", cutoff_angstrom=7.5).evaluate(atoms).virial_ev
-    assert np.abs(found - 0.5 * (virial + virial.T)).max() < 1e-12 * np.abs(virial).max()  # round-off
+    evaluated = RigidPotential("tip4p,trappe-n2,trappe-co2,argon", cutoff_angstrom=7.5).evaluate(atoms).virial_ev
+    assert np.abs(evaluated - 0.5 * (virial + virial.T)).max() < 1e-12 * np.abs(virial).max()  # round-off
 
 
 # derivatives
@@ -151,9 +153,9 @@ def test_energy_and_force_go_smoothly_to_nothing_at_the_cutoff() -> None:
     for distance in steps:
         moved = atoms.copy()
         moved.positions[3:, 0] += distance
-        found = calc.evaluate(moved)
-        energies.append(found.terms_ev["dispersion"] + found.terms_ev["reaction_field"])
-        forces.append(found.forces_ev_per_angstrom[3:, 0].sum())
+        evaluated = calc.evaluate(moved)
+        energies.append(evaluated.terms_ev["dispersion"] + evaluated.terms_ev["reaction_field"])
+        forces.append(evaluated.forces_ev_per_angstrom[3:, 0].sum())
     energies, forces = np.array(energies), np.array(forces)
     assert energies[-1] == 0.0
     slope = -np.gradient(energies, steps)
@@ -174,21 +176,21 @@ def cluster() -> Atoms:
 def test_a_cluster_feels_no_net_force_or_torque_and_may_be_turned_and_moved() -> None:
     atoms = cluster()
     calc = RigidPotential("tip4p", cutoff_angstrom=math.inf)
-    found = calc.evaluate(atoms)
-    size = np.abs(found.forces_ev_per_angstrom).max()
-    assert np.abs(found.forces_ev_per_angstrom.sum(axis=0)).max() < 1e-13 * size * len(
+    evaluated = calc.evaluate(atoms)
+    size = np.abs(evaluated.forces_ev_per_angstrom).max()
+    assert np.abs(evaluated.forces_ev_per_angstrom.sum(axis=0)).max() < 1e-13 * size * len(
         atoms
     )  # Newton's third law, round-off
-    torque = np.cross(atoms.positions, found.forces_ev_per_angstrom).sum(axis=0)
+    torque = np.cross(atoms.positions, evaluated.forces_ev_per_angstrom).sum(axis=0)
     assert np.abs(torque).max() < 1e-12 * size * len(atoms)  # round-off, arms of 10 Å
     turned = atoms.copy()
     turned.rotate(33.0, (1, 2, -1))
     turned.positions += (100.0, -7.0, 3.0)
     again = calc.evaluate(turned)
-    assert again.energy_ev == pytest.approx(found.energy_ev, rel=1e-11)  # round-off of positions, 1e-14 of 100 Å
+    assert again.energy_ev == pytest.approx(evaluated.energy_ev, rel=1e-11)  # round-off of positions, 1e-14 of 100 Å
     back = Atoms(positions=again.forces_ev_per_angstrom)
     back.rotate(-33.0, (1, 2, -1))
-    assert np.abs(back.positions - found.forces_ev_per_angstrom).max() < 1e-10 * size  # the same
+    assert np.abs(back.positions - evaluated.forces_ev_per_angstrom).max() < 1e-10 * size  # the same
 
 
 def test_an_open_pair_has_coulomb_and_lennard_jones_and_nothing_else() -> None:
@@ -209,27 +211,27 @@ def test_an_open_pair_has_coulomb_and_lennard_jones_and_nothing_else() -> None:
 def test_molecules_may_be_broken_by_the_edge_or_lie_in_other_cells(method: str) -> None:
     atoms = plain.box_of({"tip3p": 64}, 14.0, seed=7)
     calc = potential("tip3p", method)
-    found = calc.evaluate(atoms)
+    evaluated = calc.evaluate(atoms)
     moved = atoms.copy()
     moved.positions += (5.0, -3.3, 8.1)
     moved.wrap()
     assert np.ptp(moved.positions[:, 0].reshape(-1, 3), axis=1).max() > 7  # some are broken
     moved.positions += 14.0 * np.random.default_rng(1).integers(-2, 3, size=moved.positions.shape)
     again = potential("tip3p", method).evaluate(moved)
-    assert again.energy_ev == pytest.approx(found.energy_ev, rel=1e-11)  # round-off of positions, terms that cancel
-    difference = again.forces_ev_per_angstrom - found.forces_ev_per_angstrom
-    assert np.abs(difference).max() < 1e-11 * np.abs(found.forces_ev_per_angstrom).max()  # the same
+    assert again.energy_ev == pytest.approx(evaluated.energy_ev, rel=1e-11)  # round-off of positions, terms that cancel
+    difference = again.forces_ev_per_angstrom - evaluated.forces_ev_per_angstrom
+    assert np.abs(difference).max() < 1e-11 * np.abs(evaluated.forces_ev_per_angstrom).max()  # the same
 
 
 def test_threads_change_the_last_digits_only_and_repeat_bit_for_bit() -> None:
     atoms = plain.box_of({"spce": 125}, 16.0, seed=8)
-    one = potential("spce", "ewald").evaluate(atoms)
+    evaluated = potential("spce", "ewald").evaluate(atoms)
     two = [potential("spce", "ewald", threads=2).evaluate(atoms) for _ in range(2)]
     assert two[0].energy_ev == two[1].energy_ev
     assert (two[0].forces_ev_per_angstrom == two[1].forces_ev_per_angstrom).all()
-    assert two[0].energy_ev == pytest.approx(one.energy_ev, rel=1e-12)  # another order of the sum
-    difference = np.abs(two[0].forces_ev_per_angstrom - one.forces_ev_per_angstrom).max()
-    assert difference < 1e-12 * np.abs(one.forces_ev_per_angstrom).max()  # the same
+    assert two[0].energy_ev == pytest.approx(evaluated.energy_ev, rel=1e-12)  # another order of the sum
+    difference = np.abs(two[0].forces_ev_per_angstrom - evaluated.forces_ev_per_angstrom).max()
+    assert difference < 1e-12 * np.abs(evaluated.forces_ev_per_angstrom).max()  # the same
 
 
 def test_reset_gives_the_bits_of_a_new_calculator() -> None:
@@ -246,22 +248,22 @@ def test_reset_gives_the_bits_of_a_new_calculator() -> None:
 def test_ase_gets_what_is_asked_for_and_nothing_is_reckoned_twice() -> None:
     atoms = plain.box_of({"spce": 125}, 16.0, seed=8)
     calc = RigidPotential("spce", cutoff_angstrom=7.0)
-    asked: list[int] = []
+    requests: list[int] = []
     plainly = calc.evaluate
-    calc.evaluate = lambda box: (asked.append(1), plainly(box))[1]
+    calc.evaluate = lambda box: (requests.append(1), plainly(box))[1]
     atoms.calc = calc
     with pytest.raises(ValueError, match="no atoms were given"):
         calc.get_potential_energy()
     forces = atoms.get_forces()
     assert atoms.get_potential_energy() == math.fsum(calc.terms_ev.values())
     assert len(atoms.get_stress()) == 6
-    assert len(asked) == 1
+    assert len(requests) == 1
     forces[:] = 0.0  # a copy
     assert atoms.get_forces().any()
     atoms.positions[0:3] += 1e-12
     assert calc.get_property("energy", atoms, allow_calculation=False) is None
     atoms.get_forces()
-    assert (len(asked), calc.rebuilds) == (2, 1)  # lists outlive a small move
+    assert (len(requests), calc.rebuilds) == (2, 1)  # lists outlive a small move
     atoms.set_cell([16.1] * 3)
     expected = RigidPotential("spce", cutoff_angstrom=7.0).evaluate(atoms).energy_ev
     assert atoms.get_potential_energy() == expected
@@ -314,9 +316,9 @@ def printed(values: list[float]) -> list[str]:
 @pytest.mark.parametrize("number", SAMPLES)
 def test_nist_water_to_all_printed_digits(number: int, shared: Path) -> None:
     """Term by term; the printed total is the sum of the printed terms."""
-    found = printed(terms_k(sample(number, shared)))
-    assert found == printed(list(SAMPLES[number][:6]))
-    assert f"{sum(float(x) for x in found):.5e}" == f"{SAMPLES[number][6]:.5e}"
+    computed = printed(terms_k(sample(number, shared)))
+    assert computed == printed(list(SAMPLES[number][:6]))
+    assert f"{sum(float(x) for x in computed):.5e}" == f"{SAMPLES[number][6]:.5e}"
 
 
 @pytest.mark.oracle

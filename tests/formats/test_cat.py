@@ -427,5 +427,5 @@ def test_wide_numbers_in_a_long_list_are_spelled_as_one_by_one(monkeypatch):
     columns = (frequency, rng.uniform(0, 2e3, n), lgint, np.full(n, 3), rng.uniform(0, 9e4, n), rng.integers(1, 900, n))
     catalogue = Catalogue(*columns, np.full(n, 1), np.full(n, 303), quanta, quanta)
     together = format_lines(catalogue)
-    monkeypatch.setattr(cat, "_wide_rows", lambda *given: None)
+    monkeypatch.setattr(cat, "_wide_rows", lambda *arguments: None)
     assert together == format_lines(catalogue)

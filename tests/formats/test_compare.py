@@ -13,7 +13,7 @@ from rotor.formats.spcat.compare import agreement, compare, in_mhz, likely_tempe
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Layout
 
-ONE = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  28503 101 1           0           \n"
+FIRST_LINE = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  28503 101 1           0           \n"
 TWO = b"  230538.0000  0.0005 -4.1197 2    3.8450  5 -28503 101 2           1           \n"
 DOUBLET = (
     b"   73577.4513  0.0000 -3.8105 3   48.3748 18  41505 202 4-3         3 3         \n"
@@ -30,18 +30,18 @@ def test_a_list_is_equal_to_itself_and_a_change_is_seen():
     rng = np.random.default_rng(1)
     shuffled = ours.take(rng.permutation(len(ours))[5:])
     shuffled = replace(shuffled, frequency_mhz=shuffled.frequency_mhz + 0.25)
-    found = compare(ours, shuffled)
-    assert (len(found.of_ours), len(found.missing), len(found.extra)) == (len(ours) - 5, 5, 0)
-    np.testing.assert_allclose(found.differences("frequency_mhz"), 0.25, atol=1e-9)  # round-off of 1e7 MHz
+    comparison = compare(ours, shuffled)
+    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra)) == (len(ours) - 5, 5, 0)
+    np.testing.assert_allclose(comparison.differences("frequency_mhz"), 0.25, atol=1e-9)  # round-off of 1e7 MHz
     assert len(compare(shuffled, ours).extra) == 5
 
 
 def test_components_of_a_doublet_are_one_line_whatever_the_signs():
     merged = replace(read_cat(DOUBLET).take([0]), lgint=[np.log10(2) - 3.8105], g_upper=[36])
-    found = compare(read_cat(DOUBLET), merged)
-    assert (len(found.of_ours), len(found.missing), len(found.extra)) == (1, 0, 0)
-    assert found.differences("lgint")[0] == pytest.approx(0, abs=1e-12)  # round-off
-    assert found.differences("g_upper")[0] == 0
+    comparison = compare(read_cat(DOUBLET), merged)
+    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra)) == (1, 0, 0)
+    assert comparison.differences("lgint")[0] == pytest.approx(0, abs=1e-12)  # round-off
+    assert comparison.differences("g_upper")[0] == 0
     apart = replace(read_cat(DOUBLET), frequency_mhz=[73577.4513, 73577.4523])
     assert len(compare(read_cat(DOUBLET), apart).extra) == 1  # 1 kHz apart: two lines
 
@@ -49,8 +49,8 @@ def test_components_of_a_doublet_are_one_line_whatever_the_signs():
 def test_lines_of_other_states_are_counted_not_compared():
     ground = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  285031202 1 0         0 0         \n"
     excited = b"  114221.7523  0.0005 -9.0105 2 2143.2711  3  285031202 1 1         0 1         \n"
-    found = compare(read_cat(ground + excited), read_cat(ONE))
-    assert (len(found.of_ours), len(found.missing), found.other_states) == (1, 0, 1)
+    comparison = compare(read_cat(ground + excited), read_cat(FIRST_LINE))
+    assert (len(comparison.of_ours), len(comparison.missing), comparison.other_states) == (1, 0, 1)
 
 
 def test_strengths_of_many_decades_are_added_without_loss():
@@ -59,26 +59,26 @@ def test_strengths_of_many_decades_are_added_without_loss():
 
 
 def test_wavenumbers_become_mhz():
-    line = read_cat(ONE.replace(b"  115271.2018  0.0005", b"       3.8450 -0.0005"))
+    line = read_cat(FIRST_LINE.replace(b"  115271.2018  0.0005", b"       3.8450 -0.0005"))
     assert [float(x[0]) for x in in_mhz(line)] == pytest.approx([3.845 * 29979.2458, 0.0005 * 29979.2458], rel=1e-12)
-    infrared = replace(read_cat(ONE), frequency_mhz=[2.0], error_mhz=[0.5], layout=Layout(decimals=(6, 6, 4, 4)))
+    infrared = replace(read_cat(FIRST_LINE), frequency_mhz=[2.0], error_mhz=[0.5], layout=Layout(decimals=(6, 6, 4, 4)))
     assert [float(x[0]) for x in in_mhz(infrared)] == pytest.approx([2 * 29979.2458, 0.5 * 29979.2458], rel=1e-12)
 
 
 def test_agreement_counts_measured_lines_alone():
-    predicted = replace(read_cat(ONE + TWO), frequency_mhz=[0.0, 230538.0014], tag=[28503, 28503])
-    found = agreement(compare(read_cat(ONE + TWO), predicted))
-    assert (found.lines, found.within_3_sigma, found.no_error) == (1, 1.0, 0)  # 1.4 kHz, σ 0.5 kHz
-    assert found.median_mhz == found.rms_mhz == pytest.approx(0.0014, abs=1e-9)  # round-off of 1e5 MHz
+    predicted = replace(read_cat(FIRST_LINE + TWO), frequency_mhz=[0.0, 230538.0014], tag=[28503, 28503])
+    computed = agreement(compare(read_cat(FIRST_LINE + TWO), predicted))
+    assert (computed.lines, computed.within_3_sigma, computed.no_error) == (1, 1.0, 0)  # 1.4 kHz, σ 0.5 kHz
+    assert computed.median_mhz == computed.rms_mhz == pytest.approx(0.0014, abs=1e-9)  # round-off of 1e5 MHz
     further = replace(predicted, frequency_mhz=[0.0, 230538.0016])
-    assert agreement(compare(read_cat(ONE + TWO), further)).within_3_sigma == 0.0
-    exact = replace(read_cat(ONE + TWO), error_mhz=[0.0, 0.0])
+    assert agreement(compare(read_cat(FIRST_LINE + TWO), further)).within_3_sigma == 0.0
+    exact = replace(read_cat(FIRST_LINE + TWO), error_mhz=[0.0, 0.0])
     assert agreement(compare(exact, further)).no_error == 1
-    assert agreement(compare(read_cat(ONE), predicted)).lines == 0
+    assert agreement(compare(read_cat(FIRST_LINE), predicted)).lines == 0
 
 
 def test_measured_lines_take_their_places():
-    predicted = read_cat(DOUBLET + ONE + TWO.replace(b"-28503", b" 28503"))
+    predicted = read_cat(DOUBLET + FIRST_LINE + TWO.replace(b"-28503", b" 28503"))
     measured = read_cat(
         TWO + DOUBLET[:81].replace(b"73577.4513  0.0000", b"240000.123  0.0300").replace(b"  41505", b" -41505")
     )
@@ -94,7 +94,7 @@ def test_measured_lines_take_their_places():
 def test_two_measured_frequencies_of_one_label_are_refused():
     twice = read_cat(TWO + TWO.replace(b"230538.0000", b"230539.0000"))
     with pytest.raises(ValueError, match="have one label"):
-        with_measured_lines(read_cat(ONE), twice)
+        with_measured_lines(read_cat(FIRST_LINE), twice)
 
 
 SPLIT = (  # J = 1 - 0 of CH3-37Cl (JPL, c052009): F = 5/2, 1/2, 3/2 above F = 3/2, rounded up
@@ -106,13 +106,18 @@ WHOLE = b"   26175.5000  0.0010 -5.3300 3    0.0000  6  52009 202 1 0         0 
 
 
 def test_components_of_a_spin_are_one_line_beside_a_list_without():
-    found = compare(read_cat(SPLIT), read_cat(WHOLE))
-    assert (len(found.of_ours), len(found.missing), len(found.extra), found.collapsed) == (1, 0, 0, True)
+    comparison = compare(read_cat(SPLIT), read_cat(WHOLE))
+    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra), comparison.collapsed) == (
+        1,
+        0,
+        0,
+        True,
+    )
     weights = 10.0 ** np.array([-5.8078, -5.6313, -6.1082])
     centre = weights @ [26164.4901, 26179.2202, 26190.9981] / weights.sum()
-    assert found.reference.frequency_mhz[0] == pytest.approx(centre, abs=1e-9)  # round-off of 3e4 MHz
-    assert found.reference.lgint[0] == pytest.approx(np.log10(weights.sum()), abs=1e-12)  # round-off
-    assert found.reference.tag[0] == 52009  # one component was not measured
+    assert comparison.reference.frequency_mhz[0] == pytest.approx(centre, abs=1e-9)  # round-off of 3e4 MHz
+    assert comparison.reference.lgint[0] == pytest.approx(np.log10(weights.sum()), abs=1e-12)  # round-off
+    assert comparison.reference.tag[0] == 52009  # one component was not measured
     turned = compare(read_cat(WHOLE), read_cat(SPLIT))
     assert turned.differences("frequency_mhz")[0] == pytest.approx(centre - 26175.5, abs=1e-9)  # round-off
     assert not compare(read_cat(SPLIT), read_cat(SPLIT)).collapsed
@@ -126,11 +131,14 @@ def test_a_catalogue_with_quadrupole_splitting_meets_an_unsplit_prediction(share
     # round constants that its own lines of low J and K give
     top = rotor.Top.from_constants("A=156051.5 B=13088.168 DJ=0.01753 DJK=0.1937 MHz", dipole_abc_debye=(1.9, 0, 0))
     ours = catalogue(rotor.api.line_list(top, jmax=82, min_lgint=-99.0, untrusted=True))
-    found = compare(reference, ours)
-    assert found.collapsed
-    assert (len(found.of_ours), len(found.missing)) == (1186, 0)  # every line of the catalogue has its partner
-    off = np.abs(found.differences("frequency_mhz")) / found.reference.frequency_mhz[found.of_reference]
-    j, k = np.abs(found.reference.quanta_upper[found.of_reference, :2].T)
+    comparison = compare(reference, ours)
+    assert comparison.collapsed
+    assert (len(comparison.of_ours), len(comparison.missing)) == (
+        1186,
+        0,
+    )  # every line of the catalogue has its partner
+    off = np.abs(comparison.differences("frequency_mhz")) / comparison.reference.frequency_mhz[comparison.of_reference]
+    j, k = np.abs(comparison.reference.quanta_upper[comparison.of_reference, :2].T)
     inside = (j <= 49) & (k <= 9)
     assert inside.sum() == 445
     assert off[inside].max() < 3e-5  # 2.7e-5: constants without sextic terms

@@ -40,14 +40,16 @@ def test_the_page_has_the_rows_and_texts_of_its_script(make):
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("label", [pytest.param(one, marks=pytest.mark.slow) if one != "OCS" else one for one in ROWS])
+@pytest.mark.parametrize(
+    "label", [pytest.param(label, marks=pytest.mark.slow) if label != "OCS" else label for label in ROWS]
+)
 def test_a_row_made_anew_is_that_of_the_page(shared, make, label):
     """Lines, reduction and number of constants as they stand there; the rms to the last digit."""
     page = make.PAGE.read_text(encoding="utf-8")
     written = next(cells(line) for line in page.splitlines() if cells(line)[0] == label)
-    found = cells(make.row(label, shared))
-    assert found[:7] == written[:7]
-    assert float(found[7]) == pytest.approx(float(written[7]), abs=0.011)  # two decimals, one unit of the last
+    computed = cells(make.row(label, shared))
+    assert computed[:7] == written[:7]
+    assert float(computed[7]) == pytest.approx(float(written[7]), abs=0.011)  # two decimals, one unit of the last
 
 
 @pytest.mark.oracle
@@ -56,11 +58,13 @@ def test_no_smooth_model_meets_the_lines_of_hnco(shared, make):
     lines, _ = read_assigned_lines(shared / "reference/library_lines/c043002.cat.gz", ("j", "ka", "kc"))
     worst = "34 1 34 - 35 0 35"
     for power, coefficients, rms in ((3, 32, 3.36), (8, 54, 2.97)):
-        found = make.ladders(lines, power)
-        assert found[:2] == (coefficients, pytest.approx(rms, abs=0.005))  # two decimals are written
-        assert 19 < found[2][worst] < 22.5
+        computed = make.ladders(lines, power)
+        assert computed[:2] == (coefficients, pytest.approx(rms, abs=0.005))  # two decimals are written
+        assert 19 < computed[2][worst] < 22.5
     text = [lines.text(i) for i in range(len(lines))]
-    without = lines.take(np.array([one != worst for one in text]))
+    without = lines.take(np.array([line != worst for line in text]))
     assert make.ladders(without, 4)[1] == pytest.approx(1.17, abs=0.005)  # the same
     more = {worst, "10 1 9 - 9 1 8", "9 1 9 - 8 1 8", "2 1 2 - 1 1 1", "8 1 8 - 7 1 7"}
-    assert make.ladders(lines.take(np.array([one not in more for one in text])), 3)[1] == pytest.approx(0.85, abs=0.005)
+    assert make.ladders(lines.take(np.array([line not in more for line in text])), 3)[1] == pytest.approx(
+        0.85, abs=0.005
+    )

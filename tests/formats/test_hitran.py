@@ -61,14 +61,14 @@ def test_lines_of_co_are_those_of_hitran(tmp_path):
     """J = 2 - 1 of 12C16O, whose abundance HITRAN has as 0.986544: frequency, S, A, E″, weights and labels."""
     lines = rotor.api.line_list(rotor.read("CO"), temperature_k=296.0, jmax=30)
     rotor.write(lines, tmp_path / "co.hitran", settings={"molecule": 5, "isotopologue": 1, "abundance": 0.986544})
-    made, theirs = rotor.read(tmp_path / "co.hitran").record(1), read_hitran(SAMPLE).record(9)
-    assert made["wavenumber_cm"] == pytest.approx(theirs["wavenumber_cm"], abs=1.1e-6)  # print
-    assert made["intensity_cm"] == pytest.approx(
+    ours, theirs = rotor.read(tmp_path / "co.hitran").record(1), read_hitran(SAMPLE).record(9)
+    assert ours["wavenumber_cm"] == pytest.approx(theirs["wavenumber_cm"], abs=1.1e-6)  # print
+    assert ours["intensity_cm"] == pytest.approx(
         theirs["intensity_cm"], rel=0.01
     )  # HITRAN states 1 to 2 % (code 7 or 8)
-    assert made["einstein_a_per_s"] == pytest.approx(theirs["einstein_a_per_s"], rel=1e-3)  # as above
+    assert ours["einstein_a_per_s"] == pytest.approx(theirs["einstein_a_per_s"], rel=1e-3)  # as above
     for name in ("energy_lower_cm", "g_upper", "g_lower", "local_upper", "local_lower", "global_upper", "molecule"):
-        assert made[name] == theirs[name]
+        assert ours[name] == theirs[name]
     assert all(len(line) == 160 for line in (tmp_path / "co.hitran").read_text().splitlines())
 
 
@@ -84,8 +84,8 @@ def test_labels_of_other_tops():
 
 def test_inversion_states_are_called_by_their_names():
     lines = rotor.api.line_list(rotor.read("NH3"), temperature_k=296.0, jmax=2)
-    found = hitran_lines(lines, molecule=11)
-    pairs = set(zip(map(str.strip, found.global_upper), map(str.strip, found.global_lower), strict=True))
+    computed = hitran_lines(lines, molecule=11)
+    pairs = set(zip(map(str.strip, computed.global_upper), map(str.strip, computed.global_lower), strict=True))
     assert pairs == {("0-", "0+"), ("0+", "0-")}
 
 
@@ -156,10 +156,10 @@ def test_mutated_records_are_read_and_come_back_or_are_refused():
     rng, read = np.random.default_rng(3), 0
     for _ in range(1500):
         text = mutated(TEXT, rng)
-        found = read_or_refuse(text)
-        if isinstance(found, str):
-            assert "the text given, line " in found
+        computed = read_or_refuse(text)
+        if isinstance(computed, str):
+            assert "the text given, line " in computed
         else:
-            assert format_hitran(found) == text
+            assert format_hitran(computed) == text
             read += 1
     assert 100 < read < 1400  # both outcomes are really tried

@@ -76,8 +76,8 @@ def test_mistakes_in_a_molecule_file_are_named(acetaldehyde, line, wrong, text):
 
 def test_the_partition_function_is_that_of_the_lille_database(acetaldehyde):
     """https://lsd.univ-lille.fr/table/5: Q with A and E levels of v_t up to 8 alike, as here; its constants have higher orders."""
-    found = rotor.partition_function(rotor.read(acetaldehyde), [9.375, 37.5])
-    assert found.q.tolist() == pytest.approx([135.028, 1077.01], rel=1.5e-3)
+    partition = rotor.partition_function(rotor.read(acetaldehyde), [9.375, 37.5])
+    assert partition.q.tolist() == pytest.approx([135.028, 1077.01], rel=1.5e-3)
 
 
 def test_lines_on_the_command_line_have_species_and_torsional_states(acetaldehyde, tmp_path, call):
@@ -143,8 +143,8 @@ def test_spin_weights_are_those_of_the_hydrogens_that_turn(isotopes, weights):
     molecule = rotor.read("SMILES:CC=O").molecule
     top = with_internal_rotation(Top.from_molecule(molecule.with_isotopes(isotopes) if isotopes else molecule))
     levels = rotor.api.solve_levels(top, 0)
-    found = [int(levels.weight[levels.find(species=name, vt=0, j=0, ka=0, kc=0)]) for name in "AE"]
-    assert tuple(found) == weights
+    computed = [int(levels.weight[levels.find(species=name, vt=0, j=0, ka=0, kc=0)]) for name in "AE"]
+    assert tuple(computed) == weights
 
 
 def test_a_barrier_by_a_scan_is_that_of_the_torsion():
@@ -222,20 +222,20 @@ def test_a_field_on_a_molecule_with_spins_has_species_and_spins(acetaldehyde, ca
 
 def test_raman_lines_of_both_species_have_the_strengths_of_a_rigid_top(call, tmp_path):
     """v_t = 0 behind 408 cm-1, the tensor turned into the frame of rho: S of A as of the rigid top, of E twice as much."""
-    found = {}
+    results = {}
     for name, options in {"rigid": (), "turning": ("--internal-rotation", "geometry")}.items():
         path = tmp_path / f"{name}.csv"
         tensor = ("--polarizability", "5,4.4,4", "--temperature", "20", "--jmax", "2", "--csv", str(path))
         assert call("raman", "SMILES:CC=O", *options, *tensor)[0] == 0
         rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-        found[name] = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
-    strength = next(key for key in found["rigid"][0] if key.startswith("strength"))
+        results[name] = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
+    strength = next(key for key in results["rigid"][0] if key.startswith("strength"))
 
     def of(row):
         return tuple(row[key] for key in row if key.split("_")[0] in ("j", "ka", "kc"))
 
-    rigid = {of(row): float(row[strength]) for row in found["rigid"]}
-    turning = [row for row in found["turning"] if {row[key] for key in row if key.startswith("vt_")} == {"0"}]
+    rigid = {of(row): float(row[strength]) for row in results["rigid"]}
+    turning = [row for row in results["turning"] if {row[key] for key in row if key.startswith("vt_")} == {"0"}]
     compared = 0
     for row in turning:
         species = {row[key] for key in row if key.startswith("species_")}

@@ -43,7 +43,7 @@ def test_every_measured_line_is_where_it_was_measured(shared, name, tag, jmax):
     """Negative tags of the catalogue; with the constants alone D2O missed one by GHz."""
     folders = (shared / "reference" / folder for folder in ("catalogues", "library_lines"))
     path = next(folder / f"{tag}.cat.gz" for folder in folders if (folder / f"{tag}.cat.gz").is_file())
-    found = read_cat(gzip.decompress(path.read_bytes()))
+    catalogue = read_cat(gzip.decompress(path.read_bytes()))
     lines = rotor.api.line_list(rotor.read(name), jmax=jmax, min_lgint=None, q=1.0)
     ends = [
         np.stack([lines.columns[f"{n}_{end}"] for n in ("j", "ka", "kc")], axis=1).tolist()
@@ -51,11 +51,11 @@ def test_every_measured_line_is_where_it_was_measured(shared, name, tag, jmax):
     ]
     ours = {(tuple(u), tuple(v)): f for u, v, f in zip(*ends, lines.frequency_mhz.tolist(), strict=True)}
     compared = 0
-    for i in np.flatnonzero(np.asarray(found.tag) < 0).tolist():
-        key = tuple(tuple(x[i, :3].tolist()) for x in (found.quanta_upper, found.quanta_lower))
+    for i in np.flatnonzero(np.asarray(catalogue.tag) < 0).tolist():
+        key = tuple(tuple(x[i, :3].tolist()) for x in (catalogue.quanta_upper, catalogue.quanta_lower))
         if max(key[0][0], key[1][0]) <= jmax and key in ours:
-            allowed = 0.001 + 3 * float(found.error_mhz[i])  # what the file says of itself
-            assert abs(ours[key] - found.frequency_mhz[i]) <= allowed
+            allowed = 0.001 + 3 * float(catalogue.error_mhz[i])  # what the file says of itself
+            assert abs(ours[key] - catalogue.frequency_mhz[i]) <= allowed
             compared += 1
     assert compared > 40
 
@@ -70,8 +70,8 @@ def test_lines_of_a_tabulated_molecule_are_between_tabulated_levels(name):
         assert (top.level_table.rows_of(labels) >= 0).all()
     assert not any("does not converge" in text for text in lines.warnings)
     assert any("left out" in text for text in lines.warnings) == (lines.untrusted > 0)
-    given = top.with_constants(top.constants)  # without the table
-    assert any("does not converge" in text for text in rotor.api.line_list(given).warnings)
+    without = top.with_constants(top.constants)  # without the table
+    assert any("does not converge" in text for text in rotor.api.line_list(without).warnings)
 
 
 def test_lines_between_tabulated_levels_have_no_error_of_the_constants():

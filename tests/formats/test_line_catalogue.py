@@ -42,7 +42,7 @@ def test_catalogue_of_cdms_gives_back_its_species(folder: Path) -> None:
         [str(folder / "cdms")],
         SourceFacts(citation="Endres 2016", inchikeys={"28503": "UGFAIRIUMAVXCW-UHFFFAOYSA-N"}),
     )
-    assert [(one.species, one.lines, one.fault) for one in report] == [("CO, v=0", 3, None)]
+    assert [(entry.species, entry.lines, entry.fault) for entry in report] == [("CO, v=0", 3, None)]
     direct = read_cat_species(folder / "cdms" / "c028503.cat")
     with LineCatalogue(folder / "a.rotorcat") as catalogue:
         for word in ("CO, v=0", "CO", "28503", "UGFAIRIUMAVXCW-UHFFFAOYSA-N"):
@@ -77,7 +77,7 @@ def test_faulty_line_is_named_and_the_others_are_added(folder: Path) -> None:
     bad[1] = bad[1].replace("-4.1197", "-4.1x97")
     (folder / "cdms" / "c000001.cat").write_text("".join(bad))
     report = add_sources(folder / "a.rotorcat", [str(folder / "cdms")])
-    assert [one.fault is None for one in report] == [False, True]
+    assert [entry.fault is None for entry in report] == [False, True]
     assert "c000001.cat" in str(report[0].fault)
     assert "line 2" in str(report[0].fault)
     with LineCatalogue(folder / "a.rotorcat") as catalogue:
@@ -203,7 +203,11 @@ def test_every_catalogue_of_the_reference_is_parsed(tmp_path: Path) -> None:
         archive.extractall(tmp_path / "cdms", filter="data")
     assert len(read_catdir(folder / "catdir_jpl.cat")) == 401
     report = add_sources(tmp_path / "a.rotorcat", [str(tmp_path / "cdms")], catdir=str(folder / "catdir_cdms.cat"))
-    assert (len(report), [one for one in report if one.fault], sum(one.lines for one in report)) == (105, [], 3496)
+    assert (len(report), [entry for entry in report if entry.fault], sum(entry.lines for entry in report)) == (
+        105,
+        [],
+        3496,
+    )
     with LineCatalogue(tmp_path / "a.rotorcat") as catalogue:
         assert not any(catalogue.species().facts["note"])
 

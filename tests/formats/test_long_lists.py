@@ -153,12 +153,12 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
     from rotor.formats import streamed_lines
 
     monkeypatch.setattr(streamed_lines, "PIECE_LINES", 2_000)
-    made, true = [], streamed_lines._make_piece
+    pieces, true = [], streamed_lines._make_piece
 
     def stopping(plan, first, last):
-        if len(made) == 3:
+        if len(pieces) == 3:
             raise KeyboardInterrupt
-        made.append(first)
+        pieces.append(first)
         true(plan, first, last)
 
     with monkeypatch.context() as patch:
@@ -172,10 +172,10 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
         assert Path("a.cat.pieces").is_dir()
         assert not Path("a.cat").exists()
         patch.setattr(
-            streamed_lines, "_make_piece", lambda plan, first, last: (made.append(first), true(plan, first, last))
+            streamed_lines, "_make_piece", lambda plan, first, last: (pieces.append(first), true(plan, first, last))
         )
         assert call(*TYPED, "--cat", "a.cat")[0] == 0
-    assert len(made) == len(set(made))  # no piece twice
+    assert len(pieces) == len(set(pieces))  # no piece twice
     assert not Path("a.cat.pieces").exists()
 
 

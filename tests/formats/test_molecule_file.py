@@ -111,7 +111,7 @@ def test_a_byte_order_mark_is_skipped_and_other_encodings_are_told(tmp_path):
         read_molecule_file(tmp_path / "latin.toml")
 
 
-def same(one: MoleculeFile, other: MoleculeFile) -> None:
+def same(file: MoleculeFile, other: MoleculeFile) -> None:
     for key in (
         "name",
         "names",
@@ -123,18 +123,18 @@ def same(one: MoleculeFile, other: MoleculeFile) -> None:
         "serves",
         "unverified",
     ):
-        assert getattr(one, key) == getattr(other, key), key
-    assert (one.geometry_kind, one.vibrational_difference) == (other.geometry_kind, other.vibrational_difference)
-    assert (one.molecule is None) == (other.molecule is None)
-    if one.molecule:
-        assert one.molecule.nuclei == other.molecule.nuclei
-        assert one.molecule.charge == other.molecule.charge
-        assert one.molecule.electronic == other.molecule.electronic
-        assert np.array_equal(one.molecule.positions_angstrom, other.molecule.positions_angstrom)
-    assert (one.levels is None) == (other.levels is None)
-    if one.levels is not None:
-        assert one.levels.columns.keys() == other.levels.columns.keys()
-        assert all((column == other.levels.columns[name]).all() for name, column in one.levels.columns.items())
+        assert getattr(file, key) == getattr(other, key), key
+    assert (file.geometry_kind, file.vibrational_difference) == (other.geometry_kind, other.vibrational_difference)
+    assert (file.molecule is None) == (other.molecule is None)
+    if file.molecule:
+        assert file.molecule.nuclei == other.molecule.nuclei
+        assert file.molecule.charge == other.molecule.charge
+        assert file.molecule.electronic == other.molecule.electronic
+        assert np.array_equal(file.molecule.positions_angstrom, other.molecule.positions_angstrom)
+    assert (file.levels is None) == (other.levels is None)
+    if file.levels is not None:
+        assert file.levels.columns.keys() == other.levels.columns.keys()
+        assert all((column == other.levels.columns[name]).all() for name, column in file.levels.columns.items())
 
 
 @pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)

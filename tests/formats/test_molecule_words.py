@@ -116,18 +116,18 @@ def test_lines_in_every_format(tmp_path, suffix):
         again = rotor.read(path)
         assert isinstance(again, Catalogue)
         assert set(again.tag.tolist()) == {28503}
-        found = again.frequency_mhz
+        computed = again.frequency_mhz
     elif suffix == ".csv":
-        found = pl.read_csv(path)["frequency_mhz"].to_numpy()
+        computed = pl.read_csv(path)["frequency_mhz"].to_numpy()
     elif suffix == ".parquet":
-        found = pl.read_parquet(path)["frequency_mhz"].to_numpy()
+        computed = pl.read_parquet(path)["frequency_mhz"].to_numpy()
         provenance = json.loads(pl.read_parquet_metadata(path)["provenance"])
     else:
         content = json.loads(path.read_text())
-        found, provenance = [line["frequency_mhz"] for line in content["lines"]], content["provenance"]
+        computed, provenance = [line["frequency_mhz"] for line in content["lines"]], content["provenance"]
     if suffix in (".cat", ".cat.gz", ".csv"):
         provenance = json.loads(Path(f"{path}.provenance.json").read_text())
-    assert np.allclose(found, lines.frequency_mhz, atol=5.1e-5)  # the rounding of a .cat
+    assert np.allclose(computed, lines.frequency_mhz, atol=5.1e-5)  # the rounding of a .cat
     assert provenance["constants"].startswith("B=57635.968")
     assert provenance["command"] == "test"
     assert provenance["temperature_k"] == 100

@@ -29,8 +29,10 @@ def with_free(file, names, errtst):
 
 
 def fitted(file, lines):
-    asked = spfit_input(file, lines)
-    return asked, fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = spfit_input(file, lines)
+    return fit_input, fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +68,14 @@ def test_without_a_limit_the_wrong_lines_count_and_the_fit_says_that_it_failed()
 
 
 def test_zeros_behind_the_quantum_numbers_and_three_digits_of_j(gs):
-    _, asked, _ = gs
-    assert asked.lines.names == ("j", "ka", "kc", "v")
-    assert [100, 1, 100, 0] in asked.lines.upper.tolist()
-    assert [100, 0, 100, 0] in asked.lines.lower.tolist()
-    plain = line_list(asked.lines.upper, asked.lines.lower, asked.lines.frequency_mhz, 0.05)
+    _, fit_input, _ = gs
+    assert fit_input.lines.names == ("j", "ka", "kc", "v")
+    assert [100, 1, 100, 0] in fit_input.lines.upper.tolist()
+    assert [100, 0, 100, 0] in fit_input.lines.lower.tolist()
+    plain = line_list(fit_input.lines.upper, fit_input.lines.lower, fit_input.lines.frequency_mhz, 0.05)
     again = spfit_input(gs[0], plain).lines
-    assert (again.upper == asked.lines.upper).all()
-    assert (again.blend == asked.lines.blend).all()
+    assert (again.upper == fit_input.lines.upper).all()
+    assert (again.blend == fit_input.lines.blend).all()
 
 
 def test_numbers_behind_the_quantum_numbers_that_are_no_zeros_are_an_error(tmp_path: Path):
@@ -92,9 +94,9 @@ def test_a_line_without_digits_ends_the_parameters(gs):
     assert many.parameters == whole.parameters
     assert many.header.npar == 900
     _, fit = fitted(with_free(many, FREE, 20.0), read_lin(GS / "gs.lin", 4))
-    asked = replace(gs[1], file=with_free(many, FREE, 20.0))
+    fit_input = replace(gs[1], file=with_free(many, FREE, 20.0))
     for variances in (True, False):
-        again = read_par(format_par(fitted_file(asked, fit, variances=variances)))
+        again = read_par(format_par(fitted_file(fit_input, fit, variances=variances)))
         assert again.header.npar == len(again.parameters) == 25
 
 
@@ -109,8 +111,8 @@ def test_a_text_behind_the_parameters_is_no_table_of_correlations(gs):
 
 def test_the_correlations_of_a_var_file_are_of_all_parameters_held_ones_too(gs):
     """SPCAT reads as many as there are parameters without a minus sign, and takes none where fewer stand there."""
-    file, asked, fit = gs
-    written = fitted_file(asked, fit, variances=True)
+    file, fit_input, fit = gs
+    written = fitted_file(fit_input, fit, variances=True)
     count = len(file.parameters)
     assert len(written.rest.replace("\n", "")) == 10 * count * (count + 1) // 2
     factor = variance_factor(read_par(format_par(written)))

@@ -47,18 +47,18 @@ def all_tables() -> list[type[Table]]:
     for module in pkgutil.walk_packages(rotor.__path__, "rotor."):
         if not module.name.endswith(("__main__", "_kernels")):
             importlib.import_module(module.name)
-    found: list[type[Table]] = []
+    results: list[type[Table]] = []
     waiting = [Table]
     while waiting:
         below = waiting.pop().__subclasses__()
         waiting += below
-        found += [cls for cls in below if cls.__module__.startswith("rotor.") and not inspect.isabstract(cls)]
-    return found
+        results += [cls for cls in below if cls.__module__.startswith("rotor.") and not inspect.isabstract(cls)]
+    return results
 
 
 def test_every_name_in_the_registry_exists():
-    for one in FORMATS:
-        for name in filter(None, (one.reader, one.recognises, *one.writers, *one.writers.values())):
+    for form in FORMATS:
+        for name in filter(None, (form.reader, form.recognises, *form.writers, *form.writers.values())):
             assert loaded(name) is not None
 
 
@@ -69,7 +69,7 @@ def test_every_table_can_be_written_and_says_where_it_is_from():
 
 
 def test_no_suffix_and_type_have_two_writers():
-    claims = [(suffix, kind) for one in FORMATS for suffix in one.suffixes for kind in one.writers]
+    claims = [(suffix, kind) for form in FORMATS for suffix in form.suffixes for kind in form.writers]
     assert len(claims) == len(set(claims))
 
 

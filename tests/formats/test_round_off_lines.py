@@ -43,8 +43,8 @@ def hamiltonian() -> mp.matrix:
     both += value["40100"] * square * across + value["41000"] * (along**2 * across + across * along**2) / 2
     whole = mp.matrix(3 * size, 3 * size)
     for v, (a, b, c) in enumerate(ABC):
-        own = mp.mpf(ENERGY[v]) * mp.eye(size) + mp.mpf(a) * along**2 + mp.mpf(b) * x**2 + mp.mpf(c) * y**2 + both
-        _put(whole, v, v, own)
+        matrix = mp.mpf(ENERGY[v]) * mp.eye(size) + mp.mpf(a) * along**2 + mp.mpf(b) * x**2 + mp.mpf(c) * y**2 + both
+        _put(whole, v, v, matrix)
     between = {
         (1, 2): mp.mpf("2500") * mp.eye(size),
         (0, 1): mp.mpc(0, 450) * y + mp.mpf("-2.1") * (along * x + x * along),
@@ -73,8 +73,8 @@ def doublet(v: int, ka: int) -> tuple[np.ndarray, np.ndarray]:
     energies, vectors = np.linalg.eigh(plain())
     k = np.abs(np.arange(-N, N + 1))
     share = (np.abs(vectors.reshape(3, 2 * N + 1, -1)[v][k == ka]) ** 2).sum(axis=0)
-    found = np.sort(np.argsort(share)[-2:])
-    return energies[found], vectors[:, found]
+    sorted_energies = np.sort(np.argsort(share)[-2:])
+    return energies[sorted_energies], vectors[:, sorted_energies]
 
 
 def refined(v: int, ka: int) -> tuple[list[mp.mpf], np.ndarray]:
@@ -86,17 +86,17 @@ def refined(v: int, ka: int) -> tuple[list[mp.mpf], np.ndarray]:
     for _ in range(12):  # each gains the ratio of 1e-3 MHz to the distance of other levels, above 1e3 MHz
         columns = mp.qr(inverse * columns, mode="skinny")[0]
     pair = columns.H * hamiltonian() * columns
-    own, turn = mp.eighe((pair + pair.H) / 2)
+    eigenvalues, turn = mp.eighe((pair + pair.H) / 2)
     vectors = columns * turn
-    left_over = hamiltonian() * vectors[:, 0] - own[0] * vectors[:, 0]
+    left_over = hamiltonian() * vectors[:, 0] - eigenvalues[0] * vectors[:, 0]
     assert mp.norm(left_over) < mp.mpf(10) ** (15 - DIGITS)  # of 10^6 MHz, after some thousand sums
-    return [own[0], own[1]], np.array(vectors.tolist(), dtype=complex)
+    return [eigenvalues[0], eigenvalues[1]], np.array(vectors.tolist(), dtype=complex)
 
 
 def lgints(upper: np.ndarray, lower: np.ndarray, energies: tuple[float, float]) -> np.ndarray:
     """LGINT of the four lines between the components of two doublets."""
-    own = reduced_vector(N, N, np.array(DIPOLE), "a")
-    strength = np.abs(upper.conj().T @ np.kron(np.eye(3), own) @ lower) ** 2
+    vector = reduced_vector(N, N, np.array(DIPOLE), "a")
+    strength = np.abs(upper.conj().T @ np.kron(np.eye(3), vector) @ lower) ** 2
     up, low = energies
     population = math.exp(-low / KT_MHZ) - math.exp(-up / KT_MHZ)
     return np.log10(4.16231e-5 * (up - low) * strength * population / Q)
@@ -113,15 +113,15 @@ def test_a_doublet_in_fifty_digits():
         (up, upper), (low, lower) = (refined(v, ka) for _, ka, _, v in LABELS)
         splittings = [float(pair[1] - pair[0]) for pair in (up, low)]
     means = _mean(up), _mean(low)
-    exact, ours = lgints(upper, lower, means).max(), _of_the_package()
+    exact, ours = lgints(upper, lower, means).max(), _package_lgint()
     unit = np.spacing(np.abs(plain()).max())
     assert max(splittings) < 2e-6  # 1.96e-9 and 1.14e-6 MHz, and levels of 7.6e5 MHz end at 1.16e-10 MHz
     assert unit > 1e-10
 
-    found = np.array([lgints(*_disturbed(rng_seed, unit, means), means).max() for rng_seed in range(40)])
+    computed = np.array([lgints(*_disturbed(rng_seed, unit, means), means).max() for rng_seed in range(40)])
     assert abs(exact - LISTED) > TOLERANCE  # -11.39135 and -11.3917; the package has -11.39587
-    assert found.min() < min(exact, LISTED, ours)  # from -11.411
-    assert found.max() > max(exact, LISTED, ours)  # to -11.391
+    assert computed.min() < min(exact, LISTED, ours)  # from -11.411
+    assert computed.max() > max(exact, LISTED, ours)  # to -11.391
 
 
 def _disturbed(seed: int, unit: float, means: tuple[float, float]) -> list[np.ndarray]:
@@ -132,7 +132,7 @@ def _disturbed(seed: int, unit: float, means: tuple[float, float]) -> list[np.nd
     return [vectors[:, np.abs(energies - mean).argsort()[:2]] for mean in means]
 
 
-def _of_the_package() -> float:
+def _package_lgint() -> float:
     lines = prediction(SAMPLES / "three_states_fermi_coriolis").catalogue
     same = (lines.quanta_upper[:, :4] == LABELS[0]).all(axis=1) & (lines.quanta_lower[:, :4] == LABELS[1]).all(axis=1)
     assert same.sum() == 1

@@ -102,7 +102,8 @@ def test_chi_turns_with_the_axes_and_scales_with_q():
     nitrogen = parent.molecule.symbols.index("N") + 1
     deuterated = isotopologue(parent, {parent.molecule.symbols.index("H") + 1: "D"}).top
     fixed = [
-        one.frame.axes.T @ chi_tensor(one.spin_constants.of("14N")) @ one.frame.axes for one in (parent, deuterated)
+        molecule.frame.axes.T @ chi_tensor(molecule.spin_constants.of("14N")) @ molecule.frame.axes
+        for molecule in (parent, deuterated)
     ]
     assert not np.allclose(parent.frame.axes, deuterated.frame.axes, atol=1e-3)
     assert np.allclose(*fixed, rtol=0, atol=1e-5)  # 1e-6 of χ is taken for round-off of the frame
@@ -126,17 +127,17 @@ def test_methyl_chloride_with_the_other_chlorine(shared):
 def test_spin_rotation_follows_the_moments_of_inertia():
     top = rotor.read("CH3Cl", isotopes={2: "37Cl"})
     ratio = top.spin_constants.values["C_iso(37Cl)"] / rotor.read("CH3Cl").spin_constants.values["C_iso(35Cl)"]
-    one, other = (rotor.read("CH3Cl", isotopes=i) for i in ({}, {2: "37Cl"}))
-    g = [x.molecule.nuclei[1].g_factor for x in (one, other)]
-    assert ratio == pytest.approx(g[1] / g[0] * other.constants["B"] / one.constants["B"], rel=1e-6)  # scaled B
+    first, other = (rotor.read("CH3Cl", isotopes=i) for i in ({}, {2: "37Cl"}))
+    g = [x.molecule.nuclei[1].g_factor for x in (first, other)]
+    assert ratio == pytest.approx(g[1] / g[0] * other.constants["B"] / first.constants["B"], rel=1e-6)  # scaled B
 
 
 def test_splittings_by_casimirs_function():
     """Y of J = 1 and I = 3/2 as tabulated: 0.05, -0.2, 0.25 (Gordy and Cook, appendix I)."""
     assert [casimir(3, 1, f) for f in (5, 3, 1)] == pytest.approx([0.05, -0.2, 0.25], abs=1e-15)  # round-off
-    found = splitting_nuclei(rotor.read("CH3Cl"))[0]
-    assert (found.nucleus, found.known) == ("35Cl", True)
-    assert found.splitting_mhz == pytest.approx(26604.3651 - 26570.7288, rel=2e-3)  # c050007; second order
+    computed = splitting_nuclei(rotor.read("CH3Cl"))[0]
+    assert (computed.nucleus, computed.known) == ("35Cl", True)
+    assert computed.splitting_mhz == pytest.approx(26604.3651 - 26570.7288, rel=2e-3)  # c050007; second order
 
 
 def test_formamide_by_the_command_line(capsys):

@@ -48,11 +48,11 @@ def same(streamed: pl.DataFrame, whole: pl.DataFrame) -> None:
 @pytest.mark.parametrize("piece_lines", [1, 4000, 10**9])
 @pytest.mark.parametrize("cut", [None, -9.0])
 def test_pieces_of_any_size_make_the_same_list(tmp_path, piece_lines, cut):
-    made = stream_lines(PROPANEDIOL, tmp_path / "a.parquet", jmax=24, min_lgint=cut, q=1e5, piece_lines=piece_lines)
+    stream = stream_lines(PROPANEDIOL, tmp_path / "a.parquet", jmax=24, min_lgint=cut, q=1e5, piece_lines=piece_lines)
     whole = rotor.api.line_list(PROPANEDIOL, jmax=24, min_lgint=cut, q=1e5)
     same(pl.read_parquet(tmp_path / "a.parquet"), whole.to_polars())
-    assert made.lines == len(whole)
-    assert made.pieces_made == {1: 22, 4000: made.pieces_made, 10**9: 1}[piece_lines]
+    assert stream.lines == len(whole)
+    assert stream.pieces_made == {1: 22, 4000: stream.pieces_made, 10**9: 1}[piece_lines]
     assert [p.name for p in tmp_path.iterdir()] == ["a.parquet"]  # nothing is left behind
 
 
@@ -94,9 +94,9 @@ def test_a_catalogue_is_that_of_the_list_in_memory(tmp_path):
 
 def test_j_max_and_q_are_found_as_in_memory(tmp_path):
     top = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11, 0, 0))
-    made = stream_lines(top, tmp_path / "co.parquet")
+    stream = stream_lines(top, tmp_path / "co.parquet")
     whole = rotor.api.line_list(top)
-    assert (made.jmax, made.lines, made.q) == (whole.jmax, len(whole), whole.q)
+    assert (stream.jmax, stream.lines, stream.q) == (whole.jmax, len(whole), whole.q)
     metadata = json.loads(pl.read_parquet_metadata(tmp_path / "co.parquet")["provenance"])
     assert metadata["q"] == whole.q
 
@@ -115,9 +115,9 @@ def test_a_killed_run_goes_on(tmp_path):
     assert not path.exists()
     left = {p: p.stat().st_mtime_ns for p in pieces.glob("j*.parquet")}
 
-    made = stream_lines(PROPANEDIOL, path, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
-    assert made.pieces_found == len(left) >= 3
-    assert made.pieces_made > 0
+    stream = stream_lines(PROPANEDIOL, path, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
+    assert stream.pieces_found == len(left) >= 3
+    assert stream.pieces_made > 0
     same(pl.read_parquet(path), rotor.api.line_list(PROPANEDIOL, jmax=45, min_lgint=None, q=1e5).to_polars())
     assert not pieces.exists()
 
@@ -153,8 +153,8 @@ def test_pieces_are_used_not_made_anew(tmp_path):
     piece = sorted((tmp_path / "a.parquet.pieces").glob("j*.parquet"))[1]
     lost = len(pl.read_parquet(piece))
     pl.read_parquet(piece).clear().write_parquet(piece)
-    made = stream_lines(PROPANEDIOL, path, jmax=15, q=1e5, piece_lines=1000)
-    assert made.lines == len(rotor.api.line_list(PROPANEDIOL, jmax=15, q=1e5)) - lost
+    stream = stream_lines(PROPANEDIOL, path, jmax=15, q=1e5, piece_lines=1000)
+    assert stream.lines == len(rotor.api.line_list(PROPANEDIOL, jmax=15, q=1e5)) - lost
     assert lost > 0
 
 

@@ -46,8 +46,8 @@ def test_a_linear_triatomic_has_five_degrees_not_six():
 def test_a_bend_of_a_milliradian_is_linear_by_our_rule_and_said():
     """Some programs take it as linear in silence."""
     others = {"OCS": ((12.0, 15.9949, 31.9721), 1.56 / 1.16), "HCN": ((12.0, 1.0078, 14.0031), 1.15 / 1.06)}
-    moments = [bent(1e-3), *(bent(1e-3, *one) for one in others.values())]
-    ratios = [one.min() / one.max() for one in moments]
+    moments = [bent(1e-3), *(bent(1e-3, *other) for other in others.values())]
+    ratios = [moment.min() / moment.max() for moment in moments]
     assert 4.8e-8 < min(ratios) < max(ratios) < 8.5e-8  # what docs/gas.md states
     box = count_degrees([bent(1e-3)])
     assert box.rotation == 2

@@ -96,13 +96,13 @@ def two_domains(rng, noise):
 
 def test_two_domains_and_their_hinge_are_found():
     before, after, (axis, point, angle, shift) = two_domains(np.random.default_rng(8), 0.2)
-    one, two = rigid_parts(before, after, tolerance=1.2)[:2]
-    assert set(range(100)) <= set(one.members)
+    first, two = rigid_parts(before, after, tolerance=1.2)[:2]
+    assert set(range(100)) <= set(first.members)
     assert set(range(100, 170)) <= set(two.members)
-    assert len(one.members) + len(two.members) <= 173  # hardly a point of the loop
+    assert len(first.members) + len(two.members) <= 173  # hardly a point of the loop
     few = rigid_parts(before, after, tolerance=1.2, neighbours=4)[:2]  # first motions of four points are fitted again
-    assert [part.members.tolist() for part in few] == [one.members.tolist(), two.members.tolist()]
-    screw = two.screw_against(one)
+    assert [part.members.tolist() for part in few] == [first.members.tolist(), two.members.tolist()]
+    screw = two.screw_against(first)
     # noise of 0.2 over 70 points of spread 6: 0.2/(6 √70) = 0.004 rad, and 20 times that from the origin
     assert screw.angle == pytest.approx(angle, abs=0.015)
     assert abs(screw.axis @ axis) == pytest.approx(1.0, abs=1e-3)

@@ -366,8 +366,8 @@ if __name__ == "__main__":
 
     with tempfile.TemporaryDirectory() as temporary:
         copy_of_package(Path(temporary))
-        chosen = [one for one in MUTATIONS if not sys.argv[1:] or str(one.case) in sys.argv[1:]]
-        green = [one for one in chosen if not goes_red(one, Path(temporary))]
-    for one in green:
-        print(f"case {one.case}: {one.test} stays green without its safeguard")
+        chosen = [mutation for mutation in MUTATIONS if not sys.argv[1:] or str(mutation.case) in sys.argv[1:]]
+        green = [mutation for mutation in chosen if not goes_red(mutation, Path(temporary))]
+    for mutation in green:
+        print(f"case {mutation.case}: {mutation.test} stays green without its safeguard")
     sys.exit(bool(green))

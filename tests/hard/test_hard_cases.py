@@ -54,10 +54,12 @@ def test_a_and_b_within_1e_10_of_each_other(part):
     energies = np.sort(np.repeat(limit.energy_mhz, np.where(limit.quanta["k"] == 0, 1, 2)))
     shift = 0.5 * b * part * j * (j + 1)  # the mean of A and B
     rounding = ROUNDING * energies.max()
-    found = np.sort(levels.energy_mhz)
-    assert np.abs(found - energies).max() <= 2 * shift + rounding
+    sorted_energies = np.sort(levels.energy_mhz)
+    assert np.abs(sorted_energies - energies).max() <= 2 * shift + rounding
     place = np.flatnonzero(energies == limit.energy_mhz[limit.quanta["k"] == 1])
-    assert np.diff(found[place]) == pytest.approx(shift, rel=1e-2)  # |K| = 1 of an oblate top; rounding of 1e-6 MHz
+    assert np.diff(sorted_energies[place]) == pytest.approx(
+        shift, rel=1e-2
+    )  # |K| = 1 of an oblate top; rounding of 1e-6 MHz
 
 
 def test_j_of_300_sums_to_its_trace():
@@ -73,12 +75,12 @@ def test_j_of_300_sums_to_its_trace():
 def test_a_millikelvin_is_two_levels():
     """Case 34: Q, U and C_v of 1 mK by the lowest two levels, without overflow where the second has exp(-5532)."""
     top = Top.from_constants("B=57635.968 MHz")
-    found = thermodynamic_functions(top, [1e-3, 0.2])
-    x = 2 * 57635.968 / (MHZ_PER_K * found.temperature_k)
+    functions = thermodynamic_functions(top, [1e-3, 0.2])
+    x = 2 * 57635.968 / (MHZ_PER_K * functions.temperature_k)
     first = 3 * np.exp(-x)
-    assert found.q_rot == pytest.approx(1 + first, rel=1e-12)
-    assert found.cv_over_r == pytest.approx(x**2 * first / (1 + first) ** 2, rel=1e-9)  # the third level
-    assert found.cv_over_r[0] == 0.0
+    assert functions.q_rot == pytest.approx(1 + first, rel=1e-12)
+    assert functions.cv_over_r == pytest.approx(x**2 * first / (1 + first) ** 2, rel=1e-9)  # the third level
+    assert functions.cv_over_r[0] == 0.0
 
 
 @pytest.mark.parametrize("least", [1e-12, 1e-6])

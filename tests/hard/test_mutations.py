@@ -22,12 +22,14 @@ def copy(tmp_path_factory):
 
 
 def test_every_text_that_is_replaced_stands_there_once():
-    for one in mutations.MUTATIONS:
-        text = (mutations.ROOT / one.file).read_text(encoding="utf-8")
-        assert text.count(one.old) == 1, f"case {one.case}: {one.file} has changed; write the mutation anew"
+    for mutation in mutations.MUTATIONS:
+        text = (mutations.ROOT / mutation.file).read_text(encoding="utf-8")
+        assert text.count(mutation.old) == 1, (
+            f"case {mutation.case}: {mutation.file} has changed; write the mutation anew"
+        )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mutation", mutations.MUTATIONS, ids=lambda one: f"case {one.case}")
+@pytest.mark.parametrize("mutation", mutations.MUTATIONS, ids=lambda mutation: f"case {mutation.case}")
 def test_a_safeguard_is_missed(mutation, copy):
     assert mutations.goes_red(mutation, copy, before=False)  # the same tests run with the safeguards in place, too

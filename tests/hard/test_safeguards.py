@@ -56,8 +56,8 @@ def test_the_doublet_of_a_near_symmetric_top_is_there(part):
 def test_three_dependent_moments_of_a_planar_molecule_are_named():
     """Case 12: I_c = I_a + I_b, so that a third moment of each species is no third observation."""
     water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
-    rigid = [Top.from_molecule(one).constants for one in (water, water.with_isotopes("H=2H"))]
-    known = [dict(zip("ABC", one.rigid, strict=True)) for one in rigid]
+    rigid = [Top.from_molecule(molecule).constants for molecule in (water, water.with_isotopes("H=2H"))]
+    known = [dict(zip("ABC", constants_.rigid, strict=True)) for constants_ in rigid]
     both = family(water, [("H2O", "", known[0], {}), ("D2O", "H=2H", known[1], {})])
     all_three = fit_structure(both, "r0")
     two = fit_structure(both, "r0", leave_out=("c",))
@@ -71,8 +71,8 @@ def test_labels_are_ranks_whatever_the_grid():
     top = Top.from_constants("A=5655.2654 B=1546.875864 C=1214.40399 MHz", dipole_abc_debye=(4.5152, 0.05, 0))
     ends = []
     for count in (11, 101):
-        found = stark_map(top, np.linspace(0, 150, count), j_highest=2, m_values=(1,), tolerance_mhz=1e-3)
-        ends.append({str(found.label[rows.start]): found.energy_mhz[rows][-1] for rows in found.curves()})
+        stark = stark_map(top, np.linspace(0, 150, count), j_highest=2, m_values=(1,), tolerance_mhz=1e-3)
+        ends.append({str(stark.label[rows.start]): stark.energy_mhz[rows][-1] for rows in stark.curves()})
     assert ends[0].keys() == ends[1].keys()
     assert list(ends[0].values()) == pytest.approx(list(ends[1].values()), abs=2e-3)  # the tolerance, twice
 
@@ -85,9 +85,9 @@ def test_the_factor_of_an_oscillating_field():
 def test_the_growth_of_a_free_body_is_within_its_error_of_zero():
     """Case 27: distances of a free body grow in proportion to time, ln(t)/t in an exponent, which its error must hold."""
     flow = replace(body_flow([1.0, 1.875, 2.875], [0.5, 0.75, 1.0]), timed=True)  # the route that compiles nothing
-    found = lyapunov_exponents(flow, time=200.0, segments=4, tolerance=1e-6)
-    assert found.values[0] > 1e-3  # what is there to be mistaken for chaos
-    assert found.values[0] < 3 * found.errors[0]
+    exponents = lyapunov_exponents(flow, time=200.0, segments=4, tolerance=1e-6)
+    assert exponents.values[0] > 1e-3  # what is there to be mistaken for chaos
+    assert exponents.values[0] < 3 * exponents.errors[0]
 
 
 def test_rotation_has_a_temperature_of_its_own():
@@ -107,5 +107,5 @@ def test_the_steps_of_a_pulse_are_halved_until_they_agree():
 def test_the_edge_of_a_basis_is_empty_whatever_the_tolerance():
     """Case 23: cosines are off by about the population of the two highest J, which a tolerance of the energies says nothing of."""
     top = Top.from_constants("B=1000 MHz", dipole_abc_debye=(3.0, 0.0, 0.0))
-    found = stark_map(top, [0.0, 100.0], j_highest=1, tolerance_mhz=1e7)
-    assert found.edge_population.max() <= MOST_AT_EDGE
+    stark = stark_map(top, [0.0, 100.0], j_highest=1, tolerance_mhz=1e7)
+    assert stark.edge_population.max() <= MOST_AT_EDGE

@@ -35,7 +35,7 @@ def numbers(value):
     return [x for name in fields for x in numbers(getattr(value, name))]
 
 
-def of_motion(motion):
+def motion_numbers(motion):
     return numbers([motion.momentum, motion.attitude, motion.energy])
 
 
@@ -49,7 +49,7 @@ def tumble():
 def stepped(method, effects=(), times=(0.0, 0.7)):
     from rotor.classical.integrators.method import integrate
 
-    return of_motion(integrate(method, MOMENTS, MOMENTUM, times, effects=effects))
+    return motion_numbers(integrate(method, MOMENTS, MOMENTUM, times, effects=effects))
 
 
 def driven(method):
@@ -189,7 +189,7 @@ def methods():
 
 def probes(scenes):
     """A function for each motion, by the name that docs/classical.md gives it."""
-    own = {
+    value = {
         "free motion, `rotor tumble`": tumble,
         "many free bodies, `propagate`": batch,
         "many bodies in a field, `propagate_driven`": batch_in_field,
@@ -201,8 +201,8 @@ def probes(scenes):
         "Lyapunov exponents, of L": lyapunov,
         "Lyapunov exponents, of L and q": lyapunov_in_field,
     }
-    of_scenes = {f"scene {path.stem}": (lambda path=path: scene(path)) for path in sorted(scenes.glob("*.py"))}
-    return own | {f"`{name}`": probe for name, probe in methods().items()} | of_scenes
+    scene_probes = {f"scene {path.stem}": (lambda path=path: scene(path)) for path in sorted(scenes.glob("*.py"))}
+    return value | {f"`{name}`": probe for name, probe in methods().items()} | scene_probes
 
 
 def main():

@@ -20,7 +20,7 @@ def cosines(top: int) -> dict[tuple[int, str], np.ndarray]:
     """φ_pi for p = -1, 0, 1 (spherical, space) and i = a, b, c on |N k m⟩, z = a."""
     states = states_up_to(top)
     index = {s: i for i, s in enumerate(states)}
-    found = {}
+    results = {}
     for p, axis in product((-1, 0, 1), "abc"):
         x, y, z = in_frame(np.eye(3)["abc".index(axis)], "a")
         parts = {0: z, 1: -(x + 1j * y) / np.sqrt(2), -1: (x - 1j * y) / np.sqrt(2)}
@@ -31,19 +31,19 @@ def cosines(top: int) -> dict[tuple[int, str], np.ndarray]:
                 size *= wigner_3j(2 * other, 2, 2 * n, -2 * (m + p), 2 * p, 2 * m)
                 size *= wigner_3j(2 * other, 2, 2 * n, -2 * (k + q), 2 * q, 2 * k)
                 matrix[index[other, k + q, m + p], index[n, k, m]] += parts[q] * size
-        found[p, axis] = matrix
-    return found
+        results[p, axis] = matrix
+    return results
 
 
 def space_cosines(top: int) -> dict[tuple[str, str], np.ndarray]:
     """φ_FI, F = X, Y, Z in space, I = a, b, c in the molecule."""
     phi = cosines(top)
-    found = {}
+    results = {}
     for axis in "abc":
-        found["z", axis] = phi[0, axis]
-        found["x", axis] = (phi[-1, axis] - phi[1, axis]) / np.sqrt(2)
-        found["y", axis] = 1j * (phi[-1, axis] + phi[1, axis]) / np.sqrt(2)
-    return found
+        results["z", axis] = phi[0, axis]
+        results["x", axis] = (phi[-1, axis] - phi[1, axis]) / np.sqrt(2)
+        results["y", axis] = 1j * (phi[-1, axis] + phi[1, axis]) / np.sqrt(2)
+    return results
 
 
 def rotor_matrix(axis: str, top: int) -> np.ndarray:

@@ -97,10 +97,10 @@ class Truth:
         j, sn, cn, dn = self._functions(self.lam * t + self.start)
         pi_u = 2 * j * self.third + sn * mp.elliprf(cn**2, dn**2, 1)
         pi_u += n / 3 * sn**3 * mp.elliprj(cn**2, dn**2, 1, 1 - n * sn**2)
-        own = self.i[self.axis]
+        moment = self.i[self.axis]
         angle = mp.atan2(self.root[0] * sn, self.root[1] * cn) + j * mp.pi
         drift = self.g * (i3 - i1) / (self.lam * i1 * i3) * pi_u
-        return self.g / own * t + self.sign * (drift + angle)
+        return self.g / moment * t + self.sign * (drift + angle)
 
     def at(self, t):
         t = mp.mpf(t)

@@ -50,24 +50,26 @@ def parameter_file(kind: Kind) -> ParameterFile:
 
 def start_of(file: ParameterFile, share: float, rng: np.random.Generator) -> ParameterFile:
     """The file with every free constant off by its own part of itself, those tied to it alike."""
-    factor, made = 1.0, list[Parameter]()
+    factor, parameters = 1.0, list[Parameter]()
     for parameter in file.parameters:
         if not parameter.constrained:
             free = parameter.error is not None and parameter.error > 1.0
             factor = 1 + share * rng.uniform(-1, 1) if free else 1.0
-        made.append(replace(parameter, value=parameter.value * factor))
-    return replace(file, parameters=tuple(made))
+        parameters.append(replace(parameter, value=parameter.value * factor))
+    return replace(file, parameters=tuple(parameters))
 
 
 def lines_of(kind: Kind, file: ParameterFile, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Quanta (n, 2k) of some lines drawn from the predicted ones, and their frequencies with normal errors, MHz."""
     request = f"a kind\n0 1 1000.0 0 {kind.f_end} -30 -30 9999999 300\n{kind.dipoles.strip()}\n"
-    found = predict(file, read_int(request.encode()), as_spcat=True).catalogue
-    width = int((found.quanta_upper[0] != BLANK).sum())
-    quanta = np.concatenate([found.quanta_upper[:, :width], found.quanta_lower[:, :width]], axis=1)
-    strong = np.flatnonzero((found.lgint > np.quantile(found.lgint, 0.3)) & (found.frequency_mhz > 1000.0))
+    prediction = predict(file, read_int(request.encode()), as_spcat=True).catalogue
+    width = int((prediction.quanta_upper[0] != BLANK).sum())
+    quanta = np.concatenate([prediction.quanta_upper[:, :width], prediction.quanta_lower[:, :width]], axis=1)
+    strong = np.flatnonzero(
+        (prediction.lgint > np.quantile(prediction.lgint, 0.3)) & (prediction.frequency_mhz > 1000.0)
+    )
     rows = np.sort(rng.choice(strong, size=min(kind.lines, len(strong)), replace=False))
-    return quanta[rows].astype(int), found.frequency_mhz[rows] + ERROR_MHZ * rng.normal(size=len(rows))
+    return quanta[rows].astype(int), prediction.frequency_mhz[rows] + ERROR_MHZ * rng.normal(size=len(rows))
 
 
 def lin_text(quanta: np.ndarray, frequency: np.ndarray, rng: np.random.Generator, *, plain: bool = False) -> str:

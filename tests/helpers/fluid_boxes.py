@@ -64,11 +64,11 @@ def box_of(*names, spacing=3.2, seed=1):
     box = Atoms(cell=[across * spacing] * 3, pbc=True)
     labels = []
     for number, (name, site) in enumerate(zip(names, np.ndindex(across, across, across), strict=False)):
-        one = Atoms(name) if name == "Ar" else molecule(name)
-        one.positions = rotations.rotate(rotations.uniform(rng=rng), one.positions - one.positions.mean(axis=0))
-        one.positions += (np.array(site) + 0.5) * spacing
-        box += Atoms(one.get_chemical_symbols(), one.positions)
-        labels += [number] * len(one)
+        atoms = Atoms(name) if name == "Ar" else molecule(name)
+        atoms.positions = rotations.rotate(rotations.uniform(rng=rng), atoms.positions - atoms.positions.mean(axis=0))
+        atoms.positions += (np.array(site) + 0.5) * spacing
+        box += Atoms(atoms.get_chemical_symbols(), atoms.positions)
+        labels += [number] * len(atoms)
     box.arrays["molecule"] = np.array(labels)
     return box
 

@@ -180,22 +180,22 @@ class Piece:
 
 def patterns(spins2: tuple[int, ...], f2: int) -> list[tuple[int, ...]]:
     """All (2N, 2J, ..., 2F) of one F, from coupling backwards; N whole."""
-    found = [(f2,)]
+    computed = [(f2,)]
     for spin in reversed(spins2):
-        found = [(j, *p) for p in found for j in range(abs(p[0] - spin), p[0] + spin + 1, 2)]
-    return sorted(p for p in found if p[0] % 2 == 0)
+        computed = [(j, *p) for p in computed for j in range(abs(p[0] - spin), p[0] + spin + 1, 2)]
+    return sorted(p for p in computed if p[0] % 2 == 0)
 
 
 def pieces(states: tuple[State, ...], f2: int) -> list[Piece]:
     """The basis of one F."""
-    found = []
+    results = []
     for v, state in enumerate(states):
         for number, pattern in enumerate(patterns(state.spins2, f2)):
             n = pattern[0] // 2
             ks = tuple(k for k in range(-n, n + 1) if state.k_min <= abs(k) <= state.k_max)
             if ks:
-                found.append(Piece(v, pattern, ks, number))
-    return found
+                results.append(Piece(v, pattern, ks, number))
+    return results
 
 
 def _n_dot_s(piece: Piece, spins2: tuple[int, ...]) -> float:

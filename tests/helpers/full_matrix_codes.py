@@ -95,9 +95,9 @@ def _states(par: ParameterFile) -> tuple[State, ...]:
     digits = str(vsym)[::-1]
     states = []
     for v in range(abs(first.nvib)):
-        own = [o for o in par.options[1:] if abs(o.nvib) == v]
-        odd = not own and v < len(digits) and int(digits[v]) % 2 == 1
-        states.append(_state(own[-1] if own else first, first, odd))
+        options = [o for o in par.options[1:] if abs(o.nvib) == v]
+        odd = not options and v < len(digits) and int(digits[v]) % 2 == 1
+        states.append(_state(options[-1] if options else first, first, odd))
     return tuple(states)
 
 

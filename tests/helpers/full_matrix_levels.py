@@ -37,12 +37,12 @@ class Block:
 
 def assign(shares: np.ndarray, capacity: np.ndarray) -> np.ndarray:
     """The sub-block of each eigenvector: shares (vectors, blocks), the largest first, none beyond its capacity."""
-    left, found = capacity.copy(), np.full(len(shares), -1)
+    left, computed = capacity.copy(), np.full(len(shares), -1)
     order = np.dstack(np.unravel_index(np.argsort(-shares, axis=None, kind="stable"), shares.shape))[0]
     for vector, sub in order:
-        if found[vector] < 0 and left[sub]:
-            found[vector], left[sub] = sub, left[sub] - 1
-    return found
+        if computed[vector] < 0 and left[sub]:
+            computed[vector], left[sub] = sub, left[sub] - 1
+    return computed
 
 
 def _weight(state: State, k: int, species: str) -> int:
@@ -63,11 +63,11 @@ def _quanta(case: Case, piece: Piece, k: int, species: str) -> tuple[int, ...]:
     other = n - k + ((n + odd) % 2)
     if case.symmetric:
         threefold = state.axis == 6 and (k - state.l_code) % 3
-        own = () if case.linear else (-k if odd and not threefold else k,)
+        k_values = () if case.linear else (-k if odd and not threefold else k,)
     else:
-        own = (other, k) if case.oblate else (k, other)
+        k_values = (other, k) if case.oblate else (k, other)
     v = (piece.v,) if len(case.states) > 1 else ()
-    return (n, *own, *v, *((x2 + 1) // 2 for x2 in piece.pattern[1:]))
+    return (n, *k_values, *v, *((x2 + 1) // 2 for x2 in piece.pattern[1:]))
 
 
 def solve(case: Case, f2: int) -> Block:
@@ -75,20 +75,20 @@ def solve(case: Case, f2: int) -> Block:
     basis, functions, hamiltonian, joined = block(case, f2)
     count, part = connected_components(joined, directed=False)
     keys = sorted({(f.piece, f.species) for f in functions})
-    of_key = np.array([keys.index((f.piece, f.species)) for f in functions])
+    key_index = np.array([keys.index((f.piece, f.species)) for f in functions])
     vectors = np.zeros(hamiltonian.shape, complex)
     energy, mixing, label = np.zeros(len(functions)), np.ones(len(functions)), np.zeros(len(functions), int)
     done = 0
     for number in range(count):
         index = np.flatnonzero(part == number)
         values, columns = np.linalg.eigh(hamiltonian[np.ix_(index, index)])
-        present = np.unique(of_key[index])
-        members = [np.flatnonzero(of_key[index] == key) for key in present]
+        present = np.unique(key_index[index])
+        members = [np.flatnonzero(key_index[index] == key) for key in present]
         shares = np.array([(np.abs(columns[m]) ** 2).sum(axis=0) for m in members]).T
-        found = assign(shares, np.array([len(m) for m in members]))
+        computed = assign(shares, np.array([len(m) for m in members]))
         for sub, member in enumerate(members):
-            own = np.flatnonzero(found == sub)[:: -1 if case.oblate else 1]
-            for vector, place in zip(own, sorted(member, key=lambda i: functions[index[i]].k), strict=True):
+            members_ = np.flatnonzero(computed == sub)[:: -1 if case.oblate else 1]
+            for vector, place in zip(members_, sorted(member, key=lambda i: functions[index[i]].k), strict=True):
                 vectors[index, done] = columns[:, vector]
                 energy[done], mixing[done], label[done] = values[vector], shares[vector, sub], index[place]
                 done += 1

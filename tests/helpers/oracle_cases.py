@@ -43,12 +43,14 @@ _WEIGHTS = {
 
 def top_of_case(case: dict[str, Any]) -> Top:
     """Constants by their published names (a label "-D" is minus D), dipole, spin weights."""
-    given = {p["label"]: p["value"] for p in case["parameters"]}
+    parameters = {p["label"]: p["value"] for p in case["parameters"]}
     values = {
-        _PUBLISHED.get(k, k.removeprefix("-")): -v if k.startswith("-") else v for k, v in given.items() if k != "A-B"
+        _PUBLISHED.get(k, k.removeprefix("-")): -v if k.startswith("-") else v
+        for k, v in parameters.items()
+        if k != "A-B"
     }
-    if "A-B" in given:
-        values = {"A": given["A-B"] + given["B"]} | values
+    if "A-B" in parameters:
+        values = {"A": parameters["A-B"] + parameters["B"]} | values
     reduction = case["reduction"][-1] if case["reduction"].startswith("Watson") else None
     dipole = {d["component"]: d["value"] for d in case["dipoles_debye"]}
     return Top.from_constants(
@@ -144,13 +146,13 @@ def level_disagreements(reference: LevelList, ours: Prediction, common: int) -> 
 def coupled_level_disagreements(reference: LevelList, ours: Prediction) -> list[str]:
     """Levels of an .egy file with all their quantum numbers that are missing from ours or differ: 5.1e-7 cm⁻¹, half a digit of print."""
     assert ours.levels is not None
-    found: dict[tuple[int, ...], list[int]] = {}
+    results: dict[tuple[int, ...], list[int]] = {}
     for row, label in enumerate(ours.levels.quanta.tolist()):
-        found.setdefault(tuple(label), []).append(row)
+        results.setdefault(tuple(label), []).append(row)
     out = []
     for i in range(len(reference)):
         level = reference.level(i)
-        rows = found.get(tuple(level.quanta[: ours.levels.quanta.shape[1]]), [])
+        rows = results.get(tuple(level.quanta[: ours.levels.quanta.shape[1]]), [])
         near = min(rows, key=lambda row: abs(ours.levels.energy_cm[row] - level.energy_cm), default=None)
         if (
             near is None

@@ -52,7 +52,7 @@ def matrix(values: Mapping[str, float], j: int) -> np.ndarray:
 def levels(values: Mapping[str, float], j: int) -> dict[tuple[int, int, int], float]:
     """Energies in MHz by (J, Ka, Kc)."""
     h = matrix(values, j)
-    found = {}
+    results = {}
     for odd in (0, 1):
         for sign in (1, -1):
             ks = [k for k in range(odd, j + 1, 2) if k or sign == 1]
@@ -66,5 +66,5 @@ def levels(values: Mapping[str, float], j: int) -> dict[tuple[int, int, int], fl
             for k, energy in zip(ks, np.linalg.eigvalsh(u.T @ h @ u), strict=True):
                 even_kc = sign * (-1) ** (j + k) == 1  # C2(c)|J k> = (-1)^(J+k)|J -k>
                 kc = j - k if k == 0 or ((j - k) % 2 == 0) == even_kc else j - k + 1
-                found[j, k, kc] = float(energy)
-    return found
+                results[j, k, kc] = float(energy)
+    return results

@@ -7,7 +7,9 @@ def ram_of_pam(constants, top):
     """A, B, C, Dab, Dbc, Dac, F and rho of the rho-axis frame from A, B, C of the principal axes; those of D that vanish are left out."""
     axes = top.axes
     tensor = axes @ np.diag(np.asarray(constants, dtype=float)) @ axes.T
-    found = {"A": tensor[0, 0], "B": tensor[1, 1], "C": tensor[2, 2], "F": top.f, "rho": top.rho}
+    computed = {"A": tensor[0, 0], "B": tensor[1, 1], "C": tensor[2, 2], "F": top.f, "rho": top.rho}
     scale = 1e-14 * float(np.abs(tensor).max())
     mixed = {"Dab": tensor[0, 1], "Dbc": tensor[1, 2], "Dac": tensor[0, 2]}
-    return {name: float(value) for name, value in (found | {n: v for n, v in mixed.items() if abs(v) > scale}).items()}
+    return {
+        name: float(value) for name, value in (computed | {n: v for n, v in mixed.items() if abs(v) > scale}).items()
+    }

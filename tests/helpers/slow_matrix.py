@@ -25,8 +25,8 @@ def _anti(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def watson_matrix(values: dict[str, float], reduction: str, representation: str, j: int) -> np.ndarray:
     """Watson's Hamiltonian written as his papers print it, operator by operator, to sextic order."""
     jx, jy, jz, up, down = body_operators(j)
-    one = np.eye(2 * j + 1)
-    j2 = j * (j + 1) * one
+    identity = np.eye(2 * j + 1)
+    j2 = j * (j + 1) * identity
     v = lambda name: values.get(name, 0.0)  # noqa: E731
     axis = AXES[representation]
     total = v(axis[0].upper()) * jx @ jx + v(axis[1].upper()) * jy @ jy + v(axis[2].upper()) * jz @ jz

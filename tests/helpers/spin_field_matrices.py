@@ -53,8 +53,8 @@ def full_matrix(
     for p in "xyz":
         for q in "xyz" if twice_i > 1 else "":
             both = (spin[p] @ spin[q] + spin[q] @ spin[p]) / (4 * i * (2 * i - 1))
-            found = sum(chi[k, n] * phi[p, "abc"[k]] @ phi[q, "abc"[n]] for k in range(3) for n in range(3))
-            total = total + on_spins(found[held], (twice_i,), {1: both})
+            computed = sum(chi[k, n] * phi[p, "abc"[k]] @ phi[q, "abc"[n]] for k in range(3) for n in range(3))
+            total = total + on_spins(computed[held], (twice_i,), {1: both})
     return total
 
 
@@ -63,7 +63,7 @@ def _cosines():
     return space_cosines(LARGEST + 1)
 
 
-def every_state(found, count: int) -> np.ndarray:
+def every_state(computed, count: int) -> np.ndarray:
     """The lowest energies at the last field, each as often as it exists."""
-    last = found.field == found.field.max()
-    return np.sort(np.repeat(found.energy_mhz[last], found.copies[last]))[:count]
+    last = computed.field == computed.field.max()
+    return np.sort(np.repeat(computed.energy_mhz[last], computed.copies[last]))[:count]

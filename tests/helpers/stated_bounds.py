@@ -95,11 +95,11 @@ def spins(seed: int) -> Case:
     def answer(how: str):
         return answer_levels(LevelsRequest(top, jmax=jmax, effects=effects_of(top, True, how, tolerance)))
 
-    found, exact = answer(method), answer("exact")
-    rows = [np.lexsort((one.table.levels.energy_mhz, one.table.levels.quanta["f"])) for one in (found, exact)]
-    energies = [one.table.levels.energy_mhz[row] for one, row in zip((found, exact), rows, strict=True)]
-    floor = found.errors.rounding.value + exact.errors.rounding.value
-    return Case(found.errors.truncation.value + floor, float(np.abs(energies[0] - energies[1]).max()), floor)
+    computed, exact = answer(method), answer("exact")
+    rows = [np.lexsort((item.table.levels.energy_mhz, item.table.levels.quanta["f"])) for item in (computed, exact)]
+    energies = [item.table.levels.energy_mhz[row] for item, row in zip((computed, exact), rows, strict=True)]
+    floor = computed.errors.rounding.value + exact.errors.rounding.value
+    return Case(computed.errors.truncation.value + floor, float(np.abs(energies[0] - energies[1]).max()), floor)
 
 
 def thermo(seed: int) -> Case:
@@ -111,8 +111,8 @@ def thermo(seed: int) -> Case:
     kelvin = tuple(sorted((10 ** rng.uniform(-1.5, 2.0, 2)).tolist()))
     request = ThermoRequest(top, kelvin, relative_error=10 ** rng.uniform(-10, -1))
     answer, exact = answer_thermo(request), answer_thermo(replace(request, relative_error=1e-13))
-    pairs = [(getattr(one.functions, name) for one in (answer, exact)) for name in THERMAL]
-    actual = max(float(np.abs(found / true - 1).max()) for found, true in pairs)
+    pairs = [(getattr(item.functions, name) for item in (answer, exact)) for name in THERMAL]
+    actual = max(float(np.abs(computed / true - 1).max()) for computed, true in pairs)
     floor = answer.errors.rounding.value + exact.errors.numerical
     return Case(answer.errors.truncation.value + floor, actual, floor)
 
@@ -189,7 +189,7 @@ def torsion(seed: int) -> Case:
     answer = answer_torsion(TorsionRequest(ETHANE, "1-2", barrier, vmax=int(rng.integers(0, 12))))
     count = answer.request.vmax + 1
     pairs = [
-        [answer.torsion.states(one, waves)[0][:count] for waves in (answer.waves, 3 * answer.waves)] for one in (0, 1)
+        [answer.torsion.states(item, waves)[0][:count] for waves in (answer.waves, 3 * answer.waves)] for item in (0, 1)
     ]
     actual = max(float(np.abs(few - many).max()) for few, many in pairs)
     floor = 10 * answer.errors.rounding.value  # the reference has nine times the kinetic energy
@@ -208,11 +208,11 @@ def emission(seed: int) -> Case:
     request = EmissionRequest((top,), (source,), (low, low + 2e4), least_depth=10 ** rng.uniform(-6, -1))
     answer, exact = answer_emission(request), answer_emission(replace(request, least_depth=1e-12))
     grid = exact.spectrum.frequency_mhz
-    found = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
+    interpolated = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
     floor = answer.errors.rounding.value + exact.errors.rounding.value
     stated = answer.errors.truncation.value + floor
     uncounted = contrast(answer) * BELOW * request.least_depth  # K, of lines so weak that they are not computed
-    return Case(stated, float(np.abs(found - exact.spectrum.brightness_k).max(initial=0.0)), floor + uncounted)
+    return Case(stated, float(np.abs(interpolated - exact.spectrum.brightness_k).max(initial=0.0)), floor + uncounted)
 
 
 def contrast(answer) -> float:
@@ -233,11 +233,11 @@ def fitted(seed: int) -> Case:
     lines, start, names = fit_problem(rng_of(12, seed))
     free = parameters(start, names)
     tolerance = 10 ** rng_of(13, seed).uniform(-5, 0)
-    found = fit_lines(lines, start, free, FitOptions(tolerance=tolerance, poor_rms=1e9))
+    fit = fit_lines(lines, start, free, FitOptions(tolerance=tolerance, poor_rms=1e9))
     exact = fit_lines(lines, start, free, FitOptions(tolerance=1e-12, poor_rms=1e9))
-    budget, reference = constants_budget(found), constants_budget(exact)
+    budget, reference = constants_budget(fit), constants_budget(exact)
     floor = budget.rounding.value + reference.numerical
-    actual = float(np.abs((found.values - exact.values) / exact.errors).max())
+    actual = float(np.abs((fit.values - exact.values) / exact.errors).max())
     return Case(budget.truncation.value + floor, actual, floor)
 
 
@@ -268,14 +268,14 @@ def fluid(seed: int) -> Case:
     from rotor.fluids.settings import Settings
 
     rng = rng_of(11, seed)
-    every = int(rng.choice([1, 2, 5, 10]))
+    interval = int(rng.choice([1, 2, 5, 10]))
     settings = Settings(
-        model="argon", temperature_k=rng.uniform(50, 200), step_fs=rng.uniform(5, 40), steps=20 * every, every=every,
+        model="argon", temperature_k=rng.uniform(50, 200), step_fs=rng.uniform(5, 40), steps=20 * interval, every=interval,
         cutoff_angstrom=4.0, seed=seed,
     )  # fmt: skip
     request = FluidRequest(NewBox(27, rng.uniform(0.8, 1.4), 0.1), settings)
     answer, exact = answer_fluid(request), answer_fluid(replace(request, settings=replace(settings, every=1)))
-    stated, actual = (one.errors.truncation.value for one in (answer, exact))
+    stated, actual = (item.errors.truncation.value for item in (answer, exact))
     return Case(stated, actual, answer.errors.rounding.value)
 
 
@@ -304,10 +304,10 @@ def tumble(seed: int) -> Case:
     return Case(answer.errors.numerical, actual, answer.errors.rounding.value)
 
 
-def angle_apart(true, found) -> float:
+def angle_apart(true, computed) -> float:
     """The angle between two attitudes, rad; the difference of quaternions that are close is half of it."""
-    same = 1 if mpmath.fdot(true, found) > 0 else -1
-    return float(2 * mpmath.sqrt(sum((one - same * other) ** 2 for one, other in zip(true, found, strict=True))))
+    same = 1 if mpmath.fdot(true, computed) > 0 else -1
+    return float(2 * mpmath.sqrt(sum((first - same * other) ** 2 for first, other in zip(true, computed, strict=True))))
 
 
 def gas(seed: int) -> Case:
@@ -329,12 +329,12 @@ def temperature_apart(answer) -> float:
     request = answer.request
     top, rng = request.top, np.random.default_rng(request.seed)
     start = thermal_ensemble(top.moments_u_angstrom2, request.kt, request.molecules, rng=rng, mass=top.mass_u)
-    moments = [Fraction(one) for one in top.moments_u_angstrom2]
+    moments = [Fraction(item) for item in top.moments_u_angstrom2]
     rows = start.momentum.tolist()
     energy = sum(Fraction(part) ** 2 / moment for row in rows for part, moment in zip(row, moments, strict=True))
     true = energy / (3 * request.molecules * Fraction(request.kt))
-    found = np.mean([degree.mean for degree in answer.test.degrees])
-    return request.temperature_k * abs(float(Fraction(float(found)) - true))
+    computed = np.mean([degree.mean for degree in answer.test.degrees])
+    return request.temperature_k * abs(float(Fraction(float(computed)) - true))
 
 
 def curves_apart(answer) -> float:

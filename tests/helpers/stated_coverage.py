@@ -41,9 +41,9 @@ def gas_curves(seed: int) -> list[float]:
     top, late = Top(CO, (0.1, 0.0, 0.0)), 0.3
     answer = answer_gas(GasRequest(top, molecules=1000, seed=seed, times_ps=(late,)))
     curves, moment = answer.correlations, top.moments_u_angstrom2[2]
-    first, second = (float(one[0]) for one in linear_curves([late / units.ASE_TIME_PS], moment, answer.request.kt))
+    first, second = (float(item[0]) for item in linear_curves([late / units.ASE_TIME_PS], moment, answer.request.kt))
     departures = [(curves.c1[0] - first) / curves.c1_error[0], (curves.c2[0] - second) / curves.c2_error[0]]
-    return [float(one) for one in departures]
+    return [float(departure) for departure in departures]
 
 
 @cache
@@ -125,7 +125,7 @@ def stark_answer(scale: float):
     from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
 
     constants = Constants(**ROD.values, uncertainties=dict.fromkeys(ROD.values, 1e-9))
-    dipole = tuple(scale * one for one in DIPOLE)
+    dipole = tuple(scale * item for item in DIPOLE)
     return answer_stark(StarkRequest(Top(constants, dipole, dipole_source="estimate"), (0.0, 10.0), j_highest=1))
 
 

@@ -38,13 +38,13 @@ def read_tabs(path: Path) -> Rows:
     return Rows({name: np.array([float(row[n]) for row in rows]) for n, name in enumerate(head)})
 
 
-def write_tabs(thing: Any, path: Any, settings: Mapping[str, Any]) -> None:
+def write_tabs(table: Any, path: Any, settings: Mapping[str, Any]) -> None:
     """The numbers of a table, in full precision."""
-    columns = {name: column for name, column in thing.columns.items() if np.asarray(column).dtype.kind in "if"}
+    columns = {name: column for name, column in table.columns.items() if np.asarray(column).dtype.kind in "if"}
     with open_atomic(path, "w", encoding="utf-8") as handle:
         handle.write(f"# rotor {settings.get('command', '')}\n" + "\t".join(columns) + "\n")
         for row in zip(*columns.values(), strict=True):
-            handle.write("\t".join(repr(float(one)) for one in row) + "\n")
+            handle.write("\t".join(repr(float(item)) for item in row) + "\n")
 
 
 FORMAT = Format("columns by tabs", (".tabs",), "toy_format:read_tabs", {TABLE: "toy_format:write_tabs"})

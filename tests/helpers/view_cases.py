@@ -52,8 +52,8 @@ def write_case(folder: Path, off_mhz: float = 0.03) -> Path:
 
 def assign_line(service: Any, upper: list[int], lower: list[int], species: int = 1) -> Any:
     """Assign the peak nearest to a predicted line to it; the answer."""
-    found = service.answer({"do": "pick", "species": species, "level": upper})["ok"]["candidates"]
-    line = next(one for one in found if one["upper"] == upper and one["lower"] == lower)
+    computed = service.answer({"do": "pick", "species": species, "level": upper})["ok"]["candidates"]
+    line = next(entry for entry in computed if entry["upper"] == upper and entry["lower"] == lower)
     f = line["frequency_mhz"]
     peak = service.answer({"do": "peak", "first_mhz": f - 0.4, "last_mhz": f + 0.4})["ok"]["peak"]
     return service.answer(

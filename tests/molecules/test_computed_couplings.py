@@ -34,7 +34,7 @@ COLUMNS = {
 def output(columns: str, *, dipole: np.ndarray | None = None, isotope_of_n: int = 14, axes: bool = True) -> str:
     """An imitation of a job with output=pickett, its couplings in a table whose columns are a, b, c in another order."""
     order = COLUMNS[columns]
-    own = (PLANE - FRAME.centre) @ FRAME.axes.T @ order.T
+    frame_positions = (PLANE - FRAME.centre) @ FRAME.axes.T @ order.T
     chi, mu = order @ CHI_ABC @ order.T, order @ DIPOLE_ABC if dipole is None else dipole
     standard = PLANE @ TURN.T
     x, y, z = TURN @ FRAME.axes.T @ DIPOLE_ABC
@@ -46,7 +46,7 @@ def output(columns: str, *, dipole: np.ndarray | None = None, isotope_of_n: int 
     if axes:
         text += f"{'Principal axis orientation:':>45}\n {'-' * 69}\n Center     Atomic                     Coordinates (Angstroms)\n"
         text += f" Number     Number              X              Y              Z\n {'-' * 69}\n"
-        rows = zip(NUMBERS, own, strict=True)
+        rows = zip(NUMBERS, frame_positions, strict=True)
         text += "".join(f"{i:7d}{n:11d}    {r[0]:15.6f}{r[1]:15.6f}{r[2]:15.6f}\n" for i, (n, r) in enumerate(rows, 1))
         text += f" {'-' * 69}\n"
     text += f" Nuclear quadrupole coupling constants [Chi] (MHz):\n  2  N({isotope_of_n})\n"
@@ -64,17 +64,17 @@ def read(folder: Path, text: str) -> Top:
 
 @pytest.mark.parametrize("columns", COLUMNS)
 def test_couplings_are_turned_to_the_principal_axes(tmp_path, columns):
-    found = read(tmp_path, output(columns)).spin_constants
-    assert dict(found.twice) == {"14N": 2}
-    assert dict(found.atoms) == {"14N": 2}
-    assert found.source.startswith("computed: Gaussian, ")
+    content = read(tmp_path, output(columns)).spin_constants
+    assert dict(content.twice) == {"14N": 2}
+    assert dict(content.atoms) == {"14N": 2}
+    assert content.source.startswith("computed: Gaussian, ")
     expected = {"chi_aa(14N)": 0.36, "chi_bb-cc(14N)": -10.56, "chi_ab(14N)": 1.5}
-    assert set(found.values) == set(expected)
+    assert set(content.values) == set(expected)
     for name, value in expected.items():
-        own = (
-            abs(found.values[name]) if name == "chi_ab(14N)" else found.values[name]
+        reference = (
+            abs(content.values[name]) if name == "chi_ab(14N)" else content.values[name]
         )  # its sign goes with that of the axes
-        assert own == pytest.approx(value, abs=3e-4)  # four decimals, and six of coordinates
+        assert reference == pytest.approx(value, abs=3e-4)  # four decimals, and six of coordinates
 
 
 @pytest.mark.parametrize(
@@ -122,12 +122,12 @@ def test_levels_split(tmp_path):
     """J = 1 of three components; their mean, weighted by 2F+1, is the level without spin."""
     top = read(tmp_path, output("abc"))
     with_spin, plain = solve_levels(top, 1, effects=effects_of(top, True)), solve_levels(top, 1)
-    of_one = with_spin.quanta["n"] == 1
-    assert of_one.sum() == 9
-    weights = with_spin.multiplicity[of_one]
-    mean = np.average(with_spin.energy_mhz[of_one], weights=weights)
+    first_level = with_spin.quanta["n"] == 1
+    assert first_level.sum() == 9
+    weights = with_spin.multiplicity[first_level]
+    mean = np.average(with_spin.energy_mhz[first_level], weights=weights)
     assert mean == pytest.approx(plain.energy_mhz[plain.quanta["j"] == 1].mean(), abs=1e-3)  # χ²/A, less than 1 kHz
-    assert np.ptp(with_spin.energy_mhz[of_one]) > 0
+    assert np.ptp(with_spin.energy_mhz[first_level]) > 0
 
 
 ORCA = ORACLES / "outputs"
@@ -140,22 +140,22 @@ GRADIENTS = {  # of the samples: their own e**2qQ in MHz and the last digit of t
 @pytest.mark.parametrize("name", GRADIENTS)
 def test_field_gradients_of_orca(name):
     """Largest eigenvalue as the program's own, which has the same Q of 14N to 2e-6."""
-    own, digit = GRADIENTS[name]
+    gradient, digit = GRADIENTS[name]
     molecule = read_molecule(ORCA / name)
     values = np.linalg.eigvalsh(molecule.quadrupole_mhz[1])
     assert values[np.abs(values).argmax()] == pytest.approx(
-        own, abs=QUADRUPOLE_MHZ_PER_BARN_AU * 0.02 * 2 * digit + 1e-5
+        gradient, abs=QUADRUPOLE_MHZ_PER_BARN_AU * 0.02 * 2 * digit + 1e-5
     )
     top = rotor.read(str(ORCA / name))
     chi = top.frame.axes @ molecule.quadrupole_mhz[1] @ top.frame.axes.T
-    found = top.spin_constants.values
-    assert set(found) == {"chi_aa(14N)", "chi_bb-cc(14N)", "chi_ac(14N)"}  # a plane of symmetry
-    assert found["chi_aa(14N)"] == pytest.approx(chi[0, 0])
-    assert found["chi_bb-cc(14N)"] == pytest.approx(chi[1, 1] - chi[2, 2])
+    computed = top.spin_constants.values
+    assert set(computed) == {"chi_aa(14N)", "chi_bb-cc(14N)", "chi_ac(14N)"}  # a plane of symmetry
+    assert computed["chi_aa(14N)"] == pytest.approx(chi[0, 0])
+    assert computed["chi_bb-cc(14N)"] == pytest.approx(chi[1, 1] - chi[2, 2])
     assert top.spin_constants.source.startswith("computed: field gradients of ORCA, ")
 
 
-def of_charges(molecule: Molecule, atom: int) -> np.ndarray:
+def field_gradient_of_charges(molecule: Molecule, atom: int) -> np.ndarray:
     """∂²/∂r² of the potential Σ Z/r of the other nuclei at one, Eh/(e a0²): Σ Z (3 r rᵀ - r²)/r⁵."""
     total = np.zeros((3, 3))
     for other, nucleus in enumerate(molecule.nuclei):
@@ -175,7 +175,7 @@ def test_sign_and_axes_of_orca_are_those_of_positive_charges():
     }  # fmt: skip
     for atom, values in printed.items():
         axes = np.array(orientation[atom])
-        assert np.diag(axes.T @ of_charges(molecule, atom - 1) @ axes) == pytest.approx(
+        assert np.diag(axes.T @ field_gradient_of_charges(molecule, atom - 1) @ axes) == pytest.approx(
             values, abs=2e-5
         )  # 6 decimals of r
         whole = np.diag(axes.T @ molecule.field_gradients_au[atom] @ axes)
@@ -241,8 +241,8 @@ def test_computed_gradients_give_the_measured_couplings(name):
     top = rotor.read(name)
     gradients = {atom: gradient for (molecule, atom), gradient in PYSCF.items() if molecule == name}
     with_them = replace(top.molecule, quadrupole_mhz=couplings_mhz(gradients, top.molecule.nuclei))
-    found = Top.from_molecule(with_them).spin_constants.values
+    computed = Top.from_molecule(with_them).spin_constants.values
     measured = {key: value for key, value in top.spin_constants.values.items() if key.startswith("chi")}
     assert {"chi_aa", "chi_bb-cc"} & {key.partition("(")[0] for key in measured}
     for key, value in measured.items():
-        assert found[key] == pytest.approx(value, abs=0.11 * max(abs(one) for one in measured.values())), key
+        assert computed[key] == pytest.approx(value, abs=0.11 * max(abs(item) for item in measured.values())), key

@@ -21,11 +21,11 @@ MEASURED_DEBYE = {
 
 
 def test_the_scale_and_the_errors_that_the_note_states_are_those_measured():
-    found = np.array([np.linalg.norm(from_smiles(text).dipole_debye) for text in MEASURED_DEBYE])
+    computed = np.array([np.linalg.norm(from_smiles(text).dipole_debye) for text in MEASURED_DEBYE])
     measured = np.array(list(MEASURED_DEBYE.values()))
-    best = GAS_SCALE * np.sum(found * measured) / np.sum(found**2)
+    best = GAS_SCALE * np.sum(computed * measured) / np.sum(computed**2)
     assert best == pytest.approx(GAS_SCALE, abs=0.01)  # two digits are kept
-    errors = np.abs(found - measured)
+    errors = np.abs(computed - measured)
     assert np.median(errors) == pytest.approx(0.20, abs=0.02)  # D; one digit is stated
     assert errors.max() == pytest.approx(1.2, abs=0.1)  # D, SO2
 

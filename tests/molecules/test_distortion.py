@@ -23,14 +23,16 @@ def turned_field(field: ForceField, rng: np.random.Generator) -> ForceField:
     from scipy.spatial.transform import Rotation
 
     r = Rotation.random(rng=rng).as_matrix()
-    every = np.kron(np.eye(len(field.molecule.symbols)), r)
-    return ForceField(field.molecule.moved(r, (1.0, -2.0, 0.5)), every @ field.hessian_ev_per_angstrom2 @ every.T)
+    rotation_of_all = np.kron(np.eye(len(field.molecule.symbols)), r)
+    return ForceField(
+        field.molecule.moved(r, (1.0, -2.0, 0.5)), rotation_of_all @ field.hessian_ev_per_angstrom2 @ rotation_of_all.T
+    )
 
 
 def test_sulfur_dioxide_meets_the_measured_constants():
-    found = distortion_constants(force_fields.sulfur_dioxide(), reduction="A")
+    constants = distortion_constants(force_fields.sulfur_dioxide(), reduction="A")
     measured = rotor.read("SO2").constants
-    off = {name: abs(found[name] / measured[name] - 1) for name in QUARTICS}
+    off = {name: abs(constants[name] / measured[name] - 1) for name in QUARTICS}
     assert max(off[name] for name in QUARTICS[:4]) < 0.03  # harmonic: 0.9, 1.7, 2.5 and 0.5 %
     assert off["deltaK"] < 0.11  # the smallest, a difference of large terms: 9.6 %
 
@@ -39,28 +41,30 @@ def test_two_force_fields_of_sulfur_dioxide_agree():
     """One fitted to fundamentals, one computed: the computed one is stiffer, as harmonic wavenumbers are above fundamentals."""
     fitted, computed = force_fields.sulfur_dioxide(), force_fields.sulfur_dioxide_ab_initio()
     assert computed.vibrations().wavenumbers_cm == pytest.approx([524.4, 1170.1, 1382.5], abs=0.1)  # as typed
-    one, other = (distortion_constants(field, reduction="A") for field in (fitted, computed))
+    first, other = (distortion_constants(field, reduction="A") for field in (fitted, computed))
     for name in QUARTICS:
-        assert other[name] < one[name] if one[name] > 0 else other[name] > one[name]
-        assert other[name] == pytest.approx(one[name], rel=0.04), name  # 1.6, 1.5, 3.7, 1.6 and 2.1 %
+        assert other[name] < first[name] if first[name] > 0 else other[name] > first[name]
+        assert other[name] == pytest.approx(first[name], rel=0.04), name  # 1.6, 1.5, 3.7, 1.6 and 2.1 %
 
 
 def test_water_is_off_by_what_anharmonicity_does():
-    found = distortion_constants(force_fields.water(), reduction="A")
+    constants = distortion_constants(force_fields.water(), reduction="A")
     measured = dict(zip(QUARTICS, (37.594, -172.91, 973.29, 15.210, 41.05), strict=True))  # De Lucia 1974, memory
     for name in ("DeltaJ", "DeltaJK", "deltaJ"):
-        assert found[name] == pytest.approx(measured[name], rel=0.11)  # 4.9, 10.5 and 5.6 %
-    assert found["DeltaK"] == pytest.approx(measured["DeltaK"], rel=0.22)  # the bend is soft and strongly anharmonic
-    assert 0 < found["deltaK"] < measured["deltaK"]
+        assert constants[name] == pytest.approx(measured[name], rel=0.11)  # 4.9, 10.5 and 5.6 %
+    assert constants["DeltaK"] == pytest.approx(
+        measured["DeltaK"], rel=0.22
+    )  # the bend is soft and strongly anharmonic
+    assert 0 < constants["deltaK"] < measured["deltaK"]
 
 
 def test_hdo_turns_its_axes_and_changes_a_sign():
     """No scaling of H2O's constants gives the ΔJK of HDO, 34.2 MHz where H2O has -173; the force field does."""
-    found = distortion_constants(force_fields.water().with_isotopes("2=2H"), reduction="A")
+    constants = distortion_constants(force_fields.water().with_isotopes("2=2H"), reduction="A")
     measured = dict(zip(QUARTICS, (10.838, 34.208, 377.08, 3.647, 63.087), strict=True))  # De Lucia 1971, memory
-    assert found["DeltaJK"] == pytest.approx(measured["DeltaJK"], rel=0.02)  # found 33.89
-    assert found["DeltaJ"] == pytest.approx(measured["DeltaJ"], rel=0.06)  # found 10.29
-    assert found["DeltaK"] == pytest.approx(measured["DeltaK"], rel=0.25)  # harmonic
+    assert constants["DeltaJK"] == pytest.approx(measured["DeltaJK"], rel=0.02)  # found 33.89
+    assert constants["DeltaJ"] == pytest.approx(measured["DeltaJ"], rel=0.06)  # found 10.29
+    assert constants["DeltaK"] == pytest.approx(measured["DeltaK"], rel=0.25)  # harmonic
 
 
 def test_linear_molecules_have_the_closed_form():
@@ -123,8 +127,8 @@ def energy_at_minimum(field: ForceField, j: np.ndarray) -> float:
         return ROTATIONAL_MHZ_U_ANGSTROM2 * j @ np.linalg.solve(point_masses(masses, moved).tensor, j)
 
     rigid = rotation(np.zeros(len(stiffness)))
-    found = minimize(lambda q: q @ q / 2 + rotation(q) - rigid, np.zeros(len(stiffness)), tol=1e-13)
-    return float(found.fun)
+    computed = minimize(lambda q: q @ q / 2 + rotation(q) - rigid, np.zeros(len(stiffness)), tol=1e-13)
+    return float(computed.fun)
 
 
 @pytest.mark.parametrize("field", planar_fields())
@@ -162,13 +166,13 @@ def test_the_levels_of_the_unreduced_hamiltonian_come_back(reduction, representa
     for epsilon in (1e-2, 1e-3):
         scaled = full.replace(**{n: v * epsilon for n, v in full.values.items() if n not in "ABC"})
         ours = rotor.api.solve_levels(rotor.Top.from_constants(scaled), 6)
-        found = {j: np.sort(ours.energy_mhz[ours.quanta["j"] == j]) for j in range(1, 7)}
+        computed = {j: np.sort(ours.energy_mhz[ours.quanta["j"] == j]) for j in range(1, 7)}
         rows, misses = [], []
         for j in range(1, 7):
             plain, quartic = whole_matrices(rigid, tensor, j)
             energies, states = np.linalg.eigh(plain + epsilon * quartic)
-            misses.append(energies - found[j])
-            slopes = [whole_matrices(one, 0 * tensor, j)[0] for one in np.eye(3)]
+            misses.append(energies - computed[j])
+            slopes = [whole_matrices(item, 0 * tensor, j)[0] for item in np.eye(3)]
             rows.append(np.array([np.einsum("ki,kl,li->i", states.conj(), s, states).real for s in slopes]).T)
         design, miss = np.concatenate(rows), np.concatenate(misses)
         shift = np.linalg.lstsq(design, miss, rcond=None)[0]

@@ -32,9 +32,11 @@ def lennard_jones():
 
 
 def test_water_has_the_published_harmonic_wavenumbers():
-    found = force_fields.water().vibrations()
-    assert found.wavenumbers_cm == pytest.approx([1648.5, 3832.2, 3942.5], abs=1.0)  # force constants to three digits
-    assert found.left_over_cm < 1e-3  # B of internal coordinates knows no translation
+    computed = force_fields.water().vibrations()
+    assert computed.wavenumbers_cm == pytest.approx(
+        [1648.5, 3832.2, 3942.5], abs=1.0
+    )  # force constants to three digits
+    assert computed.left_over_cm < 1e-3  # B of internal coordinates knows no translation
 
 
 def test_heavy_water_follows_the_product_rule_of_teller_and_redlich():
@@ -44,15 +46,15 @@ def test_heavy_water_follows_the_product_rule_of_teller_and_redlich():
     light, heavy = force_fields.water(), force_fields.water().with_isotopes("H=2H")
     ratio = np.prod(heavy.vibrations().wavenumbers_cm / light.vibrations().wavenumbers_cm)
     masses = np.prod(light.molecule.masses_u / heavy.molecule.masses_u) ** 3
-    moments = [np.prod(Top.from_molecule(one.molecule).moments_u_angstrom2) for one in (heavy, light)]
+    moments = [np.prod(Top.from_molecule(item.molecule).moments_u_angstrom2) for item in (heavy, light)]
     expected = np.sqrt(masses * (heavy.molecule.mass_u / light.molecule.mass_u) ** 3 * moments[0] / moments[1])
     assert ratio == pytest.approx(expected, rel=1e-9)  # round-off
 
 
 def test_vibrations_are_orthonormal_and_apart_from_rigid_motions():
     field = force_fields.sulfur_dioxide()
-    every = np.hstack([field.vibrations().modes, rigid_motions(field.molecule)])
-    assert every.T @ every == pytest.approx(np.eye(9), abs=1e-12)  # round-off
+    displacements = np.hstack([field.vibrations().modes, rigid_motions(field.molecule)])
+    assert displacements.T @ displacements == pytest.approx(np.eye(9), abs=1e-12)  # round-off
 
 
 def test_wilson_b_agrees_with_differences():
@@ -194,14 +196,16 @@ def test_tblite_takes_a_smiles_to_distortion_constants(capfd):
     arguments = ["info", "SMILES:C=O", "--calculator", "tblite", "--hessian", "calculator", "--json", "-"]
     assert run(arguments) == 0
     out, err = capfd.readouterr()
-    found = json.loads(out)
-    assert found["point_group"] == "C2v"
+    content = json.loads(out)
+    assert content["point_group"] == "C2v"
     measured = rotor.read("H2CO").constants
     for name in "ABC":
-        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.04), name  # GFN2: 3.4, 1.5 and 2.1 %
+        assert content["constants_mhz"][name] == pytest.approx(measured[name], rel=0.04), (
+            name
+        )  # GFN2: 3.4, 1.5 and 2.1 %
     for name in ("DJ", "DJK", "DK", "d1", "d2"):
         # GFN2's force field: 3, 7, 13, 6 and 9 %
-        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.15), name
+        assert content["constants_mhz"][name] == pytest.approx(measured[name], rel=0.15), name
     assert "geometry refined with TBLite" in err
     assert "harmonic force field (TBLite" in err
 
@@ -222,9 +226,9 @@ def test_conformers_on_the_command_line(capsys):
     from rotor.cli import run
 
     assert run(["info", "SMILES:CCCC", "--conformers", "20", "--json", "-"]) == 0
-    found = json.loads(capsys.readouterr().out)["conformers"]
-    assert [round(one["energy_kj_per_mol"], 1) for one in found] == [0.0, 3.3]
-    assert all(len(one["rotational_constants_mhz"]) == 3 for one in found)
+    content = json.loads(capsys.readouterr().out)["conformers"]
+    assert [round(entry["energy_kj_per_mol"], 1) for entry in content] == [0.0, 3.3]
+    assert all(len(entry["rotational_constants_mhz"]) == 3 for entry in content)
     assert run(["info", "SMILES:CCCC", "--conformers", "20"]) == 0
     assert "E (kJ/mol)" in capsys.readouterr().out
 

@@ -55,10 +55,10 @@ def test_wavenumbers_are_those_that_spectro_prints(name):
 
 @pytest.mark.parametrize("reduction", ["A", "S"])
 def test_water_has_the_constants_that_spectro_prints(reduction):
-    found = distortion_constants(field_of("h2o"), reduction=reduction, representation="Ir")
+    constants = distortion_constants(field_of("h2o"), reduction=reduction, representation="Ir")
     for name, value in SPECTRO["h2o"][reduction].items():
         # masses and bohr of 1973 in one, of 2022 in the other: 1.2e-6
-        assert TOO_MUCH * found[name] == pytest.approx(value, rel=2e-6), name
+        assert TOO_MUCH * constants[name] == pytest.approx(value, rel=2e-6), name
 
 
 @pytest.mark.parametrize("name", ["h2o", "h2co"])
@@ -89,15 +89,15 @@ def test_the_one_that_differs_is_spectros_mixture_of_modes():
 
 @pytest.mark.parametrize("reduction", ["A", "S"])
 def test_formaldehyde_has_the_constants_that_spectro_prints(reduction):
-    found = distortion_constants(field_of("h2co"), reduction=reduction, representation="Ir")
+    constants = distortion_constants(field_of("h2co"), reduction=reduction, representation="Ir")
     for name, value in SPECTRO["h2co"][reduction].items():
-        assert TOO_MUCH * found[name] == pytest.approx(value, rel=7e-4), name  # by the share of τ′_aabb: up to 6e-4
+        assert TOO_MUCH * constants[name] == pytest.approx(value, rel=7e-4), name  # by the share of τ′_aabb: up to 6e-4
 
 
 def test_formaldehyde_is_within_some_per_cent_of_the_measured_constants():
     """Harmonic, of an ab initio force field, against the ground state of CDMS (c030501), S reduction."""
-    found, measured = distortion_constants(field_of("h2co"), reduction="S"), rotor.read("H2CO").constants
-    off = {name: abs(found[name] / measured[name] - 1) for name in ("DJ", "DJK", "DK", "d1", "d2")}
+    constants, measured = distortion_constants(field_of("h2co"), reduction="S"), rotor.read("H2CO").constants
+    off = {name: abs(constants[name] / measured[name] - 1) for name in ("DJ", "DJK", "DK", "d1", "d2")}
     assert max(off["DJ"], off["DJK"]) < 0.02  # what vibration does: 1.1 and 0.7 %
     assert max(off["DK"], off["d1"]) < 0.07  # hydrogen moves: 4.5 and 6.0 %
     assert off["d2"] < 0.15  # the smallest, a difference of large terms: 14 %
@@ -110,9 +110,9 @@ def test_water_in_internal_coordinates_is_the_same_force_field():
     bent = force_fields.bent_field(
         ("O", "H", "H"), r, degrees, k["rr"], k["rs"], k["ra"] / r, k["aa"] / r**2, "SPECTRO, ab initio"
     )
-    found = distortion_constants(bent, reduction="A", representation="Ir")
+    constants = distortion_constants(bent, reduction="A", representation="Ir")
     for name, value in SPECTRO["h2o"]["A"].items():
-        assert TOO_MUCH * found[name] == pytest.approx(value, rel=3e-5), name  # units of 1973: 1.6e-5 in mdyn/Å
+        assert TOO_MUCH * constants[name] == pytest.approx(value, rel=3e-5), name  # units of 1973: 1.6e-5 in mdyn/Å
 
 
 def test_what_parts_water_from_the_measured_constants_is_not_the_force_field():
@@ -141,8 +141,8 @@ def test_methanol_has_the_tau_that_gaussian_prints_along_its_axes():
     assert np.degrees(np.arccos(abs(printed[0, 0]))) == pytest.approx(2.6, abs=0.05)
     for pair, value in case["tau_prime_mhz"].items():
         i, j = PAIRS[pair]
-        found = tau[i, i, j, j] + 2 * (i != j) * tau[i, j, i, j]
-        assert found == pytest.approx(value, rel=4e-6), pair  # coordinates to 1e-6 Å, constants of 2006
+        computed = tau[i, i, j, j] + 2 * (i != j) * tau[i, j, i, j]
+        assert computed == pytest.approx(value, rel=4e-6), pair  # coordinates to 1e-6 Å, constants of 2006
 
 
 def test_coriolis_constants_and_inertial_defect_of_water_are_those_that_spectro_prints():
@@ -178,7 +178,7 @@ def test_the_moments_follow_the_sum_with_its_poles():
         top = rotor.Top.from_molecule(field.molecule)
         w, moments, f = field.vibrations().wavenumbers_cm, top.moments_u_angstrom2, 505379.00844 / 29979.2458
         a, zeta = inertia_by_modes(field, top), coriolis_zeta(field)
-        found = harmonic_correction_u_angstrom2(field)
+        computed = harmonic_correction_u_angstrom2(field)
         for g in range(3):
             total = 0.0
             for k in range(len(w)):
@@ -186,7 +186,7 @@ def test_the_moments_follow_the_sum_with_its_poles():
                 others = [other for other in range(len(w)) if other != k]
                 poles = [zeta[g, k, o] ** 2 * (3 * w[k] ** 2 + w[o] ** 2) / (w[k] ** 2 - w[o] ** 2) for o in others]
                 total += sum(poles) / w[k]
-            assert found[g] == pytest.approx(-f * total, rel=1e-9)  # round-off of the poles
+            assert computed[g] == pytest.approx(-f * total, rel=1e-9)  # round-off of the poles
 
 
 def test_no_inertial_defect_where_it_is_no_harmonic_quantity():

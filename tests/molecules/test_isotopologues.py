@@ -37,8 +37,8 @@ def test_abundances_of_a_family_are_those_of_all_placements(name):
     distances = np.linalg.norm(molecule.positions_angstrom[:, None] - molecule.positions_angstrom, axis=2).round(4)
     families: dict[tuple, list[float]] = defaultdict(list)
     for placement in itertools.product(*options):
-        part = np.prod([one.abundance for one in placement])
-        numbers = [one.mass_number for one in placement]
+        part = np.prod([item.abundance for item in placement])
+        numbers = [item.mass_number for item in placement]
         key = sorted(
             (
                 molecule.symbols[i],
@@ -49,26 +49,29 @@ def test_abundances_of_a_family_are_those_of_all_placements(name):
         )
         families[tuple(key)].append(float(part))
     expected = sorted((sum(parts), len(parts)) for parts in families.values() if sum(parts) >= 1e-7)
-    found = sorted(
-        (one.abundance, one.arrangements) for one in isotopologues(Top.from_molecule(molecule), min_abundance=1e-7)
+    computed = sorted(
+        (variant.abundance, variant.arrangements)
+        for variant in isotopologues(Top.from_molecule(molecule), min_abundance=1e-7)
     )
-    assert [n for _, n in found] == [n for _, n in expected]
-    assert np.allclose([a for a, _ in found], [a for a, _ in expected], rtol=1e-9)  # sums of products in another order
+    assert [n for _, n in computed] == [n for _, n in expected]
+    assert np.allclose(
+        [a for a, _ in computed], [a for a, _ in expected], rtol=1e-9
+    )  # sums of products in another order
 
 
 def test_all_isotopologues_together_are_all_molecules():
-    found = isotopologues(Top.from_molecule(g2_molecule("CH3Cl")), min_abundance=1e-14)
-    assert sum(one.abundance for one in found) == pytest.approx(1, abs=1e-10)  # what is rarer than the limit
+    computed = isotopologues(Top.from_molecule(g2_molecule("CH3Cl")), min_abundance=1e-14)
+    assert sum(entry.abundance for entry in computed) == pytest.approx(1, abs=1e-10)  # what is rarer than the limit
 
 
 def test_benzene_has_three_pairs_of_13c():
     family = isotopologues(rotor.read("C6H6"))
-    pairs = {one.label: one for one in family if len(one.substituted) == 2}
-    assert {label: one.arrangements for label, one in pairs.items()} == {
+    pairs = {item.label: item for item in family if len(item.substituted) == 2}
+    assert {label: pair.arrangements for label, pair in pairs.items()} == {
         "C4[13C]2H6 (1=13C,2=13C)": 6, "C4[13C]2H6 (1=13C,3=13C)": 6, "C4[13C]2H6 (1=13C,4=13C)": 3,
     }  # fmt: skip
-    assert [one.top.symmetry.point_group for one in pairs.values()].count("D2h") == 1  # para
-    assert not any("doubtful" in note for one in family for note in one.top.notes)
+    assert [pair.top.symmetry.point_group for pair in pairs.values()].count("D2h") == 1  # para
+    assert not any("doubtful" in note for item in family for note in item.top.notes)
 
 
 def test_mirror_images_are_one_isotopologue():
@@ -85,12 +88,14 @@ def test_mirror_images_are_one_isotopologue():
 
 def test_a_parent_that_is_rare_itself_has_the_same_family():
     rare = rotor.read("water", isotopes="O=18O")
-    assert [one.label for one in isotopologues(rare)] == [one.label for one in isotopologues(rotor.read("water"))]
+    assert [variant.label for variant in isotopologues(rare)] == [
+        variant.label for variant in isotopologues(rotor.read("water"))
+    ]
 
 
 def test_one_at_a_time():
-    found = single_substitutions(rotor.read("CH3CN"), "C", "13C")
-    assert [dict(one.substituted) for one in found] == [{1: "13C"}, {2: "13C"}]
+    computed = single_substitutions(rotor.read("CH3CN"), "C", "13C")
+    assert [dict(entry.substituted) for entry in computed] == [{1: "13C"}, {2: "13C"}]
     assert len(single_substitutions(rotor.read("C6H6"), "H", "2H")) == 1
     with pytest.raises(ValueError, match="element 'O'"):
         single_substitutions(rotor.read("CH3CN"), "O", "18O")
@@ -100,7 +105,7 @@ def test_the_lowest_of_equivalent_atoms_is_named_also_for_a_lighter_isotope():
     """Of boron 11B is the abundant one."""
     pair = Molecule(("B", "B"), [[0.0, 0.0, 0.0], [0.0, 0.0, 1.6]])
     family = isotopologues(Top.from_molecule(pair), min_abundance=1e-3)
-    assert [dict(one.substituted) for one in family] == [{}, {1: "10B"}, {1: "10B", 2: "10B"}]
+    assert [dict(item.substituted) for item in family] == [{}, {1: "10B"}, {1: "10B", 2: "10B"}]
 
 
 @pytest.mark.parametrize(
@@ -136,10 +141,10 @@ def test_heavy_atoms_replaced_are_met_within_a_few_parts_in_ten_thousand(shared)
     for tag, name, changes in cases:
         catalogue = rotor.read(shared / "reference" / "catalogues" / f"{tag}.cat.gz")
         line = catalogue.frequency_mhz[catalogue.tag < 0][0]
-        one = isotopologue(rotor.read(name), changes).top.constants
-        found = 2 * one["B"] - 4 * one["D"]
-        assert found == pytest.approx(line, rel=2e-4), tag  # what the two vibrational averages differ by
-        assert found != pytest.approx(line, rel=1e-8)  # scaled, not looked up
+        item = isotopologue(rotor.read(name), changes).top.constants
+        computed = 2 * item["B"] - 4 * item["D"]
+        assert computed == pytest.approx(line, rel=2e-4), tag  # what the two vibrational averages differ by
+        assert computed != pytest.approx(line, rel=1e-8)  # scaled, not looked up
 
 
 @pytest.mark.parametrize(("changes", "name"), [("H=2H", "D2O"), ("2=2H", "HDO")])
@@ -187,11 +192,11 @@ def test_what_scaling_misses_for_heavy_atoms_is_stated(shared):
     for name in ("OCS", "HC3N"):
         fits = [fit.named for fit in make.of_lines(name, shared)[1].values()]
         heavy = [
-            one for one in fits[1:] if name == "OCS" or one["B"] > 0.95 * fits[0]["B"]
+            fit for fit in fits[1:] if name == "OCS" or fit["B"] > 0.95 * fits[0]["B"]
         ]  # B of DC3N is 0.93 of that of HC3N
-        for one, (constant, power) in itertools.product(heavy, (("D", 2), ("H", 3))):
-            if constant in one.values and constant in fits[0].values:
-                ratio = fits[0][constant] * (one["B"] / fits[0]["B"]) ** power / one[constant]
+        for item, (constant, power) in itertools.product(heavy, (("D", 2), ("H", 3))):
+            if constant in item.values and constant in fits[0].values:
+                ratio = fits[0][constant] * (item["B"] / fits[0]["B"]) ** power / item[constant]
                 worst[constant] = max(worst[constant], abs(ratio - 1))
     assert (round(100 * worst["D"], 1), round(100 * worst["H"])) == (1.1, 10)
     notes = " ".join(rotor.read("OCS", isotopes="O=18O").notes)
@@ -264,9 +269,9 @@ def test_diatomics_scale_exactly(distance, changes):
 
 def test_a_geometry_alone_is_recomputed():
     water = g2_molecule("H2O")
-    one = isotopologue(Top.from_molecule(water), "1=18O").top
-    assert one.constants == Top.from_molecule(water.with_isotopes("1=18O")).constants
-    assert not any("the ratio of those calculated" in note for note in one.notes)
+    item = isotopologue(Top.from_molecule(water), "1=18O").top
+    assert item.constants == Top.from_molecule(water.with_isotopes("1=18O")).constants
+    assert not any("the ratio of those calculated" in note for note in item.notes)
 
 
 # Axes, dipole, weights
@@ -288,38 +293,40 @@ def near_oblate() -> Top:
 
 def test_axes_that_change_places_are_matched_by_overlap():
     parent = near_oblate()
-    one = isotopologue(parent, "H=2H")
-    assert one.axes == "bac"
-    along, before = (int(np.argmax(np.abs(top.dipole_abc_debye))) for top in (one.top, parent))
-    assert one.axes[along] == "abc"[before]  # the dipole has not moved in the molecule
+    item = isotopologue(parent, "H=2H")
+    assert item.axes == "bac"
+    along, before = (int(np.argmax(np.abs(top.dipole_abc_debye))) for top in (item.top, parent))
+    assert item.axes[along] == "abc"[before]  # the dipole has not moved in the molecule
     assert along != before
-    assert one.turned_degrees == pytest.approx(0, abs=1e-6)  # matched, they have not turned at all
+    assert item.turned_degrees == pytest.approx(0, abs=1e-6)  # matched, they have not turned at all
 
 
 def test_scaled_constants_follow_axes_that_change_places():
     rigid = near_oblate()
     measured = rigid.constants.replace(A=rigid.constants["A"] * 1.001, DeltaJ=1.0)
     parent = replace(rigid, constants=measured)
-    one = isotopologue(parent, "H=2H")
-    bare = Top.from_molecule(one.top.molecule).constants
-    assert one.top.constants["B"] == pytest.approx(bare["B"] * 1.001, rel=1e-12)  # B here is along the parent's a
-    assert one.top.constants["A"] == pytest.approx(bare["A"], rel=1e-12)
-    assert "DeltaJ" not in one.top.constants
+    item = isotopologue(parent, "H=2H")
+    bare = Top.from_molecule(item.top.molecule).constants
+    assert item.top.constants["B"] == pytest.approx(bare["B"] * 1.001, rel=1e-12)  # B here is along the parent's a
+    assert item.top.constants["A"] == pytest.approx(bare["A"], rel=1e-12)
+    assert "DeltaJ" not in item.top.constants
 
 
 def test_scaled_constants_out_of_order_take_their_frame_along():
     rigid = near_oblate().with_polarizability(np.diag([3.0, 2.0, 1.0]), "invented")
     parent = replace(rigid, constants=rigid.constants.replace(A=rigid.constants["A"] * 1.2))
-    one = isotopologue(parent, "H=2H").top
-    bare = Top.from_molecule(one.molecule)
-    assert one.constants["A"] == pytest.approx(bare.constants["B"] * 1.2, rel=1e-12)
+    item = isotopologue(parent, "H=2H").top
+    bare = Top.from_molecule(item.molecule)
+    assert item.constants["A"] == pytest.approx(bare.constants["B"] * 1.2, rel=1e-12)
     theirs = np.array(bare.polarizability_abc_angstrom3)[np.ix_((1, 0, 2), (1, 0, 2))]
-    assert np.abs(one.polarizability_abc_angstrom3) == pytest.approx(np.abs(theirs), abs=1e-12)  # round-off of a turn
+    assert np.abs(item.polarizability_abc_angstrom3) == pytest.approx(np.abs(theirs), abs=1e-12)  # round-off of a turn
     assert np.diag(theirs)[0] != pytest.approx(np.diag(theirs)[1], rel=0.1)
-    assert one.constants.rigid == tuple(sorted(one.constants.rigid, reverse=True))
-    assert [abs(mu) for mu in one.dipole_abc_debye] == pytest.approx([abs(bare.dipole_abc_debye[i]) for i in (1, 0, 2)])
-    assert np.linalg.det(one.frame.axes) == pytest.approx(1.0)
-    assert any("another order" in note for note in one.notes)
+    assert item.constants.rigid == tuple(sorted(item.constants.rigid, reverse=True))
+    assert [abs(mu) for mu in item.dipole_abc_debye] == pytest.approx(
+        [abs(bare.dipole_abc_debye[i]) for i in (1, 0, 2)]
+    )
+    assert np.linalg.det(item.frame.axes) == pytest.approx(1.0)
+    assert any("another order" in note for note in item.notes)
 
 
 @pytest.mark.parametrize(
@@ -330,10 +337,10 @@ def test_scaled_constants_out_of_order_take_their_frame_along():
 )  # fmt: skip
 def test_free_axes_do_not_count_as_turned(name, changes, kind, degrees):
     """Of NH2D the axis nearest to C3 is 9.06° off it, wherever a and b of NH3 were put."""
-    one = isotopologue(rotor.read(name), changes)
-    assert one.top.kind == kind
-    assert one.turned_degrees == pytest.approx(degrees, abs=0.01)
-    assert not any("doubtful" in note for note in one.top.notes)
+    item = isotopologue(rotor.read(name), changes)
+    assert item.top.kind == kind
+    assert item.turned_degrees == pytest.approx(degrees, abs=0.01)
+    assert not any("doubtful" in note for note in item.top.notes)
 
 
 def test_the_frame_of_the_input_has_no_bearing():
@@ -376,7 +383,7 @@ def test_json_and_what_is_asked_for(capsys, tmp_path):
     options = ["--each", "H=2H", "--site", "2=2H", "--site", "3=2H", "--json"]
     assert run(["isotopologues", "water", *options, "-"]) == 0
     content = json.loads(capsys.readouterr().out)
-    assert [one["label"] for one in content["isotopologues"]] == ["H[2H]O (2=2H)", "[2H]2O (2=2H,3=2H)"]
+    assert [variant["label"] for variant in content["isotopologues"]] == ["H[2H]O (2=2H)", "[2H]2O (2=2H,3=2H)"]
     assert content["isotopologues"][0]["arrangements"] == 2
     assert run(["isotopologues", "water", *options, str(tmp_path / "w.json")]) == 0
     assert json.loads((tmp_path / "w.json").read_text())["isotopologues"] == content["isotopologues"]
@@ -396,7 +403,7 @@ def test_mistakes_on_the_command_line(capsys, options, words):
 
 def test_natural_isotopes_add_up():
     for symbol in ("H", "C", "O", "Cl", "Sn", "Xe"):
-        parts = [one.abundance for one in natural_isotopes(symbol)]
+        parts = [natural_isotope.abundance for natural_isotope in natural_isotopes(symbol)]
         assert parts == sorted(parts, reverse=True)
         assert sum(parts) == pytest.approx(1, abs=2e-4)  # rounding of the tables
         assert natural_isotopes(symbol)[0] == isotope(symbol)
@@ -412,13 +419,15 @@ def test_ten_thousand_atoms_get_a_clear_word():
 @pytest.mark.parametrize("path", sorted((data_folder() / "molecules").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_molecule_of_the_library_has_a_family(path):
     family = isotopologues(rotor.read(path), min_abundance=3e-3)
-    assert sum(one.abundance for one in family) <= 1 + 1e-9
-    usual = next(one.top for one in family if not one.substituted)  # not the first for CCl4: C 35Cl3 37Cl is commoner
-    for one in family:
-        a, b, c = one.top.rotational_constants_mhz
+    assert sum(item.abundance for item in family) <= 1 + 1e-9
+    usual = next(
+        item.top for item in family if not item.substituted
+    )  # not the first for CCl4: C 35Cl3 37Cl is commoner
+    for item in family:
+        a, b, c = item.top.rotational_constants_mhz
         assert a >= b >= c > 0
-        assert one.top.spin_weights.mean > 0
-        ratio = np.divide(one.top.rotational_constants_mhz[1:], usual.rotational_constants_mhz[1:])
+        assert item.top.spin_weights.mean > 0
+        ratio = np.divide(item.top.rotational_constants_mhz[1:], usual.rotational_constants_mhz[1:])
         assert (
             (ratio > 0.9) & (ratio < 1.0 + 1e-9)
         ).all()  # one or two heavier atoms slow it down, by less than a tenth

@@ -135,7 +135,7 @@ def test_molecules_as_json(capsys, home):
         "linear",
         None,
     )
-    by_name = {one["name"]: one for one in records if not one["own"]}
+    by_name = {record["name"]: record for record in records if not record["own"]}
     water = by_name["water"]  # still there under its other names
     assert (water["kind"], water["point_group"], water["symmetry_number"]) == ("asymmetric", "C2v", 2)
     assert water["kappa"] == pytest.approx(-0.437, abs=5e-4)  # of A, B, C: three digits
@@ -198,7 +198,7 @@ files.parse_molecule_file = lambda *a, **k: read.append(a) or whole(*a, **k)
 library.library_molecule("formaldehyde")
 print(len(read))
 """
-    found = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=OURS.parents[1]
     )
-    assert found.stdout == "1\n"
+    assert process.stdout == "1\n"

@@ -10,7 +10,7 @@ from places import SHARED
 
 from rotor.molecules.nuclei import _isotopes, _lines, data_folder, element_symbol, isotope, isotope_of_mass, masses
 
-EVERY = [one for element in _lines() for one in _isotopes(element).values()]
+NUCLEI = [item for element in _lines() for item in _isotopes(element).values()]
 
 
 def test_published_values():
@@ -29,22 +29,22 @@ def test_quadrupole_ratio_of_bromine_isotopes_is_the_measured_one():
 
 
 def test_elements_mean_their_most_abundant_isotope():
-    found = [isotope(symbol).mass_number for symbol in ("H", "C", "O", "Cl", "Br", "Sn", "Te")]
-    assert found == [1, 12, 16, 35, 79, 120, 130]
+    computed = [isotope(symbol).mass_number for symbol in ("H", "C", "O", "Cl", "Br", "Sn", "Te")]
+    assert computed == [1, 12, 16, 35, 79, 120, 130]
     assert isotope("Tc").mass_number == 97  # no abundance: the longest-lived
 
 
 def test_abundances_of_an_element_add_up_to_one_or_none():
     for isotopes in map(_isotopes, _lines()):
-        total = sum(one.abundance for one in isotopes.values())
+        total = sum(item.abundance for item in isotopes.values())
         assert total == 0 or total == pytest.approx(1, abs=3e-4)  # the worst, 2.4e-4, is rounding of the tables
 
 
 def test_mass_numbers_and_spins_fit_the_nucleus():
-    for one in EVERY:
-        assert round(one.mass_u) == one.mass_number
-        assert (2 * one.spin) % 2 == one.mass_number % 2  # half-integer spin for an odd number of nucleons
-        assert one.spin >= 1 or one.quadrupole_barn == 0.0  # Q of a spin below 1 vanishes (Wigner-Eckart)
+    for item in NUCLEI:
+        assert round(item.mass_u) == item.mass_number
+        assert (2 * item.spin) % 2 == item.mass_number % 2  # half-integer spin for an odd number of nucleons
+        assert item.spin >= 1 or item.quadrupole_barn == 0.0  # Q of a spin below 1 vanishes (Wigner-Eckart)
 
 
 @pytest.mark.parametrize("name", ["2H", "D", "H2", "H-2", "2-H", " D "])
@@ -68,11 +68,11 @@ def test_unknown_names_are_refused_with_what_is_near(name, number, message):
         isotope(name, number)
 
 
-@given(st.sampled_from(EVERY))
-def test_a_label_and_a_mass_name_their_isotope(one):
-    assert isotope(one.label) is one
-    assert isotope_of_mass(one.symbol, one.mass_u) is one
-    assert element_symbol(one.element_number) == one.symbol
+@given(st.sampled_from(NUCLEI))
+def test_a_label_and_a_mass_name_their_isotope(item):
+    assert isotope(item.label) is item
+    assert isotope_of_mass(item.symbol, item.mass_u) is item
+    assert element_symbol(item.element_number) == item.symbol
 
 
 def test_a_mass_of_zero_or_of_the_natural_mixture_is_no_isotope():
@@ -109,8 +109,8 @@ def test_every_natural_isotope_agrees_with_the_tables():
         rows = [row for row in csv.DictReader(file) if float(row["abundance"] or 0) > 0]
     assert len(rows) == 288
     for row in rows:
-        one = isotope(row["symbol"], int(row["mass_number"]))
-        assert one.mass_u == float(row["mass [u]"])
-        assert one.spin == float(row["spin"])
-        if one.label != "126Te":  # the table's 8.84 % leaves tellurium at 90 %; 18.84 % is IUPAC's
-            assert one.abundance == pytest.approx(float(row["abundance"]) / 100, rel=1e-7)  # 8 digits are kept
+        item = isotope(row["symbol"], int(row["mass_number"]))
+        assert item.mass_u == float(row["mass [u]"])
+        assert item.spin == float(row["spin"])
+        if item.label != "126Te":  # the table's 8.84 % leaves tellurium at 90 %; 18.84 % is IUPAC's
+            assert item.abundance == pytest.approx(float(row["abundance"]) / 100, rel=1e-7)  # 8 digits are kept

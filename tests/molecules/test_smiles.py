@@ -49,12 +49,15 @@ def test_conformers_are_kept_with_their_energies():
     assert trans.energy_kj_per_mol == 0
     assert gauche.energy_kj_per_mol == pytest.approx(3.27, abs=0.02)  # 0.78 kcal/mol of MMFF94
     ends = [
-        np.linalg.norm(one.molecule.positions_angstrom[0] - one.molecule.positions_angstrom[3])
-        for one in (trans, gauche)
+        np.linalg.norm(item.molecule.positions_angstrom[0] - item.molecule.positions_angstrom[3])
+        for item in (trans, gauche)
     ]
     assert ends[0] > 3.8 > 3.3 > ends[1]
     assert len(conformers("O", 20)) == 1  # twenty times the same geometry
-    assert [round(one.energy_kj_per_mol) for one in conformers("C1CCCCC1", 20)] == [0, 25]  # chair, twisted boat
+    assert [round(conformer.energy_kj_per_mol) for conformer in conformers("C1CCCCC1", 20)] == [
+        0,
+        25,
+    ]  # chair, twisted boat
     assert len(conformers("OO", 20)) == 1  # its two forms are mirror images
 
 

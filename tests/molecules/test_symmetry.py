@@ -73,9 +73,9 @@ def test_g2_in_any_orientation_with_noise(seed):
         return turned + rng.normal(scale=1e-4, size=positions.shape)  # the noise in Å that must not hide a symmetry
 
     for name, group in GROUP_OF.items():
-        found = g2_symmetry(name, disturbed)
-        assert (found.point_group, found.symmetry_number) == (group, SIGMA[group]), name
-        assert found.deviation_angstrom < 6e-4, name  # six standard deviations of the noise
+        computed = g2_symmetry(name, disturbed)
+        assert (computed.point_group, computed.symmetry_number) == (group, SIGMA[group]), name
+        assert computed.deviation_angstrom < 6e-4, name  # six standard deviations of the noise
 
 
 # Shapes for the groups that g2 lacks, with the rotations and their number
@@ -132,24 +132,24 @@ SHAPES = {
 def test_groups_beyond_g2(group):
     points, rotations, number = SHAPES[group]
     points = points @ any_turn(np.random.default_rng(3)).T
-    found = find_symmetry(["F"] * len(points), np.full(len(points), 19.0), points)
-    assert (found.point_group, found.rotation_group, found.symmetry_number) == (group, rotations, number)
-    sizes = {len(alike) for alike in found.equivalent}
-    assert all(number * (2 if found.improper else 1) % size == 0 for size in sizes)  # orbits divide the order
+    computed = find_symmetry(["F"] * len(points), np.full(len(points), 19.0), points)
+    assert (computed.point_group, computed.rotation_group, computed.symmetry_number) == (group, rotations, number)
+    sizes = {len(alike) for alike in computed.equivalent}
+    assert all(number * (2 if computed.improper else 1) % size == 0 for size in sizes)  # orbits divide the order
 
 
 @pytest.mark.parametrize("name", ["NH3", "C2H4", "C6H6", "CH4", "C3H4_D2d", "C2H6", "CO2", "H2O2"])
 def test_operations_are_a_group_and_do_what_they_say(name):
-    found = g2_symmetry(name)
+    computed = g2_symmetry(name)
     mass = masses(g2[name].get_chemical_symbols())
     positions = g2[name].positions - mass @ g2[name].positions / mass.sum()
-    known = {one.permutation.tobytes() for one in found.rotations}
-    for one in found.rotations:
-        images = positions @ one.matrix.T
-        assert np.abs(images - positions[one.permutation]).max() < 1e-5  # g2 prints six decimals
-        assert abs(np.linalg.det(one.matrix) - 1) < 1e-12  # round-off
-        for other in found.rotations:
-            assert one.permutation[other.permutation].tobytes() in known
+    known = {rotation.permutation.tobytes() for rotation in computed.rotations}
+    for rotation in computed.rotations:
+        images = positions @ rotation.matrix.T
+        assert np.abs(images - positions[rotation.permutation]).max() < 1e-5  # g2 prints six decimals
+        assert abs(np.linalg.det(rotation.matrix) - 1) < 1e-12  # round-off
+        for other in computed.rotations:
+            assert rotation.permutation[other.permutation].tobytes() in known
 
 
 def test_axes_of_water_and_allene():
@@ -196,18 +196,20 @@ def ammonia(height):
 )
 def test_near_symmetry_is_said_and_not_used(shape, group, near, displacement):
     symbols, positions = shape
-    found = find_symmetry(symbols, masses(symbols), positions)
-    assert found.point_group == group
-    assert (found.near.point_group if found.near else None) == near
-    if found.near:
-        assert found.near.displacement_angstrom == pytest.approx(displacement, abs=1e-3)  # worked out by hand to 1e-3
-        assert f"near {near}" in found.describe()
+    computed = find_symmetry(symbols, masses(symbols), positions)
+    assert computed.point_group == group
+    assert (computed.near.point_group if computed.near else None) == near
+    if computed.near:
+        assert computed.near.displacement_angstrom == pytest.approx(
+            displacement, abs=1e-3
+        )  # worked out by hand to 1e-3
+        assert f"near {near}" in computed.describe()
 
 
 def test_isotopes_break_symmetry_and_are_not_near():
     symbols = g2["C6H6"].get_chemical_symbols()
-    found = symmetry_of(Molecule(("13C", *symbols[1:]), g2["C6H6"].positions))
-    assert (found.point_group, found.symmetry_number, found.near) == ("C2v", 2, None)
+    computed = symmetry_of(Molecule(("13C", *symbols[1:]), g2["C6H6"].positions))
+    assert (computed.point_group, computed.symmetry_number, computed.near) == ("C2v", 2, None)
 
 
 def test_masses_tell_nuclei_apart_where_kinds_do_not():
@@ -224,17 +226,17 @@ def test_a_limit_that_cuts_through_a_group_is_lowered():
     kinds, mass = "CCCNO", np.array([12.0, 12, 12, 14, 16])
     centred = points - mass @ points / mass.sum()
     operations, base = find_operations(np.array([0, 0, 0, 1, 2]), centred, 0.2)
-    mismatches = np.array([one.mismatch_angstrom for one in operations])
+    mismatches = np.array([operation.mismatch_angstrom for operation in operations])
     limits = np.sort(mismatches) + 1e-9
     within = [int((mismatches <= limit).sum()) for limit in limits]
-    kept = [len(closed_group(operations, base, limit)) for limit in limits]
+    selected = [len(closed_group(operations, base, limit)) for limit in limits]
     assert len(operations) == 6
-    assert set(kept) <= {1, 2, 3, 6}  # orders of the subgroups of C3v
-    cut = [limit for limit, n, m in zip(limits, within, kept, strict=True) if m < n]
+    assert set(selected) <= {1, 2, 3, 6}  # orders of the subgroups of C3v
+    cut = [limit for limit, n, m in zip(limits, within, selected, strict=True) if m < n]
     assert cut  # four or five operations within the limit, which cannot be a group
     for limit in cut:
-        found = find_symmetry(kinds, mass, points, tolerance=limit / shortest_distance(points))
-        assert found.point_group in ("C1", "Cs", "C3")
+        computed = find_symmetry(kinds, mass, points, tolerance=limit / shortest_distance(points))
+        assert computed.point_group in ("C1", "Cs", "C3")
 
 
 def test_tolerance_is_relative_and_stated():
@@ -261,16 +263,16 @@ def test_rotation_shift_and_order_of_atoms_change_nothing(name, seed):
     atoms, order = g2[name], rng.permutation(len(g2[name]))
     symbols = [atoms.get_chemical_symbols()[i] for i in order]
     moved = (atoms.positions @ any_turn(rng).T + rng.normal(scale=3, size=3))[order]
-    one, other = g2_symmetry(name), find_symmetry(symbols, masses(symbols), moved)
+    first, other = g2_symmetry(name), find_symmetry(symbols, masses(symbols), moved)
 
-    assert (one.point_group, one.rotation_group) == (other.point_group, other.rotation_group)
-    assert (one.near is None) == (other.near is None)
-    assert {frozenset(group) for group in one.equivalent} == {
+    assert (first.point_group, first.rotation_group) == (other.point_group, other.rotation_group)
+    assert (first.near is None) == (other.near is None)
+    assert {frozenset(group) for group in first.equivalent} == {
         frozenset(int(order[i]) for i in group) for group in other.equivalent
     }
-    assert np.allclose(one.moments_u_angstrom2, other.moments_u_angstrom2, atol=1e-8)
+    assert np.allclose(first.moments_u_angstrom2, other.moments_u_angstrom2, atol=1e-8)
     back = {tuple(order[r.permutation][np.argsort(order)].tolist()) for r in other.rotations}
-    assert back == {tuple(r.permutation.tolist()) for r in one.rotations}
+    assert back == {tuple(r.permutation.tolist()) for r in first.rotations}
 
 
 def test_best_turn_is_of_the_handedness_asked_for_in_a_plane():
@@ -306,8 +308,13 @@ def test_bad_tolerances_are_told(tolerance):
 
 
 def test_one_atom():
-    found = find_symmetry(["He"], [4.0], [[1, 2, 3]])
-    assert (found.point_group, found.rotation_group, found.symmetry_number, found.equivalent) == ("Kh", "K", 1, ((0,),))
+    computed = find_symmetry(["He"], [4.0], [[1, 2, 3]])
+    assert (computed.point_group, computed.rotation_group, computed.symmetry_number, computed.equivalent) == (
+        "Kh",
+        "K",
+        1,
+        ((0,),),
+    )
 
 
 # Ten thousand nuclei
@@ -319,10 +326,10 @@ def test_ten_thousand_nuclei_in_seconds():
     half = 2.0 * grid + rng.uniform(-0.4, 0.4, size=grid.shape) + [1.0, 2.0, 3.0]
     points = np.concatenate([half, half * [-1, -1, 1]])
     start = time.perf_counter()
-    found = find_symmetry(["C"] * len(points), np.full(len(points), 12.0), points)
+    computed = find_symmetry(["C"] * len(points), np.full(len(points), 12.0), points)
     lone = find_symmetry(["C"] * len(points), np.full(len(points), 12.0), np.concatenate([points[:-1], [[99.0, 0, 0]]]))
-    assert (len(points), found.point_group, lone.point_group) == (9826, "C2", "C1")
-    assert "not looked for" in found.describe()
+    assert (len(points), computed.point_group, lone.point_group) == (9826, "C2", "C1")
+    assert "not looked for" in computed.describe()
     assert time.perf_counter() - start < 20  # about a second here; a slower machine has room
 
     with pytest.raises(ValueError, match="too many like atoms"):
@@ -352,11 +359,11 @@ def test_groups_of_cccbdb(shared: Path):
     with gzip.open(shared / "reference/structures/geometry_and_constants.json.gz", "rt", encoding="utf-8") as handle:
         species = json.load(handle)
     differ = {}
-    for key, one in species.items():
-        rows = [line.split() for line in one["xyz"].splitlines()]
+    for key, component in species.items():
+        rows = [line.split() for line in component["xyz"].splitlines()]
         symbols = [row[0] for row in rows]
-        found = find_symmetry(symbols, masses(symbols), [[float(x) for x in row[1:4]] for row in rows])
-        if found.point_group != one["point_group"]:
-            differ[key] = found.point_group
+        computed = find_symmetry(symbols, masses(symbols), [[float(x) for x in row[1:4]] for row in rows])
+        if computed.point_group != component["point_group"]:
+            differ[key] = computed.point_group
     assert len(species) == 339
     assert differ == CCCBDB_DIFFERS

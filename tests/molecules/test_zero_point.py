@@ -67,7 +67,7 @@ BEYOND = ["OCS", "C2H4", "CH3Cl", "H2CO"]
 
 def diatomic(first: str, second: str, length: float) -> tuple[np.ndarray, np.ndarray, float]:
     atoms = [isotope("H", 2) if symbol == "D" else isotope(symbol) for symbol in (first, second)]
-    return np.array([float(one.element_number) for one in atoms]), np.array([one.mass_u for one in atoms]), length
+    return np.array([float(atom.element_number) for atom in atoms]), np.array([atom.mass_u for atom in atoms]), length
 
 
 def estimate_over_measured(first: str, second: str, b: float, alpha: float, length: float) -> float:
@@ -82,17 +82,17 @@ def measured_difference(molecule: Molecule, constants_mhz: np.ndarray) -> float:
     """The quadratic mean over the axes of the relative difference of constants to those of a geometry."""
     moments = principal_frame(point_masses(molecule.masses_u, molecule.positions_angstrom)).moments
     turning = moments > 1e-6 * moments.max()
-    of_geometry = units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments[turning]
-    if len(constants_mhz) < len(of_geometry):  # B alone of a linear molecule
-        of_geometry = of_geometry[-len(constants_mhz) :]
-    return mean_square(constants_mhz / of_geometry - 1)
+    geometric_mhz = units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments[turning]
+    if len(constants_mhz) < len(geometric_mhz):  # B alone of a linear molecule
+        geometric_mhz = geometric_mhz[-len(constants_mhz) :]
+    return mean_square(constants_mhz / geometric_mhz - 1)
 
 
 def test_the_table_agrees_with_itself():
     for first, second, b, _, length in DIATOMIC:
         _, mass, _ = diatomic(first, second, length)
-        made = units.ROTATIONAL_MHZ_U_ANGSTROM2 * mass.sum() / (mass.prod() * length**2) / units.MHZ_PER_CM
-        assert made == pytest.approx(b, rel=2e-3)  # r_e of some rows has four digits
+        rotational_cm = units.ROTATIONAL_MHZ_U_ANGSTROM2 * mass.sum() / (mass.prod() * length**2) / units.MHZ_PER_CM
+        assert rotational_cm == pytest.approx(b, rel=2e-3)  # r_e of some rows has four digits
 
 
 def test_f_is_the_median_of_every_second_molecule():
@@ -114,16 +114,16 @@ def test_a_diatomic_molecule_is_longer_by_its_bond():
     carbon_monoxide = Molecule(["C", "O"], [[0, 0, 0], [0.3, 1.0, 0.4]])
     _, mass, _ = diatomic("C", "O", 0.0)
     length = float(np.linalg.norm(np.diff(carbon_monoxide.positions_angstrom, axis=0)))
-    one = relative_elongation(np.array([6.0, 8.0]), mass, length)
+    item = relative_elongation(np.array([6.0, 8.0]), mass, length)
     bonds = bonded_atoms(carbon_monoxide)
-    assert relative_difference(carbon_monoxide, bonds) == pytest.approx(2 * one, rel=5e-5)  # step of the derivative
+    assert relative_difference(carbon_monoxide, bonds) == pytest.approx(2 * item, rel=5e-5)  # step of the derivative
 
 
 def test_angles_stay():
     """Equal bonds at fixed angles: all lengths grow alike, by δr/r of C-H, and all moments by twice that."""
     methane = rotor.read("CH4").molecule
-    one = relative_elongation(*diatomic("C", "H", float(np.linalg.norm(methane.positions_angstrom[1]))))
-    assert relative_difference(methane, bonded_atoms(methane)) == pytest.approx(2 * one, rel=5e-5)  # the same step
+    item = relative_elongation(*diatomic("C", "H", float(np.linalg.norm(methane.positions_angstrom[1]))))
+    assert relative_difference(methane, bonded_atoms(methane)) == pytest.approx(2 * item, rel=5e-5)  # the same step
 
 
 @pytest.mark.parametrize("name", WITHIN)
@@ -139,7 +139,7 @@ def test_where_the_factor_is_missed(name):
 
 def library_ratio(name: str) -> float:
     top = rotor.read(name)
-    constants = np.array([one for one in top.rotational_constants_mhz if np.isfinite(one) and one > 0])
+    constants = np.array([item for item in top.rotational_constants_mhz if np.isfinite(item) and item > 0])
     estimate = relative_difference(top.molecule, bonded_atoms(top.molecule))
     return estimate / measured_difference(top.molecule, constants[-1:] if top.kind == "linear" else constants)
 
@@ -148,7 +148,7 @@ def test_corrections_of_maleic_anhydride():
     """B_e - B_0 with anharmonic force fields, in the file of the fit of its structure."""
     content = tomllib.loads((EXAMPLES / "maleic_anhydride.toml").read_text(encoding="utf-8"))
     atoms = content["geometry"]["atoms"]
-    molecule = Molecule([one[0] for one in atoms], [one[1:] for one in atoms])
+    molecule = Molecule([atom[0] for atom in atoms], [atom[1:] for atom in atoms])
     main = content["isotopologue"][0]
     values = [
         [float(part.split("=")[1]) for part in main[key].removesuffix(" MHz").split()]
@@ -163,33 +163,33 @@ def test_species_of_the_reference(shared):
     """Neutral polyatomic species whose geometry is more than 0.3 % off the constants: below that it is one of the ground state."""
     path = shared / "reference" / "structures" / "geometry_and_constants.json.gz"
     ratios = []
-    for one in json.loads(gzip.decompress(path.read_bytes())).values():
-        rows = [line.split() for line in one["xyz"].splitlines()]
-        if one["charge"] or one["max_rel_dev"] < 0.003 or len(rows) < 3:
+    for item in json.loads(gzip.decompress(path.read_bytes())).values():
+        rows = [line.split() for line in item["xyz"].splitlines()]
+        if item["charge"] or item["max_rel_dev"] < 0.003 or len(rows) < 3:
             continue
         molecule = Molecule([row[0] for row in rows], [[float(x) for x in row[1:]] for row in rows])
-        constants = units.MHZ_PER_CM * np.sort(np.array(one["rot_cm1"]))[::-1]
+        constants = units.MHZ_PER_CM * np.sort(np.array(item["rot_cm1"]))[::-1]
         ratios.append(relative_difference(molecule, bonded_atoms(molecule)) / measured_difference(molecule, constants))
-    found = np.array(ratios)
-    assert len(found) > 60
-    assert 0.5 < np.median(found) < 2.0
-    assert np.mean((found > 1 / FACTOR) & (found < FACTOR)) > 0.9
+    computed = np.array(ratios)
+    assert len(computed) > 60
+    assert 0.5 < np.median(computed) < 2.0
+    assert np.mean((computed > 1 / FACTOR) & (computed < FACTOR)) > 0.9
 
 
 def test_large_molecules_take_the_mean_over_their_bonds():
-    found = []
+    results = []
     for count in (LARGE - 10, LARGE + 10):
         chain = [[1.25 * i, 0.88 * (i % 2), 0.0] for i in range(count)]
         molecule = Molecule(["C"] * count, chain)
-        found.append(relative_difference(molecule, bonded_atoms(molecule)))
-    assert found[0] == pytest.approx(found[1], rel=0.2)  # the one by moments, the other by bonds
+        results.append(relative_difference(molecule, bonded_atoms(molecule)))
+    assert results[0] == pytest.approx(results[1], rel=0.2)  # the one by moments, the other by bonds
 
 
 def test_the_size_is_the_shift_of_a_line():
     """CO by its geometry alone: lines with B and with B (1 - δB/B)."""
     top = rotor.read("CO")
     bare = rotor.Top.from_molecule(top.molecule)
-    limit = {one.name: one for one in model_limits(bare, 7, SEMI_RIGID)}["vibration-rotation difference"]
+    limit = {limit.name: limit for limit in model_limits(bare, 7, SEMI_RIGID)}["vibration-rotation difference"]
     b = bare.rotational_constants_mhz[1]
     relative = relative_difference(top.molecule, bonded_atoms(top.molecule))
     lower = rotor.Top.from_constants(f"B={b * (1 - relative)} MHz")
@@ -200,6 +200,8 @@ def test_the_size_is_the_shift_of_a_line():
 
 
 def test_constants_of_the_ground_state_have_no_such_difference():
-    assert "vibration-rotation difference" not in {one.name for one in model_limits(rotor.read("CO"), 7, SEMI_RIGID)}
+    assert "vibration-rotation difference" not in {
+        limit.name for limit in model_limits(rotor.read("CO"), 7, SEMI_RIGID)
+    }
     atoms = Molecule(["Ar", "Ar"], [[0, 0, 0], [3.8, 0, 0]])
     assert relative_difference(atoms, bonded_atoms(atoms)) == 0.0

@@ -16,8 +16,8 @@ def test_the_order_is_that_of_a_stable_sort(count, digits):
 
 
 def test_neighbours_in_the_last_bit_zeros_and_infinity():
-    one = np.nextafter(1e5, np.inf)
-    values = np.array([np.inf, one, 1e5, 0.0, np.nextafter(one, 2e5), -0.0, one, 5e-324, 1e5] * 300)
+    item = np.nextafter(1e5, np.inf)
+    values = np.array([np.inf, item, 1e5, 0.0, np.nextafter(item, 2e5), -0.0, item, 5e-324, 1e5] * 300)
     assert np.array_equal(rising_order(values), np.argsort(values, kind="stable"))
 
 

@@ -25,7 +25,7 @@ from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 DOCS = PROJECT / "docs"
 MOLECULES = {path.stem: read_molecule_file(path) for path in sorted(folders()[-1].glob("*.toml"))}
-every = pytest.mark.parametrize("molecule", MOLECULES.values(), ids=MOLECULES)
+every_molecule = pytest.mark.parametrize("molecule", MOLECULES.values(), ids=MOLECULES)
 measured = pytest.mark.parametrize("stem", [stem for stem, molecule in MOLECULES.items() if molecule.catalogue])
 
 LIBRARY = """H2, N2, O2, CO, CO2, HCN, N2O, HC3N, HC5N, HCP, C2H2, OCS, HCl, CH4, CD4, SF6, CCl4, NH3, ND3, PH3, CH3F, CH3Cl, CH3I,
@@ -60,14 +60,14 @@ def test_the_library_spans_every_kind():
     assert all(kinds.count(kind) >= 4 for kind in ("linear", "spherical", "prolate", "oblate", "asymmetric"))
 
 
-@every
+@every_molecule
 def test_every_table_says_where_it_is_from(molecule):
     tables = {"geometry", "constants", "dipole"} | ({"spin_weights"} if molecule.spin_weights.rule != "none" else set())
     assert tables <= molecule.sources.keys()
     assert all(len(molecule.sources[table]) > 5 for table in tables)
 
 
-@every
+@every_molecule
 def test_geometry_gives_the_constants_within_the_stated_difference(molecule):
     inertia, _ = moments(molecule)
     known = [c for c in molecule.constants.rigid if np.isfinite(c)]  # A of a linear molecule is infinite
@@ -78,7 +78,7 @@ def test_geometry_gives_the_constants_within_the_stated_difference(molecule):
         assert difference > molecule.vibrational_difference / 4  # the bound is a statement, not a blank cheque
 
 
-@every
+@every_molecule
 def test_geometry_has_the_symmetry_of_its_kind(molecule):
     a, b, c = moments(molecule)[0]
     kind = molecule.constants.kind
@@ -122,7 +122,7 @@ def test_dipole_lies_on_the_symmetry_axis(axis, stem):
     assert np.abs(along).tolist() == pytest.approx([0, 0, 1], abs=1e-5)  # along z in our files, to six decimals of Å
 
 
-@every
+@every_molecule
 def test_every_operation_of_the_point_group_leaves_the_dipole_alike(molecule):
     symmetry, dipole = symmetry_of(molecule.molecule, SYMMETRIC_WITHIN), molecule.molecule.dipole_debye
     for operation in (*symmetry.rotations, *symmetry.improper):
@@ -131,7 +131,7 @@ def test_every_operation_of_the_point_group_leaves_the_dipole_alike(molecule):
         assert np.flatnonzero(molecule.dipole_abc_debye).tolist() in ([], [0])
 
 
-@every
+@every_molecule
 def test_spin_weights_are_those_of_the_geometry(molecule):
     electronic = "odd" if molecule.name == "oxygen" else "even"  # 3Σg- changes sign under a half turn
     assert weights_of(molecule.molecule, SYMMETRIC_WITHIN, electronic) == molecule.spin_weights
@@ -212,18 +212,18 @@ def test_heavy_water_is_met_everywhere(shared, make_library):
     off = np.abs(make_library.residuals(molecule, lines, tabulated=True))
     assert (off <= 3 * np.array([line.error_mhz for line in lines])).all()
     assert np.median(off) < 0.02  # 4.1 GHz before
-    some = make_library.measured_lines(molecule, shared)
-    assert np.abs(make_library.residuals(molecule, some)).max() < 1.0  # without the table
+    value = make_library.measured_lines(molecule, shared)
+    assert np.abs(make_library.residuals(molecule, value)).max() < 1.0  # without the table
 
 
-@every
+@every_molecule
 def test_every_file_says_which_lines_it_serves(molecule):
     assert molecule.serves is not None
     assert molecule.serves.j_max >= 10
     assert (molecule.serves.error_mhz is not None) == (molecule.catalogue is not None)
 
 
-@every
+@every_molecule
 def test_no_number_rests_on_memory(molecule):
     """A source was read, or its numbers are marked: no third."""
     sources = [*molecule.sources.values(), *molecule.constants.sources.values()]
@@ -290,8 +290,8 @@ def test_level_tables_are_those_of_the_catalogues(shared, name):
     good = {level: energy for level, (energy, error, _) in table.items() if error <= make.WORST_MHZ}
     rows = mine.rows_of({key: np.array([level[i] for level in good]) for i, key in enumerate(("j", "ka", "kc"))})
     assert sorted(rows.tolist()) == list(range(len(mine)))
-    found = np.array(list(good.values()))
-    assert np.abs(mine.energy_mhz[rows] - found).max() < 1e-3  # four decimals, and round-off of the least squares
+    computed = np.array(list(good.values()))
+    assert np.abs(mine.energy_mhz[rows] - computed).max() < 1e-3  # four decimals, and round-off of the least squares
     assert np.sqrt(np.mean(off**2)) < 1.5  # measured lines within their errors
 
 
@@ -352,7 +352,7 @@ def test_the_page_of_the_library_is_up_to_date(shared, make_library):
     assert make_library.page(shared) == make_library.PAGE.read_text(encoding="utf-8")
 
 
-@every
+@every_molecule
 def test_the_page_of_the_library_has_every_molecule(molecule):
     assert f"| {molecule.name} | {molecule.constants.kind} |" in (DOCS / "library.md").read_text(encoding="utf-8")
 
@@ -362,22 +362,22 @@ def test_the_page_of_the_library_has_every_molecule(molecule):
 )
 def test_package_and_plain_route_have_the_same_levels(name, jmax):
     molecule = library_molecule(name)
-    of, found = energy(molecule), solve_levels(Top.from_constants(molecule.constants), jmax, vectors=False)
-    width = {"linear": 1, "prolate": 2, "oblate": 2, "asymmetric": 3}[found.kind]
-    quanta = found.quanta_of(np.arange(len(found)))[:, :width].tolist()
+    of, solved = energy(molecule), solve_levels(Top.from_constants(molecule.constants), jmax, vectors=False)
+    width = {"linear": 1, "prolate": 2, "oblate": 2, "asymmetric": 3}[solved.kind]
+    quanta = solved.quanta_of(np.arange(len(solved)))[:, :width].tolist()
     plain = [of(*q) for q in quanta]
     assert len(quanta) >= jmax + 1
-    assert found.energy_mhz == pytest.approx(plain, rel=1e-12, abs=1e-6)  # round-off of 1e8 MHz
+    assert solved.energy_mhz == pytest.approx(plain, rel=1e-12, abs=1e-6)  # round-off of 1e8 MHz
 
 
 @pytest.mark.oracle
 def test_water_levels_beyond_the_fitted_range_are_off_by_what_the_file_says(shared):
     """Level energies (cm-1) of the catalogue, which is not made from these constants."""
     path = shared / "reference" / "catalogues" / "c018003.cat.gz"
-    found = read_cat(gzip.decompress(path.read_bytes()))
+    catalogue = read_cat(gzip.decompress(path.read_bytes()))
     known = {
         tuple(q[:3]): float(e)
-        for q, e in zip(found.quanta_lower.tolist(), found.energy_lower_cm, strict=True)
+        for q, e in zip(catalogue.quanta_lower.tolist(), catalogue.energy_lower_cm, strict=True)
         if q[3] == 0
     }
     of = energy(library_molecule("H2O"))

@@ -89,8 +89,8 @@ def drawn(benchmarks, folder):
 
 def test_every_kind_of_change_is_made_where_it_counts(drawn):
     _, mutants = drawn
-    found = Counter((mutant.operator, mutant.before.splitlines()[0][:10], mutant.after[:10]) for mutant in mutants)
-    assert found == Counter(
+    computed = Counter((mutant.operator, mutant.before.splitlines()[0][:10], mutant.after[:10]) for mutant in mutants)
+    assert computed == Counter(
         [("constant", "2.5", "3.75"), ("constant", "True", "False"), ("comparison", "==", "!="), ("constant", "0", "1"),
          ("guard removed", "whole == 0", "False"), ("raise removed", "raise Valu", "pass"), ("boolean", "and", "or"),
          ("boolean", "not strict", "strict"), ("comparison", "<", "<="), ("sign", "-LIMIT", "LIMIT"),

@@ -43,7 +43,7 @@ LOADED = {  # of FAMILIES, what a kind has a use for
 }  # fmt: skip
 OCS = 'molecule = "OCS"\n'
 BODY = "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]\n"
-OF_KIND = {
+KIND_MODULES = {
     "assign": '[spectrum]\nfile = "p.csv"\nrange = "8000:18000"\n',
     "raman": 'molecule = "N2"\n',
     "zeeman": OCS + "[magnetic]\ng = [-0.02]\n[conditions]\nfield = [0.0, 1.0]\n",
@@ -85,7 +85,7 @@ def test_modules_of_absent_effects_are_not_imported(kind, way, folder):
         np.savetxt(
             "p.csv", np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments=""
         )
-    text = f'schema = 1\nkind = "{"tumble" if kind == "driven" else kind}"\n' + OF_KIND.get(kind, OCS)
+    text = f'schema = 1\nkind = "{"tumble" if kind == "driven" else kind}"\n' + KIND_MODULES.get(kind, OCS)
     (folder / "s.toml").write_text(text)
     assert loaded_families(way) <= LOADED[kind]
 

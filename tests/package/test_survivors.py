@@ -30,9 +30,9 @@ def test_all_bands_of_a_large_block_count(width):
     size = wang_matrix.SMALL + 50
     bands = [np.arange(size) ** 2.0, *(np.full(size - n, 40.0 / n) for n in range(1, width))]
     whole = np.linalg.eigvalsh(sum(np.diag(b, n) + (np.diag(b, -n) if n else 0) for n, b in enumerate(bands)))
-    found = lowest_energies(bands, float(whole[2] + whole[3]) / 2)
-    assert len(found) >= 3
-    assert found[:3] == pytest.approx(whole[:3], abs=1e-9)  # round-off of 2e4
+    computed = lowest_energies(bands, float(whole[2] + whole[3]) / 2)
+    assert len(computed) >= 3
+    assert computed[:3] == pytest.approx(whole[:3], abs=1e-9)  # round-off of 2e4
 
 
 def test_a_block_that_overflows_is_refused_whatever_its_size():
@@ -64,7 +64,7 @@ def test_a_linear_gas_moves_and_an_atom_does_not_turn():
     rods = thermal_ensemble((0.0, 2.0, 2.0), 1.0, 50, rng=rng)
     later = rods.moved(0.7)
     assert np.abs(later.attitude - rods.attitude).max() > 0.1
-    axis, after = (rotor_axis(one.attitude) for one in (rods, later))
+    axis, after = (rotor_axis(item.attitude) for item in (rods, later))
     angle = np.linalg.norm(rods.momentum, axis=1) / 2.0 * 0.7  # the axis turns with |L|/I
     assert np.einsum("ni,ni->n", axis, after) == pytest.approx(np.cos(angle), abs=1e-12)
     atoms = thermal_ensemble((0.0, 0.0, 0.0), 1.0, 5, rng=rng, mass=1.0)
@@ -83,13 +83,13 @@ def rotor_axis(attitude):
 def test_segments_of_a_timed_flow_are_at_their_own_times():
     """dy/dt = t y (and -2 t y): the exponent of a segment is the mean of t over it."""
     flow = Flow(lambda t, y: t * y * np.array([1.0, -2.0]), np.array([0.0, 0.0]), timed=True)
-    found = lyapunov_exponents(flow, time=12.0, segments=3, transient=5.0, interval=0.5, tolerance=1e-10)
+    exponents = lyapunov_exponents(flow, time=12.0, segments=3, transient=5.0, interval=0.5, tolerance=1e-10)
     length, aligning = 4.0, 0.2 * 4.0
     means = [5.0 + length * n + aligning + length / 2 for n in range(3)]
-    assert found.values == pytest.approx([np.mean(means), -2 * np.mean(means)], rel=1e-7)
-    assert found.divergence == pytest.approx(-np.mean(means), rel=1e-7)
+    assert exponents.values == pytest.approx([np.mean(means), -2 * np.mean(means)], rel=1e-7)
+    assert exponents.divergence == pytest.approx(-np.mean(means), rel=1e-7)
     spread = np.std(means, ddof=1) / math.sqrt(3)
-    assert found.errors[0] == pytest.approx(math.hypot(spread, found.bias), rel=1e-6)
+    assert exponents.errors[0] == pytest.approx(math.hypot(spread, exponents.bias), rel=1e-6)
 
 
 # Requests of driven motions

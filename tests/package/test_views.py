@@ -55,10 +55,10 @@ DRAWN = {
 @pytest.fixture
 def figures(monkeypatch):
     """The figures that were written."""
-    found = []
+    results = []
     save = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (found.append(self), save(self, *a, **k))[1])
-    return found
+    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (results.append(self), save(self, *a, **k))[1])
+    return results
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_the_part_asked_for_is_drawn(call, folder, catalogue, figures, verb):
     options = ("--plot-title", "cost: 5$ or 6$", "--plot-range", across, "--plot-vertical", up)
     code, _, err = call(*command, "--plot", "a.svg", *options)
     assert (code, err) == (0, "") or (code == 0 and err.startswith("note: "))
-    axes = [one for one in figures[0].axes if verb != "fluid" or "Temperature" in one.get_ylabel()][panel]
+    axes = [axis for axis in figures[0].axes if verb != "fluid" or "Temperature" in axis.get_ylabel()][panel]
     assert axes.get_xlim() == pytest.approx(horizontal, rel=1e-4)  # of cm-1 in 3 THz; columns and names have a margin
     assert axes.get_ylim() == pytest.approx(vertical, rel=1e-12)
     assert "cost: 5$ or 6$" in Path("a.svg").read_text(encoding="utf-8")  # no formula between the signs
@@ -157,9 +157,9 @@ def test_the_strongest_line_has_its_name_and_names_lie_on_nothing(call, folder, 
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     assert all(axes.bbox.x0 <= b.x0 and b.x1 <= axes.bbox.x1 and b.y1 <= axes.bbox.y1 for b in boxes)
     if command[0] == "raman":
-        tips = np.array([segment[1] for one in axes.collections for segment in one.get_segments()])
+        tips = np.array([segment[1] for collection in axes.collections for segment in collection.get_segments()])
     else:
-        tips = np.concatenate([one.get_xydata() for one in axes.lines])
+        tips = np.concatenate([line.get_xydata() for line in axes.lines])
     tallest = tips[tips[:, 1].argmax()]
     near = max(names, key=lambda text: text.xy[1])
     assert near.xy == pytest.approx(tuple(tallest), rel=5e-3)  # grid points lie beside the centre of a line

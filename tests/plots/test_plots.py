@@ -26,10 +26,10 @@ def figure(monkeypatch):
     """The figures that were drawn, kept when they are written."""
     from matplotlib.figure import Figure
 
-    kept = []
+    selected = []
     save = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (kept.append(self), save(self, *a, **k))[1])
-    return kept
+    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (selected.append(self), save(self, *a, **k))[1])
+    return selected
 
 
 @pytest.mark.parametrize("suffix", START)
@@ -132,11 +132,11 @@ def test_a_picture_on_axes_of_the_user_is_that_of_its_own_figure(water):
 
     axes = Figure(layout="constrained").subplots(1, 2)
     assert rotor.plot(water, ax=axes[1]) is axes[1].figure
-    own = rotor.plot(water).axes[0]
-    drawn, true = (each.collections[0].get_segments() for each in (axes[1], own))
+    water_axes = rotor.plot(water).axes[0]
+    drawn, true = (each.collections[0].get_segments() for each in (axes[1], water_axes))
     np.testing.assert_array_equal(drawn, true)
     assert not axes[0].collections  # nothing is drawn beside it
-    assert axes[1].get_xlabel() == own.get_xlabel()
+    assert axes[1].get_xlabel() == water_axes.get_xlabel()
     rotor.plot(rotor.api.solve_levels("water", 3), ax=axes[0])
     assert axes[0].collections
 

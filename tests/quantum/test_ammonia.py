@@ -46,13 +46,15 @@ def _splitting(levels, j: int, k: int) -> float:
 def test_measured_lines():
     lines = line_list(AMMONIA, jmax=8, range_mhz=(0.0, 600e3))
     quanta = np.hstack([lines.quanta(lines.upper), lines.quanta(lines.lower)])
-    found = {tuple(q): f for q, f in zip(quanta.tolist(), lines.frequency_mhz.tolist(), strict=True)}
+    computed = {tuple(q): f for q, f in zip(quanta.tolist(), lines.frequency_mhz.tolist(), strict=True)}
     for (j, k), frequency in INVERSION.items():
         tolerance = (
             5e-3 if (j, k) == (3, 2) else 5e-4
         )  # sources differ in (3,2) by 3 kHz; file's rounding of two energies
-        assert found[1, j, k, 0, j, k] == pytest.approx(frequency, abs=tolerance)
-    assert found[0, 1, 0, 1, 0, 0] == pytest.approx(ROTATION, abs=5e-4)  # what rounding leaves; 2 kHz of pressure shift
+        assert computed[1, j, k, 0, j, k] == pytest.approx(frequency, abs=tolerance)
+    assert computed[0, 1, 0, 1, 0, 0] == pytest.approx(
+        ROTATION, abs=5e-4
+    )  # what rounding leaves; 2 kHz of pressure shift
     assert not any(upper[2] == 0 and upper[0] == 1 and upper[1] % 2 for upper in quanta[:, :3].tolist())
 
 
@@ -106,9 +108,9 @@ def test_quadrupole_components_of_the_first_rotational_line():
     measured = {1: (572497.1247 + 572497.1565) / 2, 2: (572498.3391 + 572498.3885 + 572498.3979) / 3, 0: 572500.1913}
     top = AMMONIA
     lines = line_list(top, jmax=1, effects=effects_of(top, hyperfine=True), range_mhz=(5e5, 6e5), min_lgint=None)
-    found = dict(zip(lines.levels.quanta["f"][lines.upper].tolist(), lines.frequency_mhz.tolist(), strict=True))
+    by_name = dict(zip(lines.levels.quanta["f"][lines.upper].tolist(), lines.frequency_mhz.tolist(), strict=True))
     for f, frequency in measured.items():
-        assert found[f] == pytest.approx(frequency, abs=0.03)  # half of what the protons split
+        assert by_name[f] == pytest.approx(frequency, abs=0.03)  # half of what the protons split
 
 
 GROUPS = {  # kHz from the centre, of components F1' - F1'' that protons part by up to 0.06 MHz, and the frequencies that parts them
@@ -125,7 +127,7 @@ def test_quadrupole_groups_of_inversion_lines(quanta):
     without a reference; lines first resolved by S. G. Kukolich, Phys. Rev. 156 (1967) 83. Here the mean of each group, by strength. (3,3)
     is not compared: its protons have a total spin of 3/2 and move the groups by 7 kHz.
     """
-    found, edges = GROUPS[quanta]
+    computed, edges = GROUPS[quanta]
     j = quanta[0]
     lines = line_list(AMMONIA, jmax=j, effects=effects_of(AMMONIA, True), range_mhz=(23e3, 24e3), min_lgint=None)
     rows = (lines.quanta(lines.upper)[:, 1:3] == quanta).all(axis=1)
@@ -134,7 +136,7 @@ def test_quadrupole_groups_of_inversion_lines(quanta):
     group = np.digitize(offsets, edges)
     means = [np.average(offsets[group == i], weights=strength[group == i]) for i in range(5)]
     assert means == pytest.approx(
-        found, abs=1.3
+        computed, abs=1.3
     )  # both sides of a pair differ by 0.8: what protons do to the means is left out
     bare = replace(AMMONIA, spin_constants=SpinConstants.parse("chi_cc(14N)=-4.08983MHz"))
     plain = line_list(bare, jmax=j, effects=effects_of(bare, True), range_mhz=(23e3, 24e3), min_lgint=None)
@@ -148,18 +150,18 @@ def test_levels_with_spins_are_those_of_the_table():
     plain = line_list(AMMONIA, jmax=10, range_mhz=(20e3, 30e3), min_lgint=None)
     split = line_list(AMMONIA, jmax=10, effects=effects_of(AMMONIA, True), range_mhz=(20e3, 30e3), min_lgint=None)
     assert list(split.levels.quanta) == ["v", "n", "k", "f"]
-    of, own = split.quanta(split.upper)[:, :3], plain.quanta(plain.upper)
-    for line, (quanta, frequency) in enumerate(zip(own.tolist(), plain.frequency_mhz.tolist(), strict=True)):
+    of, whole = split.quanta(split.upper)[:, :3], plain.quanta(plain.upper)
+    for line, (quanta, frequency) in enumerate(zip(whole.tolist(), plain.frequency_mhz.tolist(), strict=True)):
         rows = (of == quanta).all(axis=1)
         centre = np.average(split.frequency_mhz[rows], weights=split.strength_debye2[rows])
         assert centre == pytest.approx(frequency, abs=1e-4)  # second order: chi²/(100 GHz)
         total = split.intensity_nm2_mhz[rows].sum()
         assert total == pytest.approx(plain.intensity_nm2_mhz[line], rel=1e-5)  # Boltzmann's factor within a line
     k3 = solve_levels(AMMONIA, 10, effects=effects_of(AMMONIA, True))
-    found = k3.energy_mhz[k3.find(v=0, n=10, k=3, f=10)] - solve_levels(AMMONIA, 10).energy_mhz[0]
+    computed = k3.energy_mhz[k3.find(v=0, n=10, k=3, f=10)] - solve_levels(AMMONIA, 10).energy_mhz[0]
     table = AMMONIA.level_table
     known = table.energy_mhz[table.rows_of({"v": [0], "j": [10], "k": [3]})[0]]
-    assert found == pytest.approx(known, abs=3.0)  # the constants alone are 210 MHz off, splittings within 2 MHz
+    assert computed == pytest.approx(known, abs=3.0)  # the constants alone are 210 MHz off, splittings within 2 MHz
 
 
 def test_spins_off_the_axis_take_the_table_too():
@@ -184,11 +186,11 @@ def test_errors_of_lines_are_those_of_the_table():
     np.testing.assert_array_equal(np.isnan(lines.error_mhz), ~inside)
     inversion = inside & (up[:, 1:] == low[:, 1:]).all(axis=1)
     assert lines.error_mhz[inversion] == pytest.approx(0.0035 * np.sqrt(2))
-    found = {tuple(q): row for row, q in enumerate(np.hstack([up, low]).tolist())}
+    computed = {tuple(q): row for row, q in enumerate(np.hstack([up, low]).tolist())}
     for (j, k), frequency in INVERSION.items():
-        row = found[1, j, k, 0, j, k]
+        row = computed[1, j, k, 0, j, k]
         assert abs(lines.frequency_mhz[row] - frequency) < 1.01 * lines.error_mhz[row]  # the worst, (3,2), is the 5 kHz
-    rotation = found[0, 1, 0, 1, 0, 0]
+    rotation = computed[0, 1, 0, 1, 0, 0]
     assert lines.error_mhz[rotation] == pytest.approx(3.0 * np.sqrt(2))
     split = line_list(AMMONIA, jmax=2, effects=effects_of(AMMONIA, True), range_mhz=(23e3, 24e3), min_lgint=None)
     assert split.error_mhz == pytest.approx(0.0035 * np.sqrt(2))
@@ -224,7 +226,7 @@ def _nd3() -> Top:
     low, axial = (ND3_ROTATION[0] + energy) / 2, 94000.0
     states = StateConstants(
         {"E[1]": energy, "B[1]": low + b, "C[1]": axial + c},
-        weights={v: SpinWeights.from_mapping(one) for v, one in enumerate(ND3_WEIGHTS)},
+        weights={v: SpinWeights.from_mapping(item) for v, item in enumerate(ND3_WEIGHTS)},
         dipoles={(0, 0): (0, 0, 0), (1, 1): (0, 0, 0), (0, 1): (0, 0, 1.497)},
     )
     return Top.from_constants({"B": low, "C": axial}, dipole_abc_debye=(0, 0, 1.497), states=states)
@@ -240,13 +242,13 @@ def test_nd3_has_both_halves_of_every_doublet():
     lines = line_list(top, jmax=1, min_lgint=None)
     quanta = np.hstack([lines.quanta(lines.upper), lines.quanta(lines.lower)]).tolist()
     first, second = (quanta.index([v, 1, 0, 1 - v, 0, 0]) for v in (0, 1))
-    found = lines.frequency_mhz[[first, second]]
-    assert found == pytest.approx(
+    computed = lines.frequency_mhz[[first, second]]
+    assert computed == pytest.approx(
         ND3_ROTATION, abs=0.2
     )  # quartic terms: their difference between the states is 0.05 MHz
     populations = lines.intensity_nm2_mhz[[first, second]]
     assert populations[0] / populations[1] == pytest.approx(
-        0.1 * (found[0] / found[1]) ** 2, rel=2e-3
+        0.1 * (computed[0] / computed[1]) ** 2, rel=2e-3
     )  # ν² for hν << kT
     assert [lines.g_upper[i] for i in (first, second)] == [3, 30]
 
@@ -281,9 +283,9 @@ def test_nd3_of_the_library_meets_measured_lines():
 def test_k_3_of_nd3_lies_between_its_halves():
     """Measured: 1599.645 and 1599.704 for (3,3), 1453.125 and 1448.056 for (6,3); what J+^6 + J-^6 parts is left out."""
     levels = solve_levels(HEAVY, 6)
-    for j, (one, other), tolerance in ((3, (1599.645, 1599.704), 0.01), (6, (1453.125, 1448.056), 0.05)):
+    for j, (first, other), tolerance in ((3, (1599.645, 1599.704), 0.01), (6, (1453.125, 1448.056), 0.05)):
         assert _splitting(levels, j, 3) == pytest.approx(
-            (one + other) / 2, abs=tolerance
+            (first + other) / 2, abs=tolerance
         )  # 10 kHz of each; constants not fitted to them
 
 
@@ -301,9 +303,13 @@ def test_classical_q_counts_states_as_the_sum_does(case):
     else:
         top = rotor.read(case)
         species = {name: thermodynamic_functions(top, [300.0], species=name) for name in ("para", "ortho")}
-        for one in species.values():
-            assert one.q_rot_classical[0] == pytest.approx(one.q_rot[0], rel=0.02)  # quantum corrections and distortion
-    found = thermodynamic_functions(top, [300.0])
-    assert found.q_rot_corrected[0] == pytest.approx(found.q_rot[0], rel=1e-4)  # distortion of state 0 serves both
+        for component in species.values():
+            assert component.q_rot_classical[0] == pytest.approx(
+                component.q_rot[0], rel=0.02
+            )  # quantum corrections and distortion
+    functions = thermodynamic_functions(top, [300.0])
+    assert functions.q_rot_corrected[0] == pytest.approx(
+        functions.q_rot[0], rel=1e-4
+    )  # distortion of state 0 serves both
     factors = {"NH3": 8, "ND3": 27}  # (2I+1)³
-    assert found.spin_factor == pytest.approx(factors.get(case, found.spin_factor), rel=1e-12)  # rounding
+    assert functions.spin_factor == pytest.approx(factors.get(case, functions.spin_factor), rel=1e-12)  # rounding

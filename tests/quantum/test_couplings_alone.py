@@ -30,21 +30,24 @@ PAIR = Scheme((Spin("14N", 2), Spin("Cl1", 3, total="I"), Spin("Cl2", 3, total="
 )
 def test_bounds_are_those_of_the_whole_chain(scheme, channel, within):
     """The largest singular value and the eigenvalues over all F; of one spin equal, of two no more than `within` times as much."""
-    found = coupling_alone(scheme, channel, HIGHEST)
+    computed = coupling_alone(scheme, channel, HIGHEST)
     largest = np.zeros((HIGHEST + 1, HIGHEST + 1))
     ends = np.array([np.full(HIGHEST + 1, np.inf), np.full(HIGHEST + 1, -np.inf)])
     for f in range(scheme.total % 2, 2 * HIGHEST + scheme.total + 1, 2):
-        every = scheme.patterns(f)
-        every = every[every[:, 0] <= 2 * HIGHEST]
-        whole = coefficients_of(scheme, channel, scheme.patterns(f))[: len(every), : len(every)]
-        of_n = {n: np.flatnonzero(every[:, 0] == 2 * n) for n in range(HIGHEST + 1) if 2 * n in every[:, 0]}
-        for m, rows in of_n.items():
-            for n, columns in of_n.items():
+        pattern = scheme.patterns(f)
+        pattern = pattern[pattern[:, 0] <= 2 * HIGHEST]
+        whole = coefficients_of(scheme, channel, scheme.patterns(f))[: len(pattern), : len(pattern)]
+        rows_by_n = {n: np.flatnonzero(pattern[:, 0] == 2 * n) for n in range(HIGHEST + 1) if 2 * n in pattern[:, 0]}
+        for m, rows in rows_by_n.items():
+            for n, columns in rows_by_n.items():
                 largest[m, n] = max(largest[m, n], np.linalg.norm(whole[np.ix_(rows, columns)], 2))
             values = np.linalg.eigvalsh(whole[np.ix_(rows, rows)])
             ends[:, m] = min(ends[0, m], values[0]), max(ends[1, m], values[-1])
     allowed = 1e-12 * largest.max()  # round-off of sums of a few products
-    assert (largest <= found.norm + allowed).all()
-    assert (found.norm.sum(), found.norm.max()) <= (within * largest.sum() + allowed, within * largest.max() + allowed)
-    assert (found.lowest <= ends[0] + allowed).all()
-    assert (found.highest >= ends[1] - allowed).all()
+    assert (largest <= computed.norm + allowed).all()
+    assert (computed.norm.sum(), computed.norm.max()) <= (
+        within * largest.sum() + allowed,
+        within * largest.max() + allowed,
+    )
+    assert (computed.lowest <= ends[0] + allowed).all()
+    assert (computed.highest >= ends[1] - allowed).all()

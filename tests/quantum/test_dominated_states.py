@@ -22,10 +22,10 @@ def matrix_of(coupling, *, resonance=False, size=300, count=12):
 def test_energies_and_vectors_are_those_of_the_whole_matrix(resonance):
     lower, chosen = matrix_of(3.0, resonance=resonance), np.arange(12)
     energies, vectors = dominated_states(csr_array(np.tril(lower)), chosen)
-    every, states = np.linalg.eigh(np.tril(lower) + np.tril(lower, -1).T)
+    eigenvalues, states = np.linalg.eigh(np.tril(lower) + np.tril(lower, -1).T)
     shares = (states[chosen] ** 2).sum(axis=0)
     best = np.sort(np.argsort(-shares)[:12])
-    assert np.abs(energies - every[best]).max() < 1e-6
+    assert np.abs(energies - eigenvalues[best]).max() < 1e-6
     overlaps = np.abs(states[:, best].T @ vectors)
     assert np.abs(overlaps - np.eye(12)).max() < 1e-5
     assert np.abs(vectors.T @ vectors - np.eye(12)).max() < 1e-12

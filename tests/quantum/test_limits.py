@@ -95,21 +95,23 @@ def test_estimated_couplings(symbol, number):
 
 @pytest.mark.parametrize(("source", "nucleus"), [("SMILES:CBr", "79Br"), ("SMILES:CI", "127I"), ("SMILES:CN", "14N")])
 def test_unknown_couplings_are_those_of_covalent_bonds(source, nucleus):
-    one = next(one for one in splitting_nuclei(rotor.read(source)) if one.nucleus == nucleus)
-    assert not one.known
-    expected = np.mean(COUPLINGS[one.nucleus.lstrip("0123456789"), int(one.nucleus.rstrip("BrIN"))])
-    assert 1 / 2 < abs(one.chi_mhz) / expected < 2  # as above
-    limit = next(one for one in model_limits(rotor.read(source), 3, SEMI_RIGID) if one.name == "nuclear quadrupole")
+    item = next(item for item in splitting_nuclei(rotor.read(source)) if item.nucleus == nucleus)
+    assert not item.known
+    expected = np.mean(COUPLINGS[item.nucleus.lstrip("0123456789"), int(item.nucleus.rstrip("BrIN"))])
+    assert 1 / 2 < abs(item.chi_mhz) / expected < 2  # as above
+    limit = next(
+        limit for limit in model_limits(rotor.read(source), 3, SEMI_RIGID) if limit.name == "nuclear quadrupole"
+    )
     assert "covalent bonds" in limit.text
 
 
 @pytest.mark.parametrize("source", ["CH3OH", "CH3CHO", "NO", "NH3"])
 def test_largest_first_and_unknown_spin_before_all(source):
-    found = list(limits(source).items())
-    known = [size for _, size in found if size is not None]
+    computed = list(limits(source).items())
+    known = [size for _, size in computed if size is not None]
     assert known == sorted(known, reverse=True)
-    assert found[-1] == ("magnetic coupling of nuclear spins", None)
-    assert ("electron spin" in dict(found)) == (source == "NO") == (found[0][1] is None)
+    assert computed[-1] == ("magnetic coupling of nuclear spins", None)
+    assert ("electron spin" in dict(computed)) == (source == "NO") == (computed[0][1] is None)
 
 
 @pytest.mark.parametrize(
@@ -120,8 +122,10 @@ def test_nuclei_without_magnetic_constants_are_left_out(source, magnetic):
     """C of 14N is known of two; that of protons is not, which split lines of NH3 by 0.06 MHz."""
     top = rotor.read(source)
     for effects in (SEMI_RIGID, effects_of(top, True)):
-        (found,) = [one for one in model_limits(top, 3, effects) if one.name == "magnetic coupling of nuclear spins"]
-        assert found.text == magnetic
+        (computed,) = [
+            limit for limit in model_limits(top, 3, effects) if limit.name == "magnetic coupling of nuclear spins"
+        ]
+        assert computed.text == magnetic
 
 
 def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
@@ -131,27 +135,27 @@ def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
     d = 4 * b**3 / (VIBRATION_CM * (b / MHZ_PER_CM) ** VIBRATION_POWER * MHZ_PER_CM) ** 2
     real = rotor.Top.from_constants(f"B={b} D={d} MHz")
     moved = solve_levels(top, 8).energy_mhz - solve_levels(real, 8).energy_mhz
-    limit = {one.name: one.size_mhz for one in model_limits(top, 7, SEMI_RIGID)}["centrifugal distortion"]
+    limit = {limit.name: limit.size_mhz for limit in model_limits(top, 7, SEMI_RIGID)}["centrifugal distortion"]
     assert limit == pytest.approx(moved[8] - moved[7], rel=1e-9)  # differences of large numbers
 
 
 def distortion_over_real(name: str) -> float | None:
     """The size for the rigid constants of a molecule of the library over that of its own D, D_J or ΔJ; None where it has none."""
     top = rotor.read(name)
-    known = [top.constants[one] for one in ("D", "DJ", "DeltaJ") if one in top.constants.values]
+    known = [top.constants[item] for item in ("D", "DJ", "DeltaJ") if item in top.constants.values]
     if not known or not known[0] or top.kind == "spherical":
         return None
     a, b, c = top.rotational_constants_mhz
     text = f"B={b} MHz" if top.kind == "linear" else f"A={a} B={b} C={c} MHz"
-    sizes = {one.name: one.size_mhz for one in model_limits(rotor.Top.from_constants(text), 7, SEMI_RIGID)}
+    sizes = {limit.name: limit.size_mhz for limit in model_limits(rotor.Top.from_constants(text), 7, SEMI_RIGID)}
     return sizes["centrifugal distortion"] / (4 * abs(known[0]) * 8**3)
 
 
 def test_distortion_of_rigid_constants():
     names = sorted(path.stem for path in (data_folder() / "molecules").glob("*.toml"))
-    found = {name: ratio for name in names if (ratio := distortion_over_real(name)) is not None}
-    assert len(found) > 40
-    beyond = [name for name, ratio in found.items() if not 1 / 3 < ratio < 3]
+    computed = {name: ratio for name in names if (ratio := distortion_over_real(name)) is not None}
+    assert len(computed) > 40
+    beyond = [name for name, ratio in computed.items() if not 1 / 3 < ratio < 3]
     assert beyond == ["CH2OHCHO"]  # 0.28: its molecules are soft
 
 
@@ -167,21 +171,21 @@ def test_the_most_populated_j():
 
 @pytest.mark.parametrize("verb", ["info", "spectrum", "levels", "raman"])
 def test_reports_end_with_the_limits(call, verb):
-    given = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
-    code, out, _ = call(verb, *given)
+    words = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
+    code, out, _ = call(verb, *words)
     assert code == 0
     last = out.rstrip().splitlines()[-4:]
     assert last[0].startswith("effects   at J = ")
     assert last[1].startswith("left out  nuclear quadrupole: about 4 MHz; 14N splits J = 1 by 3.53 MHz: rotor")
     assert last[2].lstrip() == "magnetic coupling of nuclear spins: not estimated; 1H: small splittings"
     assert last[3].lstrip() == "and smaller or not estimated: spin-rotation"  # below a tenth of the largest
-    printed = json.loads(call(verb, *given, "--json", "-")[1])
-    assert [one["name"] for one in printed["limits"]] == [
+    printed = json.loads(call(verb, *words, "--json", "-")[1])
+    assert [limit["name"] for limit in printed["limits"]] == [
         "nuclear quadrupole",
         "spin-rotation",
         "magnetic coupling of nuclear spins",
     ]
-    assert {one["name"]: one["present"] for one in printed["effects"]}["nuclear quadrupole"] is False
+    assert {effect["name"]: effect["present"] for effect in printed["effects"]}["nuclear quadrupole"] is False
 
 
 @pytest.mark.parametrize(
@@ -217,12 +221,12 @@ def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
 
     spins = SpinConstants.parse("eps_aa(S)=5406 eps_bb(S)=8 b_F(S,14N)=147 chi_aa(14N)=0.5 MHz", "S=1/2")
     top = rotor.Top.from_constants("A=239905 B=13002 C=12305 MHz", spin_constants=spins)
-    found = {one.name: one for one in model_limits(top, 22, effects_of(top, False))}
-    assert next(iter(found)) == "spin-rotation"
-    assert found["spin-rotation"].size_mhz == pytest.approx(22 * 5406 / 2)
-    assert "S, 14N: its constants are known" in found["spin-spin"].text
+    computed = {limit.name: limit for limit in model_limits(top, 22, effects_of(top, False))}
+    assert next(iter(computed)) == "spin-rotation"
+    assert computed["spin-rotation"].size_mhz == pytest.approx(22 * 5406 / 2)
+    assert "S, 14N: its constants are known" in computed["spin-spin"].text
     assert not {"spin-rotation", "spin-spin", "nuclear quadrupole"} & {
-        one.name for one in model_limits(top, 22, effects_of(top, True))
+        limit.name for limit in model_limits(top, 22, effects_of(top, True))
     }
 
 
@@ -230,5 +234,5 @@ def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
 def test_inversion_of_heavy_ammonia_is_slower(isotopes, size_mhz):
     """Measured at (J, K) = (1, 1): 23.7 GHz of NH3, 1.59 GHz of ND3; one hydrogen left counts as NH3."""
     top = Top.from_molecule(read_molecule("SMILES:N", isotopes=isotopes))
-    (found,) = [limit for limit in model_limits(top, 5, SEMI_RIGID) if limit.name == "inversion"]
-    assert found.size_mhz == size_mhz
+    (computed,) = [limit for limit in model_limits(top, 5, SEMI_RIGID) if limit.name == "inversion"]
+    assert computed.size_mhz == size_mhz

@@ -173,8 +173,13 @@ def test_two_coupled_states_are_those_of_the_engine_of_states():
     turning = ket_bra(0, 1) - ket_bra(1, 0)
     terms: dict[str, Operator] = {}
     for v in (0, 1):
-        own = ket_bra(v, v)
-        terms |= {f"E{v}": own, f"A{v}": a @ a @ own, f"B{v}": b @ b @ own, f"C{v}": c @ c @ own}
+        projector = ket_bra(v, v)
+        terms |= {
+            f"E{v}": projector,
+            f"A{v}": a @ a @ projector,
+            f"B{v}": b @ b @ projector,
+            f"C{v}": c @ c @ projector,
+        }
     terms |= {"G": 1j * (c @ turning), "F": 2.0 * half_anticommutator(a, b) @ between}
     values = [0.0, *RIGID.values(), *more.values(), 400.0, 12.0]
     basis = RealFunctions(Basis(product(rotation_labels(12), {"v": np.arange(2)})))

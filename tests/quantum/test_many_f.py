@@ -63,7 +63,7 @@ def test_lines_are_those_of_pairs(case, range_mhz, monkeypatch):
     monkeypatch.setattr(many_f_lines, "can_be_stacked", lambda *a: False)
     apart = all_transitions(levels, dipoles, range_mhz, cut)
     assert len(apart.upper) > 50
-    first, second = (np.lexsort((one.lower, one.upper)) for one in (together, apart))
+    first, second = (np.lexsort((item.lower, item.upper)) for item in (together, apart))
     assert np.array_equal(together.upper[first], apart.upper[second])
     assert np.array_equal(together.lower[first], apart.lower[second])
     assert np.array_equal(together.frequency_mhz[first], apart.frequency_mhz[second])
@@ -76,5 +76,5 @@ def test_levels_without_a_weight_make_no_lines():
     levels = _levels("one nucleus")
     weight = levels.weight.copy()
     weight[::3] = 0
-    found = all_transitions(replace(levels, weight=weight), DIPOLE, cut=intensity_cut(levels, 5.0, 100.0, -7.0))
-    assert (weight[found.lower] > 0).all()
+    transitions = all_transitions(replace(levels, weight=weight), DIPOLE, cut=intensity_cut(levels, 5.0, 100.0, -7.0))
+    assert (weight[transitions.lower] > 0).all()

@@ -18,9 +18,9 @@ def test_the_sum_of_the_overlaps_is_that_of_scipy(kind):
         mixed = np.linalg.qr(rng.normal(size=(size, size)) + 2 * np.eye(size)[rng.permutation(size)])[0] ** 2
         overlaps = {"vectors": mixed, "numbers": rng.random((size, size)) ** 3, "ties": np.round(mixed, 1)}[kind]
         conflicts += len(set(overlaps.argmax(axis=0).tolist())) < size
-        found = one_to_one(overlaps)
-        assert sorted(found.tolist()) == list(range(size))
+        computed = one_to_one(overlaps)
+        assert sorted(computed.tolist()) == list(range(size))
         rows, columns = linear_sum_assignment(overlaps, maximize=True)
         best = overlaps[rows, columns].sum()
-        assert overlaps[found, np.arange(size)].sum() == pytest.approx(best, abs=1e-12)  # round-off of 40 sums
+        assert overlaps[computed, np.arange(size)].sum() == pytest.approx(best, abs=1e-12)  # round-off of 40 sums
     assert conflicts > 20

@@ -42,9 +42,9 @@ def test_rows_of_mixed_labels_are_rows_or_minus_one(values):
     levels = solve_levels(Top.from_constants("A=9 B=5 GHz"), 12)
     k = np.array(values) // 2
     rows = levels.rows_of(j=values, k=k)
-    for j, one, row in zip(values, k.tolist(), rows.tolist(), strict=True):
-        if j <= 12 and one <= j:
-            assert (levels.quanta["j"][row], levels.quanta["k"][row]) == (j, one)
+    for j, item, row in zip(values, k.tolist(), rows.tolist(), strict=True):
+        if j <= 12 and item <= j:
+            assert (levels.quanta["j"][row], levels.quanta["k"][row]) == (j, item)
         else:
             assert row == -1
 

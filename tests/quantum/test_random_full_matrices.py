@@ -139,7 +139,7 @@ def full_levels(case: Case) -> np.ndarray:
         if n <= LARGEST and 2 * m + m_a + m_b == case.twice_m
     ]  # fmt: skip
     v, r, a, b = (np.array(column) for column in zip(*basis, strict=True))
-    one, two = (spin_matrices(t) for t in twice)
+    first, two = (spin_matrices(t) for t in twice)
     unit = {0: np.eye(n_states), 1: np.eye(len(sizes[0])), 2: np.eye(len(sizes[1]))}
 
     def over(rotation: np.ndarray, state=unit[0], first=unit[1], second=unit[2]) -> np.ndarray:
@@ -166,7 +166,7 @@ def full_levels(case: Case) -> np.ndarray:
     if case.spins:
         for p, q in product("xyz", "xyz"):  # I = 1: I·χ·I/(2I(2I-1))
             field = sum(case.chi[i, k] * phi[p, "abc"[i]] @ phi[q, "abc"[k]] for i in range(3) for k in range(3))
-            total = total + over(field, first=(one[p] @ one[q] + one[q] @ one[p]) / 4)
+            total = total + over(field, first=(first[p] @ first[q] + first[q] @ first[p]) / 4)
         for p in "xyz":
             mixed = sum(case.c[i, k] * _half(phi[p, "abc"[i]], momentum["abc"[k]]) for i in range(3) for k in range(3))
             total = total + over(mixed, second=two[p])
@@ -178,7 +178,7 @@ def full_levels(case: Case) -> np.ndarray:
         moment = over(g)
         if case.spins:
             moment = (
-                moment + over(whole, first=NUCLEAR_G["N"] * one["z"]) + over(whole, second=NUCLEAR_G["H"] * two["z"])
+                moment + over(whole, first=NUCLEAR_G["N"] * first["z"]) + over(whole, second=NUCLEAR_G["H"] * two["z"])
             )
         total = total - case.tesla * NUCLEAR_MAGNETON_MHZ_PER_T * moment
     if not case.torsion:
@@ -237,12 +237,12 @@ def package_levels(case: Case) -> np.ndarray:
         with_effects = {"effects": effects} if case.spins or len(case.abc) == 2 or case.torsion else {}
         if case.tesla:
             nuclear = {"nuclear_g": NUCLEAR_G} if case.spins else {}
-            found = zeeman_map(top, [0.0, case.tesla], case.g, **with_effects, **nuclear, **common)
+            zeeman = zeeman_map(top, [0.0, case.tesla], case.g, **with_effects, **nuclear, **common)
         else:
-            found = stark_map(top, [0.0, case.kv_per_cm], m_values=[abs(case.twice_m) / 2], **with_effects, **common)
+            zeeman = stark_map(top, [0.0, case.kv_per_cm], m_values=[abs(case.twice_m) / 2], **with_effects, **common)
         m = case.twice_m / 2 if case.tesla else abs(case.twice_m) / 2
-        chosen = (found.field == found.field.max()) & (found.m == m)
-        return np.sort(found.energy_mhz[chosen])
+        chosen = (zeeman.field == zeeman.field.max()) & (zeeman.m == m)
+        return np.sort(zeeman.energy_mhz[chosen])
     levels = solve_levels(top, LARGEST, effects=effects)
     chosen = levels.multiplicity > abs(case.twice_m)
     if case.torsion:

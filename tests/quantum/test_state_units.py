@@ -71,9 +71,11 @@ def test_levels_are_those_of_the_solved_blocks(name, monkeypatch):
     direct, solved, values = models(OPTIONS[name], labels, monkeypatch)
     for point in (values, values * (1 + 0.01 * rng.normal(size=len(values)))):
         energies, slopes = direct.levels(point)
-        found, of_found = solved.levels(point)
-        assert energies == pytest.approx(found, rel=1e-12)  # round-off of matrices of 20 rows
-        assert np.abs(slopes - of_found).max(axis=0) == pytest.approx(0, abs=1e-9 * np.abs(of_found).max())  # the same
+        computed, derivatives = solved.levels(point)
+        assert energies == pytest.approx(computed, rel=1e-12)  # round-off of matrices of 20 rows
+        assert np.abs(slopes - derivatives).max(axis=0) == pytest.approx(
+            0, abs=1e-9 * np.abs(derivatives).max()
+        )  # the same
     used = np.abs(slopes).max(axis=0) > 0
     assert used.sum() >= 14
 
@@ -195,9 +197,9 @@ def test_slopes_of_some_parameters_are_those_of_all():
     group = groups_for_fit(file)[0]
     levels = group.levels((0, 10))
     names = tuple(group.effect.parameters(group.top))
-    some, rows = names[4:7] + names[-3:], np.arange(0, len(levels), 3)
-    slopes = level_derivatives(group.top, levels, names)[rows][:, [names.index(name) for name in some]]
-    assert level_derivatives(group.top, levels, some, rows) == pytest.approx(slopes, rel=1e-12)  # order of sums
+    subset, rows = names[4:7] + names[-3:], np.arange(0, len(levels), 3)
+    slopes = level_derivatives(group.top, levels, names)[rows][:, [names.index(name) for name in subset]]
+    assert level_derivatives(group.top, levels, subset, rows) == pytest.approx(slopes, rel=1e-12)  # order of sums
 
 
 def test_derivatives_of_a_few_levels_are_those_of_all():
@@ -205,7 +207,7 @@ def test_derivatives_of_a_few_levels_are_those_of_all():
     top = Top.from_constants("A=9000 B=3000 C=2500 MHz")
     states = InteractingStates({"E[1]": 700.0, "A[1]": 9000.0, "B[1]": 3000.0, "C[1]": 2500.0, "F_ac[0,1]": 20.0})
     levels = solve_levels(top, 9, effects=(*SEMI_RIGID, states))
-    every = level_derivatives(top, levels)
+    derivatives = level_derivatives(top, levels)
     by_j = {j: [block for block in levels.blocks if block.j == j] for j in (2, 7, 8, 9)}
     for low in by_j[2]:
         kinds = {(part.basis.first_k % 2, part.basis.sign, part.v) for part in low.parts}
@@ -217,5 +219,5 @@ def test_derivatives_of_a_few_levels_are_those_of_all():
         ]
         rows = np.array([*high, low.start])
         assert len(high) >= 3
-        assert level_derivatives(top, levels, rows=rows) == pytest.approx(every[rows], abs=1e-12)  # the same sums
+        assert level_derivatives(top, levels, rows=rows) == pytest.approx(derivatives[rows], abs=1e-12)  # the same sums
     assert max(len(block.parts) for block in by_j[2]) > 1

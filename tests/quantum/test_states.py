@@ -74,9 +74,9 @@ dipoles = { 0 = [0, 0, 0], 1 = [0, 0, 0], "0,1" = [0, 0, 1.5] }
 
 def _strengths(levels, dipoles):
     """Sμ² by frequency to 1e-4 MHz, summed over components; what lies in one row or in a doublet of 0 MHz is left out."""
-    found = all_transitions(levels, dipoles)
+    transitions = all_transitions(levels, dipoles)
     total: dict[float, float] = {}
-    for f, s in zip(found.frequency_mhz.tolist(), found.strength_debye2.tolist(), strict=True):
+    for f, s in zip(transitions.frequency_mhz.tolist(), transitions.strength_debye2.tolist(), strict=True):
         total[round(f, 4)] = total.get(round(f, 4), 0.0) + s
     return {f: s for f, s in total.items() if s > 1e-9 and f > 1e-3}
 
@@ -87,14 +87,14 @@ def test_closed_forms_of_two_states_are_those_of_wang_blocks():
     closed, blocks = solve_levels(OBLATE, 5), solve_rotation(OBLATE, effects, 0, 5, in_blocks=True)
     assert closed.representation is None
     assert blocks.representation == "IIIr"
-    every = np.repeat(closed.energy_mhz, closed.components)
-    np.testing.assert_allclose(np.sort(every), np.sort(blocks.energy_mhz), atol=1e-8)  # round-off of 3e5 MHz
+    energies = np.repeat(closed.energy_mhz, closed.components)
+    np.testing.assert_allclose(np.sort(energies), np.sort(blocks.energy_mhz), atol=1e-8)  # round-off of 3e5 MHz
     dipoles = dipoles_by_state(OBLATE, OBLATE.dipole_abc_debye, effects)
-    own, reference = _strengths(closed, dipoles), _strengths(blocks, dipoles)
-    assert own.keys() == reference.keys()
-    assert len(own) > 100
+    ours, reference = _strengths(closed, dipoles), _strengths(blocks, dipoles)
+    assert ours.keys() == reference.keys()
+    assert len(ours) > 100
     for frequency, strength in reference.items():
-        assert own[frequency] == pytest.approx(strength, rel=1e-9)  # closed form
+        assert ours[frequency] == pytest.approx(strength, rel=1e-9)  # closed form
 
 
 def test_rows_are_in_order_of_j_and_energies_are_those_of_each_state():
@@ -109,12 +109,12 @@ def test_rows_are_in_order_of_j_and_energies_are_those_of_each_state():
 def test_states_of_a_top_are_the_effect_given_by_hand():
     alone = replace(ASYMMETRIC, states=None)
     by_hand = solve_levels(alone, 6, effects=(*SEMI_RIGID, InteractingStates(COUPLED)))
-    own = solve_levels(ASYMMETRIC, 6)
-    np.testing.assert_array_equal(own.energy_mhz, by_hand.energy_mhz)
-    again = solve_levels(ASYMMETRIC, 6, effects=own.effects)  # not added a second time
-    np.testing.assert_array_equal(again.energy_mhz, own.energy_mhz)
-    given = (np.array([1.0, 0.5, 0.0]), solve_levels(ASYMMETRIC, 0).energy_mhz)
-    assert given[1].tolist() == [0.0, 9000.0]
+    levels = solve_levels(ASYMMETRIC, 6)
+    np.testing.assert_array_equal(levels.energy_mhz, by_hand.energy_mhz)
+    again = solve_levels(ASYMMETRIC, 6, effects=levels.effects)  # not added a second time
+    np.testing.assert_array_equal(again.energy_mhz, levels.energy_mhz)
+    arguments = (np.array([1.0, 0.5, 0.0]), solve_levels(ASYMMETRIC, 0).energy_mhz)
+    assert arguments[1].tolist() == [0.0, 9000.0]
 
 
 def test_derivatives_of_both_kinds_of_states_are_differences():
@@ -143,13 +143,13 @@ def test_q_is_the_sum_over_states():
     far = replace(OBLATE, states=replace(OBLATE.states, values={**OBLATE_STATES, "E[1]": 3e6}))
     for t in (5.0, 100.0):
         first = partition_function(replace(OBLATE, states=None), t, 1e-9).q
-        own = Top.from_constants("B=5980 C=4010 DJ=0.01 DJK=-0.02 MHz")
-        second = partition_function(own, t, 1e-9).q * np.exp(-3e6 / units.MHZ_PER_K / t)
-        found = partition_function(far, t, 1e-9)
-        assert found.q == pytest.approx(first + second, rel=1e-8)  # ten times what was asked of the sums
+        top = Top.from_constants("B=5980 C=4010 DJ=0.01 DJK=-0.02 MHz")
+        second = partition_function(top, t, 1e-9).q * np.exp(-3e6 / units.MHZ_PER_K / t)
+        partition = partition_function(far, t, 1e-9)
+        assert partition.q == pytest.approx(first + second, rel=1e-8)  # ten times what was asked of the sums
     functions = answer_thermo(ThermoRequest(far, (100.0,))).functions
     assert functions.q_rot_corrected[0] == pytest.approx(
-        found.q, rel=1e-4
+        partition.q, rel=1e-4
     )  # distortion of the second state is not corrected for
     assert functions.cv_over_r_corrected[0] == pytest.approx(
         functions.cv_over_r[0], rel=1e-3
@@ -166,11 +166,11 @@ def test_a_file_is_read_and_written_with_its_states(folder):
     file = parse_molecule_file(FILE)
     text = molecule_file_text(file)
     back = parse_molecule_file(text)
-    for one in (file.states, back.states):
-        assert dict(one.values) == {"E[1]": 800.0, "B[1]": 5980.0, "C[1]": 4010.0}
-        assert (one.names, one.source) == (("0+", "0-"), "made for a test")
-        assert one.weights[1].to_mapping() == {"0even": 4, "0odd": 0, "1": 1, "2": 1}
-        assert dict(one.dipoles) == {(0, 0): (0, 0, 0), (1, 1): (0, 0, 0), (1, 0): (0, 0, 1.5)}
+    for item in (file.states, back.states):
+        assert dict(item.values) == {"E[1]": 800.0, "B[1]": 5980.0, "C[1]": 4010.0}
+        assert (item.names, item.source) == (("0+", "0-"), "made for a test")
+        assert item.weights[1].to_mapping() == {"0even": 4, "0odd": 0, "1": 1, "2": 1}
+        assert dict(item.dipoles) == {(0, 0): (0, 0, 0), (1, 1): (0, 0, 0), (1, 0): (0, 0, 1.5)}
     assert molecule_file_text(back) == text
     (folder / "doublet.toml").write_text(text)
     top = rotor.read("doublet.toml")
@@ -179,10 +179,10 @@ def test_a_file_is_read_and_written_with_its_states(folder):
     assert absent == {(0, 0, 0), (1, 1, 0), (0, 2, 0)}  # v, J, K
     lines = line_list(top, jmax=2)
     rotor.write(lines, "lines.cat", settings={"tag": 17001})
-    found = read_cat(folder / "lines.cat")
-    assert set(found.qnfmt.tolist()) == {1303}
-    assert len(found) == len(lines)
-    ends = zip(found.quanta_upper[:, :3].tolist(), found.quanta_lower[:, :3].tolist(), strict=True)
+    catalogue = read_cat(folder / "lines.cat")
+    assert set(catalogue.qnfmt.tolist()) == {1303}
+    assert len(catalogue) == len(lines)
+    ends = zip(catalogue.quanta_upper[:, :3].tolist(), catalogue.quanta_lower[:, :3].tolist(), strict=True)
     assert ([1, 0, 0], [0, 0, 1]) in list(ends)
     frequency = {
         tuple(np.r_[u, w].tolist()): f
@@ -304,19 +304,22 @@ def test_couplings_that_a_group_tells_apart_are_refused(group):
 def test_geometry_and_weights_forbid_couplings_and_dipoles():
     water = Molecule(("O", "H", "H"), [[0, 0, 0.0], [0.757, 0.586, 0], [-0.757, 0.586, 0]])
     rigid = Top.from_molecule(water)
-    own = {f"{name}[1]": value for name, value in rigid.constants.values.items()} | {"E[1]": 1e5}
-    assert replace(rigid, states=StateConstants({**own, "G_c[0,1]": 5.0, "F_ab[0,1]": 5.0})).states.count == 2
+    constants = {f"{name}[1]": value for name, value in rigid.constants.values.items()} | {"E[1]": 1e5}
+    assert replace(rigid, states=StateConstants({**constants, "G_c[0,1]": 5.0, "F_ab[0,1]": 5.0})).states.count == 2
     with pytest.raises(ValueError, match=r"W\[0,1\] and G_c\[0,1\]: two states of a molecule of C2v"):
-        replace(rigid, states=StateConstants({**own, "W[0,1]": 5.0, "G_c[0,1]": 5.0}))
-    flat = replace(rigid, states=StateConstants(own), dipole_abc_debye=(0, 1.85, 0))
+        replace(rigid, states=StateConstants({**constants, "W[0,1]": 5.0, "G_c[0,1]": 5.0}))
+    flat = replace(rigid, states=StateConstants(constants), dipole_abc_debye=(0, 1.85, 0))
     with pytest.raises(ValueError, match="different nuclear-spin weight"):
-        replace(flat, states=StateConstants(own, dipoles={(0, 1): (0.5, 0, 0)}))
+        replace(flat, states=StateConstants(constants, dipoles={(0, 1): (0.5, 0, 0)}))
     swapped = {1: SpinWeights.from_mapping({"ee": 3, "eo": 1, "oe": 1, "oo": 3})}
-    assert replace(flat, states=StateConstants(own, weights=swapped, dipoles={(0, 1): (0.5, 0, 0)})).states.count == 2
+    assert (
+        replace(flat, states=StateConstants(constants, weights=swapped, dipoles={(0, 1): (0.5, 0, 0)})).states.count
+        == 2
+    )
     with pytest.raises(ValueError, match="between states 0 and 1"):
-        replace(flat, states=StateConstants(own, weights=swapped, dipoles={(0, 1): (0, 0.5, 0)}))
+        replace(flat, states=StateConstants(constants, weights=swapped, dipoles={(0, 1): (0, 0.5, 0)}))
     with pytest.raises(ValueError, match="symmetry forbids"):  # W joins levels of ortho and para
-        solve_levels(replace(flat, states=StateConstants({**own, "W[0,1]": 5.0}, weights=swapped)), 1)
+        solve_levels(replace(flat, states=StateConstants({**constants, "W[0,1]": 5.0}, weights=swapped)), 1)
 
 
 def test_fields_have_several_states_and_alignment_refuses_them(folder, call):

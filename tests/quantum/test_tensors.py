@@ -142,14 +142,14 @@ def test_direction_cosines_are_an_orthogonal_matrix(cosines):
     """They commute and are Hermitian; Σ_F Φ_Fg Φ_Fh = δ, Σ_g Φ_Fg Φ_Gg = δ; Φ_Xa = Φ_Yb Φ_Zc - Φ_Zb Φ_Yc."""
     phi, _, _, inner = cosines
     flat = [operator for row in phi for operator in row]
-    one = sparse.eye_array(flat[0].shape[0])
+    item = sparse.eye_array(flat[0].shape[0])
     for p, q in itertools.combinations(flat, 2):
         assert abs(commutator(p, q)).toarray()[:, :inner].max() < 1e-15  # numbers below 1
     for p in flat:
         assert differs(p, p.conj().T) < 1e-15
     for g, h in itertools.product(range(3), repeat=2):
-        assert differs(sum(phi[f][g] @ phi[f][h] for f in range(3)), (g == h) * one, inner) < 3e-15
-        assert differs(sum(phi[g][f] @ phi[h][f] for f in range(3)), (g == h) * one, inner) < 3e-15
+        assert differs(sum(phi[f][g] @ phi[f][h] for f in range(3)), (g == h) * item, inner) < 3e-15
+        assert differs(sum(phi[g][f] @ phi[h][f] for f in range(3)), (g == h) * item, inner) < 3e-15
     for (f, g, h), (k, l, m) in itertools.product(CYCLIC, CYCLIC):
         assert differs(phi[g][l] @ phi[h][m] - phi[g][m] @ phi[h][l], phi[f][k], inner) < 3e-15
 
@@ -411,7 +411,7 @@ def test_strengths_from_one_level_add_up(rank, representation):
 @pytest.mark.parametrize("rank", [1, 2])
 def test_every_representation_gives_the_same_strengths(rank):
     cartesian = np.random.default_rng(4).normal(size=(3,) * rank)
-    found = {}
+    results = {}
     for representation in REPRESENTATIONS:
         levels = solve_levels(Top(Constants(A=9.0, B=6.0, C=4.0, representation=representation)), 7)
         tensor = body_tensor(cartesian, rank, representation)
@@ -421,10 +421,10 @@ def test_every_representation_gives_the_same_strengths(rank):
             table[inside] = wang_amplitudes(up, low, tensor) ** 2
         order = np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))
         table = table[np.ix_(order, order)]
-        found[representation] = np.maximum(table, table.T)
-    for table in found.values():
-        assert np.allclose(table, found["Ir"], atol=1e-11)  # round-off of vectors
-    assert found["Ir"].max() > 1.0
+        results[representation] = np.maximum(table, table.T)
+    for table in results.values():
+        assert np.allclose(table, results["Ir"], atol=1e-11)  # round-off of vectors
+    assert results["Ir"].max() > 1.0
 
 
 def test_solved_blocks_of_j_1000_add_up():

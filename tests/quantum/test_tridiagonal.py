@@ -25,9 +25,9 @@ def matrices(rng: np.random.Generator, size: int, count: int):
 def test_the_vectors_are_those_of_lapack(size):
     diagonal, beside, values, whole = matrices(np.random.default_rng(size), size, 30)
     places = [(i, state) for i, matrix in enumerate(whole) for state in range(len(matrix))]
-    of_matrix, state = np.array(places).T
-    found = vectors_of_values(diagonal, beside, values, of_matrix, state, Workspace())
-    assert found is not None
+    matrix_index, state = np.array(places).T
+    computed = vectors_of_values(diagonal, beside, values, matrix_index, state, Workspace())
+    assert computed is not None
     for column, (i, k) in enumerate(places):
         energies, vectors = np.linalg.eigh(whole[i])
         n = len(energies)
@@ -35,18 +35,18 @@ def test_the_vectors_are_those_of_lapack(size):
         allowed = (
             1e-14 + 30 * 2.2e-16 * n * np.abs(energies).max() / gap
         )  # round-off of either over the distance of states
-        assert np.abs(np.abs(found[:n, column]) - np.abs(vectors[:, k])).max() < allowed
-        assert not found[n:, column].any()
+        assert np.abs(np.abs(computed[:n, column]) - np.abs(vectors[:, k])).max() < allowed
+        assert not computed[n:, column].any()
 
 
 def test_states_that_are_too_near_are_left_to_others():
     beside = np.array([[1e-3, 0.0]])
     values = np.array([[1e6 - 1e-3, 1e6 + 1e-3]])
-    every = np.array([0])
-    assert vectors_of_values(np.full((1, 2), 1e6), beside, values, every, every, Workspace()) is None
+    only_row = np.array([0])
+    assert vectors_of_values(np.full((1, 2), 1e6), beside, values, only_row, only_row, Workspace()) is None
 
 
 def test_a_value_that_is_none_of_the_matrix_is_found_out():
-    every = np.array([0])
+    only_row = np.array([0])
     values = np.array([[-0.5, 1.0]])  # -1 would be right
-    assert vectors_of_values(np.zeros((1, 2)), np.array([[1.0, 0.0]]), values, every, every, Workspace()) is None
+    assert vectors_of_values(np.zeros((1, 2)), np.array([[1.0, 0.0]]), values, only_row, only_row, Workspace()) is None

@@ -106,8 +106,8 @@ def test_six_j_are_orthogonal_at_1000():
     a, b, c, d = 1000.0, 3.0, 1001.5, 2.5
     x = np.arange(997.0, 1005.0)
     f = np.arange(998.5, 1003.5)
-    one = six_j(a, b, x, c, d, f[:, None])
-    gram = (one * (2 * x + 1)) @ six_j(c, d, x, a, b, f[:, None]).T * np.sqrt(np.outer(2 * f + 1, 2 * f + 1))
+    symbol = six_j(a, b, x, c, d, f[:, None])
+    gram = (symbol * (2 * x + 1)) @ six_j(c, d, x, a, b, f[:, None]).T * np.sqrt(np.outer(2 * f + 1, 2 * f + 1))
     exists = np.abs(np.diag(gram)) > 0.5
     assert exists.sum() >= 4
     assert np.allclose(gram[np.ix_(exists, exists)], np.eye(exists.sum()), atol=1e-13)  # six products

@@ -116,12 +116,17 @@ def test_errors_of_a_catalogue_are_those_of_its_strong_lines(call, folder):
     """Half of the last printed decimal, and the largest error of the file above a tenth of the strongest line."""
     lines = read_cat(CATALOGUE)
     strong = lines.lgint >= lines.lgint.max() - 1.0
-    every = replace(lines, error_mhz=np.where(strong, 0.002, 5.0), layout=Layout())
-    budget = catalogue_budget(every)
+    uncertain = replace(lines, error_mhz=np.where(strong, 0.002, 5.0), layout=Layout())
+    budget = catalogue_budget(uncertain)
     assert (budget.rounding.value, budget.data.value) == (5e-5, 0.002)
-    some = catalogue_budget(replace(every, error_mhz=np.where(lines.lgint == lines.lgint.max(), 0.0, 0.002)))
-    assert some.data.source == f"1 of {strong.sum()} strong lines have no error; the largest of the others is 0.002 MHz"
-    infrared = catalogue_budget(replace(every, layout=Layout(decimals=(6, 6, 4, 4))))
+    strong_budget = catalogue_budget(
+        replace(uncertain, error_mhz=np.where(lines.lgint == lines.lgint.max(), 0.0, 0.002))
+    )
+    assert (
+        strong_budget.data.source
+        == f"1 of {strong.sum()} strong lines have no error; the largest of the others is 0.002 MHz"
+    )
+    infrared = catalogue_budget(replace(uncertain, layout=Layout(decimals=(6, 6, 4, 4))))
     assert infrared.rounding.value == pytest.approx(5e-7 * units.MHZ_PER_CM)
 
 
@@ -131,8 +136,8 @@ def test_a_saved_scene_states_the_same(verb, call, folder):
     assert call(verb, *COMMANDS[verb], "--json", "a.json", "--save-scene", "s.toml", "--csv", "a.csv")[0] == 0
     assert call("run", "s.toml", "--json", "b.json")[0] == 0
     content = json.loads((folder / "a.json").read_text())["errors"]
-    found = json.loads((folder / "b.json").read_text())
-    assert found.get("errors", found.get("facts", {}).get("errors")) == content
+    report = json.loads((folder / "b.json").read_text())
+    assert report.get("errors", report.get("facts", {}).get("errors")) == content
     assert json.loads((folder / "a.csv.provenance.json").read_text())["errors"] == content
 
 

@@ -42,7 +42,7 @@ symmetry = "C2v"
 [states.dipoles]
 "0,1" = [0.0, 0.0, 1.47]
 """
-GIVEN = (
+STATE_TEXTS = (
     "--constants", "B=298192 C=186696 MHz", "--dipole-abc", "0,0,0", "--spin-weights", "0=2,1=1,2=1",
     "--state-constants", "E[1]=23785 B[1]=298041 C[1]=187000 MHz", "--state-dipoles", "[0,1] 0,0,1.47",
     "--state-weights", "[0] 0even=0,0odd=4,1=1,2=1 [1] 0even=4,0odd=0,1=1,2=1", "--state-symmetry", "C2v", "--state-names", "0+,0-",
@@ -55,20 +55,20 @@ def test_options_give_what_a_file_gives(call, tmp_path):
     """Weights 4:0, a dipole between states, names and symmetry: the same lines, and the inversion lines are among them."""
     path = tmp_path / "ammonia.toml"
     path.write_text(AMMONIA, encoding="utf-8")
-    of_file, of_options = (
-        json.loads(call("spectrum", *words, "--jmax", "3", "--json", "-")[1]) for words in ((str(path),), GIVEN)
+    file_top, option_top = (
+        json.loads(call("spectrum", *words, "--jmax", "3", "--json", "-")[1]) for words in ((str(path),), STATE_TEXTS)
     )
-    assert of_options["lines"] == of_file["lines"]
-    assert of_options["q"]["q"] == of_file["q"]["q"]
+    assert option_top["lines"] == file_top["lines"]
+    assert option_top["q"]["q"] == file_top["q"]["q"]
     keys = ("names", "symmetry", "spin_weights", "dipoles_abc_debye")
-    assert [of_options["further_states"][key] for key in keys] == [of_file["further_states"][key] for key in keys]
-    assert any(line["frequency_mhz"] < 30e3 for line in of_options["lines"])
+    assert [option_top["further_states"][key] for key in keys] == [file_top["further_states"][key] for key in keys]
+    assert any(line["frequency_mhz"] < 30e3 for line in option_top["lines"])
 
 
 @pytest.mark.parametrize("verb", ["levels", "thermo", "info"])
 def test_every_verb_with_states_takes_weights_and_symmetry(call, verb):
     words = [
-        *(GIVEN[:2] + GIVEN[4:8]), "--state-weights", GIVEN[11], "--state-symmetry", "C2v", "--state-names", "0+,0-",
+        *(STATE_TEXTS[:2] + STATE_TEXTS[4:8]), "--state-weights", STATE_TEXTS[11], "--state-symmetry", "C2v", "--state-names", "0+,0-",
     ]  # fmt: skip
     code, out, _ = call(verb, *words, "--json", "-")
     assert code == 0
@@ -77,7 +77,7 @@ def test_every_verb_with_states_takes_weights_and_symmetry(call, verb):
 
 def test_a_saved_scene_has_the_states(call, tmp_path):
     scene, table = tmp_path / "s.toml", tmp_path / "lines.csv"
-    assert call("spectrum", *GIVEN, "--jmax", "2", "--csv", str(table), "--save-scene", str(scene))[0] == 0
+    assert call("spectrum", *STATE_TEXTS, "--jmax", "2", "--csv", str(table), "--save-scene", str(scene))[0] == 0
     first = table.read_text(encoding="utf-8")
     table.unlink()
     assert call("run", str(scene), "--out", str(tmp_path))[0] == 0
@@ -87,9 +87,9 @@ def test_a_saved_scene_has_the_states(call, tmp_path):
 def test_what_is_not_named_stays():
     states = StateConstants({"E[1]": 5.0, "A[1]": 9.0, "B[1]": 8.0, "C[1]": 7.0}, dipoles={(1, 1): (1.0, 0.0, 0.0)})
     top = Top.from_constants("A=9 B=8 C=7 GHz", states=states)
-    found = with_state_texts(top, {"state_dipoles": "[0,1]=0,1,0"}, "given").states
-    assert found is not None
-    assert dict(found.dipoles) == {(1, 1): (1.0, 0.0, 0.0), (1, 0): (0.0, 1.0, 0.0)}
+    computed = with_state_texts(top, {"state_dipoles": "[0,1]=0,1,0"}, "given").states
+    assert computed is not None
+    assert dict(computed.dipoles) == {(1, 1): (1.0, 0.0, 0.0), (1, 0): (0.0, 1.0, 0.0)}
 
 
 @pytest.mark.parametrize(("kinds", "noted"), [("G_b G_c W", True), ("G_a F_ac G_c", True), ("G_c F_ab W", False)])

@@ -140,9 +140,9 @@ def test_the_same_errors_name_keys_of_a_scene_and_fields_of_a_request(ring):
 
 def test_the_template_and_the_help_have_every_quantity(ring, call):
     text, help_ = template("ring"), call("ring", "--help-all")[1]
-    for one in all_fields(toy_verb.RingRequest).values():
-        assert f"{one.last} = " in text
-        assert f"{one.flag} " in help_
+    for field in all_fields(toy_verb.RingRequest).values():
+        assert f"{field.last} = " in text
+        assert f"{field.flag} " in help_
     assert 'radius = "2 Å"  # radius of the ring (Å)' in text
     assert parse_scene(text).kind == "ring"
     assert "--mmax" not in call("ring", "--help")[1]  # not common
@@ -173,22 +173,22 @@ def test_one_knob_serves_sweep_accuracy_and_plan(ring, call, folder):
 def test_defaults_of_a_request_and_of_its_scene_agree(kind):
     """What a scene says of nothing is the default of the request, and an empty scene is saved as an empty scene."""
     verb = verb_of(kind)
-    given = parse_scene(f'schema = 1\nkind = "{kind}"\nmolecule = "OCS"\n')
-    assert scene_text(given).count("\n") == 3
-    asked = {"molecule.source": "OCS"} | ({"magnetic.g": (-0.03,)} if "magnetic.g" in verb.fields else {})
+    scene = parse_scene(f'schema = 1\nkind = "{kind}"\nmolecule = "OCS"\n')
+    assert scene_text(scene).count("\n") == 3
+    content = {"molecule.source": "OCS"} | ({"magnetic.g": (-0.03,)} if "magnetic.g" in verb.fields else {})
     if "observables.bond" in verb.fields:  # a linear molecule has none about which it turns
-        asked |= {"molecule.source": "C2H6", "observables.bond": "1-2"}
-    values = read_fields(verb.request, Given({}, "key"), verb.read(Given(asked), _place())[1])
-    defaults = {one.name: one.default for one in fields(verb.request)}
+        content |= {"molecule.source": "C2H6", "observables.bond": "1-2"}
+    values = read_fields(verb.request, Given({}, "key"), verb.read(Given(content), _place())[1])
+    defaults = {field.name: field.default for field in fields(verb.request)}
     assert all(value == defaults[name] for name, value in values.items())
 
 
 @pytest.mark.parametrize("kind", DECLARED)
 def test_a_default_as_it_is_shown_is_the_default(kind):
-    for one in verb_of(kind).fields.values():
-        if one.typed is not None:
-            assert one.reader.read(one.typed) == pytest.approx(one.default, rel=1e-15), (
-                one.key
+    for field in verb_of(kind).fields.values():
+        if field.typed is not None:
+            assert field.reader.read(field.typed) == pytest.approx(field.default, rel=1e-15), (
+                field.key
             )  # one rounding of a unit
 
 
@@ -218,10 +218,10 @@ READERS = [
 
 
 @pytest.mark.parametrize(
-    ("reader", "given", "value"), READERS, ids=[f"{type(one[0]).__name__} {one[1]}" for one in READERS]
+    ("reader", "text", "value"), READERS, ids=[f"{type(reader[0]).__name__} {reader[1]}" for reader in READERS]
 )
-def test_a_value_is_read_and_written_back(reader, given, value):
-    read = reader.read(given)
+def test_a_value_is_read_and_written_back(reader, text, value):
+    read = reader.read(text)
     exact = not isinstance(value, float) and not isinstance(reader, Grid)
     assert read == (value if exact else pytest.approx(value, rel=1e-15))  # one rounding of a product
     assert reader.read(reader.write(read)) == read
@@ -231,18 +231,18 @@ def test_a_value_is_read_and_written_back(reader, given, value):
 def test_every_number_takes_a_unit_and_its_errors_name_the_option(kind):
     """Of every option with a unit: a text with it is read, another unit and a word are refused, with the option and what was typed."""
     numbers = [
-        one
-        for one in verb_of(kind).options.values()
-        if isinstance(one.reader, Quantity | Grid | Range) and one.reader.unit
+        option
+        for option in verb_of(kind).options.values()
+        if isinstance(option.reader, Quantity | Grid | Range) and option.reader.unit
     ]
     assert numbers or kind == "structure"  # whose settings are words
-    for one in numbers:
-        text = f"1:2 {one.reader.unit}" if isinstance(one.reader, Range) else f"1 {one.reader.unit}"
-        assert one.read(text, "option") is not None
+    for number in numbers:
+        text = f"1:2 {number.reader.unit}" if isinstance(number.reader, Range) else f"1 {number.reader.unit}"
+        assert number.read(text, "option") is not None
         for wrong in ("1 furlong", "x"):
-            wrong = wrong.replace("1 ", "1:2 ") if isinstance(one.reader, Range) else wrong
-            with pytest.raises(ValueError, match=f"^{one.flag}: '{wrong}'"):
-                one.read(wrong, "option")
+            wrong = wrong.replace("1 ", "1:2 ") if isinstance(number.reader, Range) else wrong
+            with pytest.raises(ValueError, match=f"^{number.flag}: '{wrong}'"):
+                number.read(wrong, "option")
 
 
 def test_the_page_of_options_is_that_of_the_declarations():

@@ -23,7 +23,7 @@ from rotor.thermodynamics.classical_gas import GasRequest, answer_gas, settling_
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.thermodynamics.thermal_tumble import thermal_tumble
 
-OF_COMMAND = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
+COMMAND_KEYS = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
 
 
 def answer_of(call, *arguments: str) -> dict:
@@ -34,7 +34,7 @@ def answer_of(call, *arguments: str) -> dict:
 
 def assert_same(command: Mapping, facts: Mapping, but: frozenset[str] = frozenset()) -> None:
     """Every key of the command's JSON but those of the command itself, number by number: no tolerance, one code computes both."""
-    assert set(command) - OF_COMMAND == set(facts) - but
+    assert set(command) - COMMAND_KEYS == set(facts) - but
     for key, value in plain(facts).items():
         if key not in but:
             assert command[key] == value, key
@@ -99,8 +99,8 @@ def test_tumble_of_a_molecule(call):
     request = thermal_tumble(rotor.read("water"), temperature_k=100, times_ps=np.linspace(0, 2, 21))
     answer = answer_tumble(request)
     facts = {**answer.facts(), "motion": rows_of(answer.table)}
-    of_top = {key for key in command if key not in facts} - OF_COMMAND
-    assert_same({k: v for k, v in command.items() if k not in of_top}, facts)
+    top_keys = {key for key in command if key not in facts} - COMMAND_KEYS
+    assert_same({k: v for k, v in command.items() if k not in top_keys}, facts)
     assert command["temperature_k"] == 100
 
 
@@ -143,16 +143,16 @@ def test_levels_of_every_kind_of_top():
     assert linear.energy_mhz.tolist() == [1e3 * j * (j + 1) for j in range(2, 6)]
     assert linear.energy_cm[0] == pytest.approx(6e3 / 29979.2458, rel=1e-15)  # one division
     top = rotor.Top.from_constants("A=10 B=6 C=4 MHz")
-    some = answer_levels(LevelsRequest(top, jmax=4, jmin=1, kmin=1, kmax=2)).table
-    every = answer_levels(LevelsRequest(top, jmax=4)).table
+    levels = answer_levels(LevelsRequest(top, jmax=4, jmin=1, kmin=1, kmax=2)).table
+    table = answer_levels(LevelsRequest(top, jmax=4)).table
     chosen = [
         (row["j"], row["ka"], row["kc"], row["energy_mhz"])
-        for row in rows_of(every)
+        for row in rows_of(table)
         if row["j"] >= 1 and 1 <= row["ka"] <= 2
     ]
-    assert [(row["j"], row["ka"], row["kc"], row["energy_mhz"]) for row in rows_of(some)] == chosen
+    assert [(row["j"], row["ka"], row["kc"], row["energy_mhz"]) for row in rows_of(levels)] == chosen
     low = answer_levels(LevelsRequest(top, jmax=4, max_energy_mhz=50.0)).table
-    assert low.energy_mhz.tolist() == [e for e in every.energy_mhz.tolist() if e <= 50.0]
+    assert low.energy_mhz.tolist() == [e for e in table.energy_mhz.tolist() if e <= 50.0]
 
 
 def test_levels_count_from_the_lowest_that_exists():

@@ -75,7 +75,7 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
         "raman": ("min_relative", "cross_section_cm2_per_sr"),
     }[kind]
     whole = verb_of(kind).answer(replace(result.request, **{name: None, "jmax": 150}), Work())
-    part, true = (getattr(one.lines, column).sum() for one in (result.answer, whole))
+    part, true = (getattr(result_.lines, column).sum() for result_ in (result.answer, whole))
     assert 0 <= 100 * (1 - part / true) <= result.reached.error <= result.reached.asked
 
 
@@ -119,7 +119,7 @@ def test_a_decade_coarser_misses(folder):
     for accuracy, percent in (("0.1 %", 0.1), ("0.01 %", 0.01)):
         request = taken("fit", accuracy, FIT)
         coarser = replace(request, options=replace(request.options, tolerance=10 * request.options.tolerance))
-        errors = [100 * answer_fit(one).constants_errors.numerical for one in (request, coarser)]
+        errors = [100 * answer_fit(fit_request).constants_errors.numerical for fit_request in (request, coarser)]
         assert errors[0] <= percent
         assert errors[1] > percent or request.options.tolerance == 1.0
 
@@ -128,8 +128,8 @@ def test_what_cannot_be_had_is_refused(call, folder):
     assert "cannot be given: the error here is" in ran(call, folder, "emission", "1e-9 K", EMISSION)[2]
     assert "cannot be given: the error here is" in ran(call, folder, "fit", "1e-9 kHz", FIT)[2]
     assert "does not measure the same thing" in ran(call, folder, "structure", "1 kHz", STRUCTURE)[2]
-    of_substitution = STRUCTURE.replace('"r0"', '"rs"')
-    said = ran(call, folder, "structure", "1e-6 Å", of_substitution)[2]
+    substitution = STRUCTURE.replace('"r0"', '"rs"')
+    said = ran(call, folder, "structure", "1e-6 Å", substitution)[2]
     assert (
         "accuracy: the numerical error of bond lengths (rs) is not estimated: Kraitchman's equations lose digits"
         in said

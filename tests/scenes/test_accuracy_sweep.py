@@ -61,10 +61,10 @@ def test_orders_of_distortion_of_a_linear_molecule():
     """Without D the highest level is off by D (J(J+1))² - H (J(J+1))³, without H by that last term."""
     rod = MoleculeSection(constants="B=6000 D=1e-3 H=1e-10 MHz")
     table = work_precision(LevelsScene(molecule=rod, observables=LevelsObservables(jmax=20)))
-    found, x = errors(table, "effects.distortion"), 20 * 21
-    assert found["order J^2"] == pytest.approx(1e-3 * x**2 - 1e-10 * x**3, rel=1e-9)  # round-off of 2.5e6 MHz
-    assert found["order J^4"] == pytest.approx(1e-10 * x**3, rel=1e-4)  # likewise, of 7e-3 MHz
-    assert found["order J^6"] == 0.0
+    deviations, x = errors(table, "effects.distortion"), 20 * 21
+    assert deviations["order J^2"] == pytest.approx(1e-3 * x**2 - 1e-10 * x**3, rel=1e-9)  # round-off of 2.5e6 MHz
+    assert deviations["order J^4"] == pytest.approx(1e-10 * x**3, rel=1e-4)  # likewise, of 7e-3 MHz
+    assert deviations["order J^6"] == 0.0
     assert [row.own for row in table.rows] == [False, False, True]
 
 
@@ -113,9 +113,11 @@ def test_methods_of_hyperfine_structure():
         spin_constants="chi_aa(35Cl)=-57 chi_bc(35Cl)=20 MHz",
     )
     scene = LevelsScene(molecule=spins, observables=LevelsObservables(jmax=3))
-    found = errors(work_precision(scene), "effects.hyperfine_method")
-    assert found["exact"] == 0.0 < found["N-diagonal"] <= found["first-order"] < found["left out"]
-    assert found["left out"] == pytest.approx(57 / 4, rel=1e-6)  # J = 1 and I = 3/2 are shifted by χ_aa/4; second order
+    deviations = errors(work_precision(scene), "effects.hyperfine_method")
+    assert deviations["exact"] == 0.0 < deviations["N-diagonal"] <= deviations["first-order"] < deviations["left out"]
+    assert deviations["left out"] == pytest.approx(
+        57 / 4, rel=1e-6
+    )  # J = 1 and I = 3/2 are shifted by χ_aa/4; second order
 
 
 def test_a_stark_map_converges_with_j_max():
@@ -131,8 +133,8 @@ def test_a_stark_map_converges_with_j_max():
 def test_a_partition_function_reaches_each_error():
     table = work_precision(ThermoScene(molecule="CO", conditions=ThermoConditions(temperature=[20.0, 100.0])))
     for name in ("Q", "U", "C_v"):
-        for asked, error in errors(table, "numerics.relative_error", name).items():
-            assert error <= 100 * float(asked)  # percent
+        for goal, error in errors(table, "numerics.relative_error", name).items():
+            assert error <= 100 * float(goal)  # percent
 
 
 @pytest.mark.slow
@@ -143,8 +145,8 @@ def test_the_step_of_a_splitting_has_its_order():
         TumbleScene(body=rod, effects=[weight], conditions=TumbleConditions(times=[0.0, 1.0, 2.0])), limit_seconds=20
     )
     for order in (2, 4):
-        found = errors(table, f"numerics.step, order {order}")
-        steps, values = np.array([float(one) for one in found])[:3], np.array(list(found.values()))[:3]
+        deviations = errors(table, f"numerics.step, order {order}")
+        steps, values = np.array([float(entry) for entry in deviations])[:3], np.array(list(deviations.values()))[:3]
         slope = np.polyfit(np.log(steps), np.log(values), 1)[0]
         assert slope == pytest.approx(order, abs=0.4)  # leading term alone, over a factor of 4 in the step
     steps = errors(table, "numerics.tolerance")
@@ -158,15 +160,15 @@ def test_kinds_without_a_knob_say_so():
     assert "exact: nothing cheaper" in table.remarks[0]
     drag = [LinearDragSection(coefficients=[0.1, 0.1, 0.1])]
     driven = knobs_of(TumbleScene(body=racket, effects=drag, conditions=TumbleConditions(times=[0.0, 1.0])))
-    assert [one.name for one in driven.knobs] == ["numerics.tolerance"]
+    assert [knob.name for knob in driven.knobs] == ["numerics.tolerance"]
     assert "a splitting holds no torque of the angular velocity" in driven.remarks[0]
 
 
 @pytest.mark.slow
 def test_the_error_of_a_gas_falls_with_the_root_of_its_molecules():
     table = work_precision(GasScene(molecule="water", numerics=GasNumerics(molecules=3000)))
-    found = errors(table, "numerics.molecules", "temperature")
-    for count, error in found.items():
+    deviations = errors(table, "numerics.molecules", "temperature")
+    for count, error in deviations.items():
         expected = 300 * math.sqrt(2 / (6 * int(count)))  # of 2E/6k, E a sum of 6 halves of χ²
         assert 0.4 < error / expected < 1.8  # 8 gases: χ of 8 degrees is inside with 99.7 %
 
@@ -176,8 +178,8 @@ def test_the_step_of_a_fluid_is_of_second_order():
     box = FluidConditions(model="spce", molecules=27, steps=10)
     table = work_precision(FluidScene(conditions=box, numerics=FluidNumerics(cutoff="4.5 Å", electrostatics="ewald")))
     for of in ("conserved energy per degree", "positions after 48 fs"):
-        found = errors(table, "numerics.step", of)
-        assert found["2"] / found["1"] == pytest.approx(4.0, rel=0.15)  # leading term alone
+        deviations = errors(table, "numerics.step", of)
+        assert deviations["2"] / deviations["1"] == pytest.approx(4.0, rel=0.15)  # leading term alone
     ewald = list(errors(table, "numerics.ewald_tolerance").values())
     assert ewald == sorted(ewald, reverse=True)
     assert ewald[-1] < 1e-3 < 0.01 < ewald[0]  # percent of a force
@@ -187,15 +189,15 @@ def test_the_step_of_a_fluid_is_of_second_order():
 def test_alignment_reaches_each_tolerance():
     pulse = [GaussianSection(peak=1e12, fwhm=0.3)]
     table = work_precision(AlignScene(molecule="OCS", pulses=pulse))
-    found = errors(table, "numerics.tolerance")
-    assert all(error <= float(asked) for asked, error in found.items())
-    assert found["0.01"] > 100 * found["1e-06"]
+    deviations = errors(table, "numerics.tolerance")
+    assert all(error <= float(goal) for goal, error in deviations.items())
+    assert deviations["0.01"] > 100 * deviations["1e-06"]
 
 
 def test_raman_lines():
-    found = errors(work_precision(RamanScene(molecule="N2")), "observables.min_relative")
-    assert list(found.values()) == sorted(found.values(), reverse=True)
-    assert found["1e-06"] < 1e-3 < found["0.1"]  # percent of all cross sections
+    deviations = errors(work_precision(RamanScene(molecule="N2")), "observables.min_relative")
+    assert list(deviations.values()) == sorted(deviations.values(), reverse=True)
+    assert deviations["1e-06"] < 1e-3 < deviations["0.1"]  # percent of all cross sections
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
@@ -209,9 +211,9 @@ def test_the_numerics_of_every_kind_can_be_loaded(kind):
 def test_a_fit_and_a_source():
     spectrum = [EmittingMolecule(source="CO", column=1e18), EmittingMolecule(source="CH3CN", column=1e14)]
     source = EmissionScene(molecules=spectrum, conditions=EmissionConditions(excitation="20 K", range="110:116GHz"))
-    found = list(errors(work_precision(source), "observables.least_depth").values())
-    assert found == sorted(found, reverse=True)
-    assert found[-1] < 1e-3 < found[0]  # K
+    computed = list(errors(work_precision(source), "observables.least_depth").values())
+    assert computed == sorted(computed, reverse=True)
+    assert computed[-1] < 1e-3 < computed[0]  # K
 
     lines = PROJECT / "tests" / "oracles" / "fits"
     par = next(iter(sorted(lines.rglob("*.par"))))
@@ -225,8 +227,8 @@ def slow_knob(seconds: list[float], clock: list[float]) -> Sweep:
         clock[0] += request
         return request
 
-    measure = Measure("nothing", "", lambda one, other: abs(one - other))
-    settings = tuple(Setting(f"{one:g}", one) for one in seconds)
+    measure = Measure("nothing", "", lambda first, other: abs(first - other))
+    settings = tuple(Setting(f"{duration:g}", duration) for duration in seconds)
     return Sweep("time", (measure,), settings, 1000.0, "a long one", answer)
 
 
@@ -247,7 +249,7 @@ def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
 def test_a_panel_a_knob():
     rows = [Row(f"numerics.step, order {n}", "1", False, "attitude", 1e-3 / n, "rad", 0.1) for n in (2, 4)]
     panels = panels_of(WorkPrecision("tumble", tuple(rows), {}))
-    assert [(one.title, one.of, list(one.curves)) for one in panels] == [
+    assert [(panel.title, panel.of, list(panel.curves)) for panel in panels] == [
         ("length of a step", "attitude (rad)", ["order 2", "order 4"])
     ]
 

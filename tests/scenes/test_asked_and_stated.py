@@ -29,7 +29,11 @@ def test_a_verdict_names_what_does_not_hold():
 
 
 @pytest.mark.parametrize(
-    "number", [one if one in FAST else pytest.param(one, marks=pytest.mark.slow) for one in range(1, len(SCENES) + 1)]
+    "number",
+    [
+        number if number in FAST else pytest.param(number, marks=pytest.mark.slow)
+        for number in range(1, len(SCENES) + 1)
+    ],
 )
 def test_a_scene_is_within_what_it_states(number, tmp_path):
     row = cases.measured(number, *SCENES[number - 1], tmp_path)

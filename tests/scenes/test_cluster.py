@@ -47,8 +47,8 @@ def cluster():
     """Two workers in this process."""
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
-    ) as made:
-        yield made.scheduler_address
+    ) as process:
+        yield process.scheduler_address
 
 
 def test_a_sweep_on_a_cluster_gives_the_same_bytes(call, folder, cluster):
@@ -86,8 +86,8 @@ def test_a_scheduler_that_is_not_there(monkeypatch):
 def test_a_sweep_on_a_cluster_goes_on_where_it_stopped(folder, cluster):
     count = []
 
-    def stop(made):
-        count.append(made)
+    def stop(record):
+        count.append(record)
         if len(count) == 2:
             raise KeyboardInterrupt
 
@@ -131,12 +131,12 @@ def test_what_has_not_begun_on_a_cluster_is_cancelled(folder, cluster):
 def certificate(tmp_path):
     """A certificate signed by itself, and its key."""
     key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
-    made = subprocess.run(
+    process = subprocess.run(
         ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", cert, "-days", "2",
          "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1,DNS:localhost"],
         capture_output=True, check=False,
     )  # fmt: skip
-    if made.returncode:
+    if process.returncode:
         pytest.skip("openssl, which makes the certificate, is not there")
     return str(cert), str(cert), str(key)
 
@@ -150,8 +150,8 @@ def test_an_encrypted_cluster_takes_a_client_with_certificates(call, folder, cer
     write_scene(SWEEP, "s.toml")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tls://", security=security
-    ) as made:
-        address = made.scheduler_address
+    ) as process:
+        address = process.scheduler_address
         assert address.startswith("tls://")
         code, _, err = call("run", "s.toml", "--dask", address)
         assert (code, "no scheduler of Dask answers" in err) == (2, True)
@@ -162,8 +162,8 @@ def test_an_encrypted_cluster_takes_a_client_with_certificates(call, folder, cer
 
 def test_certificates_that_are_not_there(call, folder):
     write_scene(SWEEP, "s.toml")
-    for given, said in (("a,b", "expected three files"), ("a,b,c", "a: no such file")):
-        code, _, err = call("run", "s.toml", "--dask", "tls://localhost:1", "--dask-tls", given)
+    for files, said in (("a,b", "expected three files"), ("a,b,c", "a: no such file")):
+        code, _, err = call("run", "s.toml", "--dask", "tls://localhost:1", "--dask-tls", files)
         assert code == 2
         assert said in err
     code, _, err = call("run", "s.toml", "--dask-tls", "a,b,c")

@@ -220,7 +220,7 @@ def test_the_model_of_q_is_the_error_of_the_geometry():
     top = rotor.read("SMILES:CC(Cl)C#N")
     relative = top.molecule.uncertainty
     with_vibration = answer_thermo(ThermoRequest(top, (300.0,), vibrations=VibrationalStates.parse("200")))
-    limits = {one.name: one.size_mhz for one in every_limit(top, populated_j(top, 300.0), with_vibration.effects)}
+    limits = {limit.name: limit.size_mhz for limit in every_limit(top, populated_j(top, 300.0), with_vibration.effects)}
     share = limits["error of the geometry"] / sum(size for size in limits.values() if size)
     assert with_vibration.errors.model.value * share == pytest.approx(1.5 * relative, rel=0.5)
     assert answer_thermo(ThermoRequest(top, (300.0,))).errors.model.source == "vibration is left out"
@@ -300,20 +300,20 @@ def test_a_quadrupole_that_is_left_out_takes_brightness_from_the_centre(name, ra
     from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
 
     source, top = Source(1e14, 20.0, width), rotor.read(name)
-    found = answer_emission(EmissionRequest((top,), (source,), range_mhz))
+    answer = answer_emission(EmissionRequest((top,), (source,), range_mhz))
     split = answer_emission(EmissionRequest((top,), (source,), range_mhz, effects=(effects_of(top, True),)))
-    there = emission(split.emitted[0], source, [found.peak.observed_mhz]).brightness_k[0]
-    lost = found.peak.brightness_k - float(there)
-    assert lost / 1.5 < found.errors.model.value < 1.5 * lost + 1e-3 * found.peak.brightness_k
-    assert "nuclear quadrupole" in found.errors.model.source
+    there = emission(split.emitted[0], source, [answer.peak.observed_mhz]).brightness_k[0]
+    lost = answer.peak.brightness_k - float(there)
+    assert lost / 1.5 < answer.errors.model.value < 1.5 * lost + 1e-3 * answer.peak.brightness_k
+    assert "nuclear quadrupole" in answer.errors.model.source
 
 
 def test_the_quadrupole_of_a_line_of_high_j_is_inside_its_width():
     """HC3N 10 - 9 at 1 km/s: its strong components are 0.02 MHz apart, the width is 0.3 MHz."""
     from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
 
-    found = answer_emission(EmissionRequest((rotor.read("HC3N"),), (Source(1e14, 100.0, 1.0),), (80e3, 100e3)))
-    assert found.errors.model.value < 0.05 * found.peak.brightness_k
+    answer = answer_emission(EmissionRequest((rotor.read("HC3N"),), (Source(1e14, 100.0, 1.0),), (80e3, 100e3)))
+    assert answer.errors.model.value < 0.05 * answer.peak.brightness_k
 
 
 def test_components_of_a_line_have_their_mean_at_its_centre():
@@ -326,14 +326,14 @@ def test_the_temperature_of_a_gas_scatters_as_stated():
     """Temperatures of 200 gases: their standard deviation against the stated one, and the coverage of the confidence."""
     from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
 
-    top, found = Top.from_constants("A=10 B=6 C=4 GHz"), []
+    top, computed = Top.from_constants("A=10 B=6 C=4 GHz"), []
     for seed in range(200):
         answer = answer_gas(GasRequest(top, molecules=100, seed=seed, confidence=0.9))
-        found.append(300.0 * np.mean([degree.mean for degree in answer.test.degrees]) - 300.0)
+        computed.append(300.0 * np.mean([degree.mean for degree in answer.test.degrees]) - 300.0)
     stated = answer.errors.statistics.value
-    assert np.std(found) == pytest.approx(stated, rel=0.2)  # four standard errors of a deviation of 200
+    assert np.std(computed) == pytest.approx(stated, rel=0.2)  # four standard errors of a deviation of 200
     assert "within 1.64 times" in answer.errors.statistics.source
-    assert abs(np.mean(np.abs(found) <= 1.645 * stated) - 0.9) < 4 * math.sqrt(0.9 * 0.1 / 200)
+    assert abs(np.mean(np.abs(computed) <= 1.645 * stated) - 0.9) < 4 * math.sqrt(0.9 * 0.1 / 200)
 
 
 def test_the_steps_of_a_fluid_are_counted_about_the_mean():
@@ -377,10 +377,10 @@ def test_the_phase_of_flips_follows_from_the_last_digits():
         for place in range(3):
             others = [list(moments), list(momentum)]
             for numbers in others:
-                kept, numbers[place] = numbers[place], math.nextafter(numbers[place], 9.0)
+                original, numbers[place] = numbers[place], math.nextafter(numbers[place], 9.0)
                 other = answer_tumble(TumbleRequest(tuple(others[0]), tuple(others[1]), times=(0.0,)))
                 moved = max(moved, abs(float(other.motion.period) - period))
-                numbers[place] = kept
+                numbers[place] = original
         stated = flip_phase_error(period, 1e3, answer.stability.growth_rate)
         actual = 2 * math.pi * 1e3 * moved / period**2
         assert actual / 3 <= stated <= 3 * actual
@@ -425,8 +425,8 @@ RIGID = '[molecule]\nconstants = "B=6000(1) D=0.001 MHz"\n[observables]\njmax = 
 )
 def test_the_accuracy_of_the_total_is_refused_where_it_cannot_be_given(call, folder, body, accuracy, says):
     """σ(E) of J = 3 is 12 σ(B)."""
-    given = f'schema = 1\nkind = "levels"\naccuracy = {accuracy}\n' + body + '[outputs]\ncsv = "l.csv"\n'
-    (folder / "s.toml").write_text(given)
+    text = f'schema = 1\nkind = "levels"\naccuracy = {accuracy}\n' + body + '[outputs]\ncsv = "l.csv"\n'
+    (folder / "s.toml").write_text(text)
     code, _, err = call("run", "s.toml")
     assert code == (2 if says else 0), err
     assert says in " ".join(err.split())

@@ -61,7 +61,7 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
     assert alone.size is None
     assert f"{pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
     scene = SpectrumScene(molecule="H2CO", conditions=SpectrumConditions(temperature="30 K", range="100:105GHz"))
-    widths = {one.name: one for one in plan_of(scene).left_out}
+    widths = {neglected.name: neglected for neglected in plan_of(scene).left_out}
     assert "at 105000 MHz" in widths["Doppler width"].basis
     assert widths["pressure width"].size is None
 
@@ -70,7 +70,7 @@ def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
     def names(**observables) -> set[str]:
         gas = SpectrumConditions(range="115.2:115.4GHz")
         scene = SpectrumScene(molecule="CO", conditions=gas, observables=SpectrumObservables(**observables))
-        return {one.name for one in plan_of(scene).left_out}
+        return {neglected.name for neglected in plan_of(scene).left_out}
 
     assert {"Doppler width", "pressure width"} <= names()
     assert {"Doppler width", "pressure width"} & names(profile="gaussian") == {"pressure width"}
@@ -89,16 +89,16 @@ def test_a_plan_says_where_the_distortion_series_ends():
 @pytest.mark.parametrize("name", ["H2CO", "SO2", "water", "HCONH2", "CH2CHCN"])
 def test_the_shift_of_an_asymmetric_top_in_a_stray_field(name):
     top = rotor.read(name)
-    found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=1, m_values=(1,), tolerance_mhz=1e-6)
-    energy = found.energy_mhz.reshape(-1, 2)  # both fields of one state after each other
+    stark = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=1, m_values=(1,), tolerance_mhz=1e-6)
+    energy = stark.energy_mhz.reshape(-1, 2)  # both fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
     assert 1 / 3 < stray_field(top).size / shift < 3  # the other levels of J = 0 and 2 are left out
 
 
 def normal(count: int) -> np.ndarray:
     """Numbers (count, 3) spread normally, by quantiles: their squares have the mean 1 but for the tails."""
-    one = norm.ppf((np.arange(count) + 0.5) / count)
-    return np.stack([one, one, one], axis=-1) / one.std()
+    deviates = norm.ppf((np.arange(count) + 0.5) / count)
+    return np.stack([deviates, deviates, deviates], axis=-1) / deviates.std()
 
 
 @pytest.mark.parametrize("u", [0.3, 1.0, 2.0])
@@ -110,21 +110,21 @@ def test_the_quantum_correction_is_that_of_oscillators(u):
     )
     omega = u * units.EV_PER_K * kelvin / units.HBAR_CLASSICAL
     force = -np.sqrt(bodies.mass[:, None] * units.EV_PER_K * kelvin) * omega * normal(count)  # -mΩ²x
-    found = {one.name: one for one in left_out_of_fluid(bodies, force, 0 * force, kelvin, 2.0)}
+    computed = {omission.name: omission for omission in left_out_of_fluid(bodies, force, 0 * force, kelvin, 2.0)}
     exact = 3 * np.log(np.sinh(u / 2) / (u / 2))
     tolerance = (
         0.05 + u**2 / 50
     )  # 12,000 squares have a spread of 1.3 %; the next order is u²/120 of this one, and more
-    assert found["quantum mechanics of nuclei"].size / 100 == pytest.approx(exact, rel=tolerance)
-    assert "finite step" not in found  # atoms do not turn
+    assert computed["quantum mechanics of nuclei"].size / 100 == pytest.approx(exact, rel=tolerance)
+    assert "finite step" not in computed  # atoms do not turn
 
 
 def test_the_step_error_is_that_of_librators():
     """⟨L²/I⟩ at full steps is s √(1 - s²)/asin s of kT, s = Ωh/2 (`rotor.fluids.motion.thermometers`)."""
     kelvin, step_fs, count = 300.0, 3.0, 20
     dimers = [molecule("N2") for _ in range(count)]
-    for number, one in enumerate(dimers):
-        one.translate([10.0 * number, 0, 0])
+    for number, dimer in enumerate(dimers):
+        dimer.translate([10.0 * number, 0, 0])
     bodies, _ = bodies_of(sum(dimers[1:], dimers[0]), np.arange(2 * count) // 2)
     step, rng = step_fs * 1e-3 / units.ASE_TIME_PS, np.random.default_rng(4)
     omega = 0.5 / step
@@ -133,9 +133,9 @@ def test_the_step_error_is_that_of_librators():
         bodies.inverse_moments > 0, 1 / np.where(bodies.inverse_moments > 0, bodies.inverse_moments, 1), 0
     )
     torque = -np.sqrt(moments * units.EV_PER_K * kelvin) * omega * angles
-    found = {one.name: one for one in left_out_of_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
+    computed = {omission.name: omission for omission in left_out_of_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
     s = 0.25
-    assert found["finite step"].size / 100 == pytest.approx(
+    assert computed["finite step"].size / 100 == pytest.approx(
         1 - s * np.sqrt(1 - s**2) / np.arcsin(s), rel=0.1
     )  # the next order of Ωh
 
@@ -147,7 +147,9 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
     slowed = yeh_hummer_correction(Diffusion(0.0, 0.0), 298.0, 0.9e-3, edge).corrected / 2.3e-9
     bodies, _ = bodies_of(Atoms("Ar2", positions=[[0, 0, 0], [9, 0, 0]]), np.arange(2))
     share = left_out_of_fluid(bodies, np.zeros((2, 3)), np.zeros((2, 3)), 298.0, 1.0)
-    size = next(one.size for one in share if one.name == "finite box") * (2 / count) ** (1 / 3)  # of two: N^(-1/3)
+    size = next(omission.size for omission in share if omission.name == "finite box") * (2 / count) ** (
+        1 / 3
+    )  # of two: N^(-1/3)
     assert 1 / 3 < size / 100 / slowed < 3
 
 
@@ -156,7 +158,7 @@ def test_a_plan_of_atoms_on_a_perfect_lattice():
     """64 atoms of argon: forces are round-off at the start, which is no net force; atoms have no step error of rotation."""
     box = FluidConditions(model="argon", molecules=64, density=1.0, steps=10, every=5)
     plan = plan_of(FluidScene(conditions=box, numerics=FluidNumerics(cutoff="7 Å")))
-    sizes = {one.name: one.size for one in plan.left_out}
+    sizes = {neglected.name: neglected.size for neglected in plan.left_out}
     assert sizes["finite box"] == pytest.approx(25.0)  # 64^(-1/3)
     assert "finite step" not in sizes
 
@@ -171,7 +173,7 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
 
     box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)
     scene = FluidScene(conditions=box, numerics=FluidNumerics(cutoff="6 Å"))
-    planned = {one.name: one.size for one in plan_of(scene).left_out}
+    planned = {neglected.name: neglected.size for neglected in plan_of(scene).left_out}
     request = kind_of(scene).request(scene, ".")
     atoms, kelvin, step_fs = box_of(request), 298.15, 2.0
     thermostat = Langevin(kelvin, 5e-3 / ase_units.fs, np.random.default_rng(1))
@@ -180,15 +182,15 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     sizes = []
     for _ in range(20):
         dynamics.run(10)
-        found = left_out_of_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
-        sizes.append({one.name: one.size for one in found if one.size is not None})
+        computed = left_out_of_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
+        sizes.append({entry.name: entry.size for entry in computed if entry.size is not None})
     for name in ("quantum mechanics of nuclei", "finite step"):
-        assert 1 / 3 < planned[name] / np.mean([one[name] for one in sizes]) < 3
+        assert 1 / 3 < planned[name] / np.mean([size[name] for size in sizes]) < 3
 
 
 def driven(name: str, **changes) -> DrivenRequest:
     scene = read_scene(SCENES / f"{name}.toml")
-    fields = {one: getattr(scene, one) for one in scene.__struct_fields__}
+    fields = {name: getattr(scene, name) for name in scene.__struct_fields__}
     return replace(kind_of(scene).request(type(scene)(**{**fields, "accuracy": None}), SCENES), **changes)
 
 

@@ -44,8 +44,8 @@ ALLOWED = {
 def outcomes(call, folder, scene) -> list[tuple[int, str]]:
     kind, body = scene
     (folder / "s.toml").write_text(HEAD.format(kind) + body)
-    found = [call(verb, "s.toml") for verb in ("plan", "run")]
-    return [(code, " ".join(err.split())) for code, _, err in found]
+    computed = [call(verb, "s.toml") for verb in ("plan", "run")]
+    return [(code, " ".join(err.split())) for code, _, err in computed]
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -63,10 +63,10 @@ from rotor.thermodynamics.classical_gas import answer_gas
 from rotor.tops.top import Top
 
 
-@pytest.mark.parametrize("asked", ["1 MHz", "1 kHz"])
-def test_a_stark_map(asked):
+@pytest.mark.parametrize("goal", ["1 MHz", "1 kHz"])
+def test_a_stark_map(goal):
     field = StarkConditions(field=[0.0, 100.0])
-    result = run_scene(StarkScene(molecule="OCS", conditions=field, accuracy=asked))
+    result = run_scene(StarkScene(molecule="OCS", conditions=field, accuracy=goal))
     fine = run_scene(
         StarkScene(molecule="OCS", conditions=field, numerics=StarkNumerics(tolerance=result.reached.asked / 100))
     )
@@ -140,15 +140,15 @@ DRIVEN = [
 TIMES = TumbleConditions(times=[0.0, 5.0, 10.0])
 
 
-@pytest.mark.parametrize("asked", [1e-3, 1e-8])
-def test_a_driven_motion(asked):
-    result = run_scene(TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, accuracy=f"{asked} rad"))
+@pytest.mark.parametrize("goal", [1e-3, 1e-8])
+def test_a_driven_motion(goal):
+    result = run_scene(TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, accuracy=f"{goal} rad"))
     fine = run_scene(TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, numerics=TumbleNumerics(tolerance=1e-13)))
     error = distance(result.answer.motion.attitude, fine.answer.motion.attitude).max()
-    assert error <= result.reached.error <= asked
+    assert error <= result.reached.error <= goal
     assert result.answer.motion.steps < fine.answer.motion.steps  # cheaper than the finest
     coarser = answer_driven(replace(result.request, tolerance=10 * result.request.tolerance)).motion
-    assert distance(coarser.attitude, fine.answer.motion.attitude).max() > asked
+    assert distance(coarser.attitude, fine.answer.motion.attitude).max() > goal
 
 
 def test_steps_that_end_at_dense_times_are_no_reference():
@@ -188,11 +188,11 @@ TWO = MoleculeSection(
 )
 
 
-@pytest.mark.parametrize(("asked", "method"), [("20 MHz", "first-order"), ("1 kHz", "exact")])
-def test_several_spins_by_the_cheapest_method(asked, method):
+@pytest.mark.parametrize(("goal", "method"), [("20 MHz", "first-order"), ("1 kHz", "exact")])
+def test_several_spins_by_the_cheapest_method(goal, method):
     """What is stated covers the difference from exact lines; what is too much to be left out stays."""
     few = BasisNumerics(jmax=2)
-    scene = SpectrumScene(molecule=TWO, conditions=JET, numerics=few, accuracy=asked)
+    scene = SpectrumScene(molecule=TWO, conditions=JET, numerics=few, accuracy=goal)
     result = run_scene(scene)
     exact = run_scene(SpectrumScene(molecule=TWO, conditions=JET, numerics=few))
     assert used_method(result.table.levels).method == method
@@ -271,10 +271,10 @@ def test_levels_with_spins_that_are_known():
     assert coarse.reached.error > 1.0  # MHz: the spins are left out
 
 
-@pytest.mark.parametrize(("asked", "unit"), [("3 K", "K"), ("3 %", "%")])
-def test_a_gas_has_the_molecules_that_its_accuracy_needs(asked, unit):
+@pytest.mark.parametrize(("goal", "unit"), [("3 K", "K"), ("3 %", "%")])
+def test_a_gas_has_the_molecules_that_its_accuracy_needs(goal, unit):
     """Errors of 40 gases beside what is stated at 99 %: two of them may be outside, by chance 0.7 % of all times three are."""
-    scene = GasScene(molecule="water", accuracy=asked)
+    scene = GasScene(molecule="water", accuracy=goal)
     result = run_scene(scene)
     count, degrees = result.request.molecules, 6
     expected = 2.5758**2 * ((300 / 3) ** 2 * 2 / degrees if unit == "K" else (100 / 3) ** 2 * (2 + 12 / degrees))
@@ -289,8 +289,8 @@ def test_a_gas_has_the_molecules_that_its_accuracy_needs(asked, unit):
         )
         energy = sum(gas.kinetic.energies.values()) / units.EV_PER_K
         true = 300.0 if unit == "K" else 0.5 * degrees * 300.0**2
-        found = 2 * energy.mean() / degrees if unit == "K" else energy.var()
-        errors.append(abs(found - true) * (1.0 if unit == "K" else 100 / true))
+        computed = 2 * energy.mean() / degrees if unit == "K" else energy.var()
+        errors.append(abs(computed - true) * (1.0 if unit == "K" else 100 / true))
     assert np.count_nonzero(np.array(errors) > 3.0) <= 2
     assert np.max(errors) > 1.0  # 40 errors of a normal distribution are not all below a third of its 99 % quantile
 
@@ -301,8 +301,8 @@ def test_correlation_functions_of_a_gas():
     result = run_scene(GasScene(molecule="water", observables=seen, accuracy=0.05))
     fine = answer_gas(replace(result.request, molecules=300_000, seed=7))
     for name in ("c1", "c2"):
-        one, true = (getattr(answer.correlations, name) for answer in (result.answer, fine))
-        assert np.abs(one - true).max() <= 0.05
+        single, true = (getattr(answer.correlations, name) for answer in (result.answer, fine))
+        assert np.abs(single - true).max() <= 0.05
     assert 0.03 < result.reached.error <= 0.05
 
 
@@ -313,14 +313,14 @@ def test_the_bound_of_a_fluid_covers_other_boxes():
     """Root mean squares of the conserved energy with other velocities are below the bound."""
     scene = FluidScene(conditions=BOX, numerics=FluidNumerics(cutoff="4 Å"), accuracy="1 K")
     request = with_box(kind_of(scene).request(scene, "."))
-    bound, found = conserved_bound_k(request, 2.0), []
+    bound, computed = conserved_bound_k(request, 2.0), []
     for seed in range(50, 62):
         other = replace(request, settings=replace(request.settings, seed=seed))
-        found.append(conserved_k(answer_followed(followed(other, 2.0))))
+        computed.append(conserved_k(answer_followed(followed(other, 2.0))))
     assert (
-        sum(one > bound for one in found) <= 1
+        sum(entry > bound for entry in computed) <= 1
     )  # at a confidence of 0.99, of twelve: two by chance in 0.6 % of all times
-    assert np.mean(found) < bound < 3.0 * np.mean(found)  # not far above
+    assert np.mean(computed) < bound < 3.0 * np.mean(computed)  # not far above
 
 
 def test_the_step_of_a_fluid():
@@ -329,8 +329,10 @@ def test_the_step_of_a_fluid():
     assert result.reached.error <= 1.0 == result.reached.asked
     assert 1.0 < result.request.settings.step_fs < 4.0
     coarser = replace(result.request.settings, step_fs=2 * result.request.settings.step_fs, steps=20)
-    made = kind_of(scene).request(scene, ".")
-    assert conserved_k(answer_fluid(replace(made, settings=coarser), progress=lambda *_: None)) > 1.0  # it would miss
+    request = kind_of(scene).request(scene, ".")
+    assert (
+        conserved_k(answer_fluid(replace(request, settings=coarser), progress=lambda *_: None)) > 1.0
+    )  # it would miss
 
 
 def test_the_tolerance_of_ewalds_sum():

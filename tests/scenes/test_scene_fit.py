@@ -137,7 +137,9 @@ def test_plans_of_fits_say_what_is_free_and_count():
     assert dict(plan.parts)["free"] == "B, D"
     assert plan.left_out[0].name == "centrifugal distortion of order J^6"
     free = plan_of(FitScene(lines=scene.lines, molecule=START, parameters=FitParameters(free=["B", "D", "H"])), DATA)
-    assert not any(one.name.startswith("centrifugal distortion") for one in free.left_out)  # H is no longer left out
+    assert not any(
+        neglected.name.startswith("centrifugal distortion") for neglected in free.left_out
+    )  # H is no longer left out
     spfit = plan_of(FitScene(lines=FitLines(source="co.par")), DATA)
     assert spfit.counts["parameters"] == 4
 
@@ -173,7 +175,7 @@ def test_a_plan_of_a_source_counts_lines_and_points():
     plan, result = plan_of(scene), run_scene(scene)
     assert plan.counts["lines"] == len(result.table)
     assert plan.counts["points"] == len(result.answer.spectrum)
-    sizes = [one.size for one in plan.left_out if one.size is not None]
+    sizes = [neglected.size for neglected in plan.left_out if neglected.size is not None]
     assert sizes == sorted(sizes, reverse=True)
     assert np.isfinite(plan.seconds)
 

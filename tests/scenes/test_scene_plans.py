@@ -50,8 +50,8 @@ def truncated(top: rotor.Top, order: int) -> rotor.Top:
     }
     values = {name: top.constants[name] for name in orders if orders[name] <= order}
     reduction = top.constants.reduction if order > 2 else None
-    made = Constants(reduction=reduction, representation=top.constants.representation, kind=top.kind, **values)
-    return top.with_constants(made)
+    constants = Constants(reduction=reduction, representation=top.constants.representation, kind=top.kind, **values)
+    return top.with_constants(constants)
 
 
 HELD = [
@@ -92,8 +92,8 @@ def test_where_the_next_order_is_missed(name, order):
 def test_the_shift_in_a_stray_field(name):
     top = rotor.read(name)
     linear = top.kind == "linear"
-    found = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=0 if linear else 1, tolerance_mhz=1e-9)
-    energy = found.energy_mhz.reshape(-1, 2)  # all fields of one state after each other
+    stark = rotor.api.stark_map(top, [0.0, 1e-3], j_highest=0 if linear else 1, tolerance_mhz=1e-9)
+    energy = stark.energy_mhz.reshape(-1, 2)  # all fields of one state after each other
     shift = np.abs(energy[:, 1] - energy[:, 0]).max()
     assert 1 / 3 < stray_field(top).size / shift < 3  # claimed; a closed form to second or first order
     assert stray_field(rotor.read("CH4")) is None
@@ -111,7 +111,7 @@ SPINS = [
 @pytest.mark.parametrize("j", [1, 4])
 def test_known_couplings_of_spins(name, constants, effect, j):
     top = replace(rotor.read(name), spin_constants=SpinConstants.parse(constants))
-    size = next(one.size for one in left_out_of_levels(top, j, SEMI_RIGID) if one.name == effect)
+    size = next(omission.size for omission in left_out_of_levels(top, j, SEMI_RIGID) if omission.name == effect)
     split = solve_levels(top, j, jmin=j, effects=(*SEMI_RIGID, *spin_effects(top)))
     plain = solve_levels(top, j, jmin=j)
     names = [name for name in plain.quanta if name != "j"]
@@ -137,7 +137,7 @@ def test_quantum_corrections_of_a_classical_gas(name, kelvin):
         / classical_partition_function(truncated(top, 2), kelvin)
         - 1
     )
-    size = next(one.size for one in left_out_of_gas(top, kelvin) if one.name == "quantum corrections")
+    size = next(omission.size for omission in left_out_of_gas(top, kelvin) if omission.name == "quantum corrections")
     assert 1 / 3 < size / 100 / abs(exact) < 3  # the first term of a series
 
 
@@ -157,7 +157,7 @@ def test_a_plan_agrees_with_what_happens(folder, name):
         assert f"J to {facts['jmax']}:" in parts["basis"]
     if "steps" in plan.counts:
         assert 0.5 < plan.counts["steps"] / facts["steps"] < 2  # from a twentieth of the motion
-    sizes = [one.size for one in plan.left_out]
+    sizes = [neglected.size for neglected in plan.left_out]
     known = [size for size in sizes if size is not None]
     assert known == sorted(known, reverse=True)
     assert sizes[: len(known)] == known  # what is not estimated comes last
@@ -191,10 +191,10 @@ def test_nothing_is_written_by_a_plan(call, folder):
 
 def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
     top = rotor.read("HCN")
-    said = {one.name: one.basis for one in left_out_of_levels(top, 8, SEMI_RIGID)}
+    said = {omission.name: omission.basis for omission in left_out_of_levels(top, 8, SEMI_RIGID)}
     assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
     with_spins = left_out_of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
-    assert not any("effects.hyperfine" in one.basis for one in with_spins)
+    assert not any("effects.hyperfine" in item.basis for item in with_spins)
 
 
 STARK = 'schema = 1\nkind = "stark"\nmolecule = "OCS"\n[conditions]\nfield = "0:100:3"\n'
@@ -216,6 +216,6 @@ def test_a_plan_names_the_coarser_setting_that_the_model_allows():
 
 def test_a_plan_of_a_map_leaves_out_what_its_run_does():
     scene = parse_scene(STARK)
-    run = [one["name"] for one in run_scene(scene).answer.facts()["limits"]]
+    run = [limit["name"] for limit in run_scene(scene).answer.facts()["limits"]]
     assert "polarization by the static field" in run
-    assert set(run) <= {one.name for one in plan_of(scene).left_out}
+    assert set(run) <= {neglected.name for neglected in plan_of(scene).left_out}

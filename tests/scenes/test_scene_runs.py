@@ -247,11 +247,11 @@ SWEEP = LevelsScene(
 
 
 def test_a_sweep_is_every_combination():
-    made = list(points(SWEEP))
-    assert [(p.scene.molecule, p.scene.observables.jmax) for p in made] == [
+    expanded = list(points(SWEEP))
+    assert [(p.scene.molecule, p.scene.observables.jmax) for p in expanded] == [
         (m, j) for m in ("CO", "HCl", "OCS") for j in (2, 5)
     ]
-    assert made[1].scene.outputs.csv == "CO_5.csv"
+    assert expanded[1].scene.outputs.csv == "CO_5.csv"
     result = run_sweep(LevelsScene(molecule="CO", sweep={"observables.jmax": [2, 5]}))
     assert result.columns["rows"].tolist() == [3, 6]
     assert result.columns["observables.jmax"].tolist() == [2, 5]

@@ -82,7 +82,7 @@ def test_intervals_cover_the_truth(name):
 def test_an_interval_from_half_a_deviation_does_not_cover(monkeypatch):
     """Negative control."""
     name = "fitted constants"
-    monkeypatch.setitem(COVERED, name, lambda seed: [2 * one for one in fitted(seed)[0]])
+    monkeypatch.setitem(COVERED, name, lambda seed: [2 * deviation for deviation in fitted(seed)[0]])
     assert np.mean(covered(name)) < 0.85
 
 

@@ -95,12 +95,12 @@ def test_every_file_that_enters_is_part_of_the_key(folder, monkeypatch, file, sc
 def test_other_files_are_not_part_of_the_key(folder):
     Path("out.csv").write_text("a result of the last run")
     Path("many.sdf").write_text("one\n$$$$\ntwo\n$$$$\n")
-    own = levels(outputs=LevelsOutputs(csv="out.csv"), sweep={"observables.jmax": [1]})
+    scene_ = levels(outputs=LevelsOutputs(csv="out.csv"), sweep={"observables.jmax": [1]})
     second = levels(sweep={"molecule": ["many.sdf#2"]})
-    before = _key(own), _key(second)
+    before = _key(scene_), _key(second)
     Path("out.csv").write_text("another result")
     Path("many.sdf").write_text("uno\n$$$$\ntwo\n$$$$\n")
-    assert (_key(own), _key(second)) == before
+    assert (_key(scene_), _key(second)) == before
 
 
 def test_values_of_a_point_and_the_version_are_part_of_the_key(folder, monkeypatch):
@@ -226,7 +226,7 @@ def test_a_sweep_goes_on_where_a_worker_is_killed(folder, monkeypatch):
 
     with worker_processes(2) as pool:
         result = run_sweep(scene, record="r", executor=Deadly(pool))
-        assert [made["values"] for made in result.failed] == [{"observables.jmax": 3}]
+        assert [record["values"] for record in result.failed] == [{"observables.jmax": 3}]
         assert "ended from outside" in result.failed[0]["error"]
         assert result.columns["rows"].tolist() == [2, 3, 0, 5, 6, 7, 8, 9]
         again = run_sweep(scene, record="r", executor=pool, retry_failed=True)
@@ -284,8 +284,8 @@ def test_an_sdf_of_many_molecules_is_a_sweep_over_them(call, folder):
 
 def test_a_csv_of_smiles_or_names_is_a_sweep_over_them(folder):
     Path("a.csv").write_text("id,SMILES\nformaldehyde,C=O\n,[C-]#[O+]\nformaldehyde,C#N\n")
-    made = [(p.values["molecule"], p.content["molecule"]) for p in points(levels(molecule="a.csv"))]
-    assert made == [
+    molecules = [(p.values["molecule"], p.content["molecule"]) for p in points(levels(molecule="a.csv"))]
+    assert molecules == [
         ("formaldehyde", "SMILES:C=O"), ("[C-]#[O+]", "SMILES:[C-]#[O+]"), ("formaldehyde_2", "SMILES:C#N"),
     ]  # fmt: skip
     Path("b.csv").write_text("name;x\n")
@@ -346,8 +346,8 @@ def test_a_stopped_sweep_keeps_the_rows_of_its_points(folder):
     )
     count = []
 
-    def stop(made):
-        count.append(made)
+    def stop(record):
+        count.append(record)
         if len(count) == 3:
             raise KeyboardInterrupt
 
@@ -574,7 +574,7 @@ def test_what_is_not_written_is_not_computed(monkeypatch, folder):
 
     monkeypatch.setattr(LevelsAnswer, "facts", failing)
     result = run_sweep(levels(sweep={"observables.jmax": [1, 2]}, outputs=LevelsOutputs(parquet="all.parquet")))
-    assert [made.get("error") for made in result.records] == [None, None]
+    assert [record.get("error") for record in result.records] == [None, None]
 
 
 def test_a_csv_of_all_points_has_a_column_of_the_molecule(folder):

@@ -68,7 +68,7 @@ def test_a_point_of_a_sweep_that_cannot_be_costs_itself(call, folder):
     code, _, err = call("run", "s.toml")
     assert (code, len(err.splitlines())) == (1, 2)
     assert "conditions.temperature = 20 MHz: conditions.temperature: '20 MHz'" in err
-    assert [one.name for one in folder.glob("*.csv")] == ["10_K.csv"]
+    assert [path.name for path in folder.glob("*.csv")] == ["10_K.csv"]
 
 
 OPTIONS = [

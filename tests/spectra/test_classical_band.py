@@ -102,19 +102,19 @@ def test_ocs_at_300_k_over_its_lines():
 
 
 def test_water_agrees_at_300_k_and_parts_at_30_k():
-    found = {}
+    results = {}
     for temperature_k, fwhm, end in ((300.0, 60.0, 900.0), (30.0, 20.0, 400.0)):
         grid = np.linspace(0, end, 901) * CM
         lines = rotor.api.line_list(WATER, temperature_k=temperature_k, min_lgint=-14)
         quantum = Spectrum.from_lines(lines, grid, fwhm_mhz=fwhm * CM)
         gas = {"temperature_k": temperature_k, "molecules": 50_000, "rng": np.random.default_rng(2)}
-        found[temperature_k] = compare_bands(classical_band(WATER, grid, fwhm_mhz=fwhm * CM, **gas), quantum)
-    assert found[300.0].area == pytest.approx(1.0, abs=0.02)  # 50,000 molecules: 0.5 %
-    assert found[300.0].mean == pytest.approx(1.0, abs=0.03)
-    assert found[300.0].largest < 0.08
-    assert found[30.0].area == pytest.approx(1.0, abs=0.02)  # the sum holds at any temperature
-    assert found[30.0].mean < 0.95  # the first lines of water lie above what 30 K can classically reach
-    assert found[30.0].largest > 0.3
+        results[temperature_k] = compare_bands(classical_band(WATER, grid, fwhm_mhz=fwhm * CM, **gas), quantum)
+    assert results[300.0].area == pytest.approx(1.0, abs=0.02)  # 50,000 molecules: 0.5 %
+    assert results[300.0].mean == pytest.approx(1.0, abs=0.03)
+    assert results[300.0].largest < 0.08
+    assert results[30.0].area == pytest.approx(1.0, abs=0.02)  # the sum holds at any temperature
+    assert results[30.0].mean < 0.95  # the first lines of water lie above what 30 K can classically reach
+    assert results[30.0].largest > 0.3
 
 
 def test_what_stays_is_no_absorption():

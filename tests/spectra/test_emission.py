@@ -51,8 +51,8 @@ def test_a_thin_line_gives_its_column_density_back():
     q = lines.q
     upper_k = lines.energy_lower_cm[row] * 1.438776877 + si.h * nu / si.k
     n_upper = 8 * math.pi * si.k * nu**2 / (si.h * si.c**3 * a) * area_k_m_s
-    found = n_upper / g * q * math.exp(upper_k / temperature) * 1e-4
-    assert found == pytest.approx(column, rel=2e-5)  # τ = 1e-4 at most, and the grid
+    computed = n_upper / g * q * math.exp(upper_k / temperature) * 1e-4
+    assert computed == pytest.approx(column, rel=2e-5)  # τ = 1e-4 at most, and the grid
 
 
 def test_width_and_velocity_are_the_sources():
@@ -72,7 +72,7 @@ def test_molecules_in_one_source_add_their_depths():
     grid = np.linspace(115150, 115300, 3001)
     lists = [lines_at(10.0), line_list(other, temperature_k=10.0, jmax=12)]
     both = emission(lists, source, grid).optical_depth
-    assert both == pytest.approx(sum(emission(one, source, grid).optical_depth for one in lists), rel=1e-12)
+    assert both == pytest.approx(sum(emission(lines, source, grid).optical_depth for lines in lists), rel=1e-12)
 
 
 def test_absorption_against_a_hot_background_is_negative():
@@ -105,7 +105,9 @@ def test_molecules_of_two_temperatures_mix_in_a_layer():
     sources = (Source(2e16, 8.0, 1.0), Source(3e16, 40.0, 2.0, velocity_km_s=0.3))
     lists = [lines_at(8.0), line_list(other, temperature_k=40.0, jmax=12)]
     seen = emission(lists, sources, [REST])
-    a, b = (float(emission(one, source, [REST]).optical_depth[0]) for one, source in zip(lists, sources, strict=True))
+    a, b = (
+        float(emission(lines, source, [REST]).optical_depth[0]) for lines, source in zip(lists, sources, strict=True)
+    )
     brightness, slices = float(planck_k(REST, BACKGROUND_K)), 20000
     for _ in range(slices):
         gain = (a * float(planck_k(REST, 8.0)) + b * float(planck_k(REST, 40.0 * (1 - 0.3 / 299792.458)))) / slices

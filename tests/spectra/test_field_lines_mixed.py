@@ -42,20 +42,20 @@ def dipole_with_spin(twice_i: int, axis: str, dipole: tuple[float, ...]) -> np.n
     return on_spins(sum(dipole[k] * phi[axis, "abc"[k]] for k in range(3))[held], (twice_i,), {})
 
 
-def assert_strengths(found, energies, squares, close_mhz: float, mixed_debye2: float = 0.0) -> None:
+def assert_strengths(computed, energies, squares, close_mhz: float, mixed_debye2: float = 0.0) -> None:
     """Every line has the squares of all pairs of states of the full matrix at its two energies, to 1e-9 of the strongest.
 
     mixed_debye2: what round-off may do besides to states of different M that nearly coincide in the full matrix.
     """
-    assert len(found) > 10
+    assert len(computed) > 10
     worst = 0.0
-    for line in range(len(found)):
-        high = np.abs(energies - found.lower_mhz[line] - found.frequency_mhz[line]) < close_mhz
-        low = np.abs(energies - found.lower_mhz[line]) < close_mhz
+    for line in range(len(computed)):
+        high = np.abs(energies - computed.lower_mhz[line] - computed.frequency_mhz[line]) < close_mhz
+        low = np.abs(energies - computed.lower_mhz[line]) < close_mhz
         assert high.any()
         assert low.any()
         expected = squares[np.ix_(high, low)].sum()
-        worst = max(worst, abs(found.strength_debye2[line] - expected))
+        worst = max(worst, abs(computed.strength_debye2[line] - expected))
     assert worst < 1e-9 * squares.max() + mixed_debye2
 
 
@@ -75,13 +75,13 @@ def test_strengths_with_a_quadrupole_nucleus_are_those_of_the_full_matrix(consta
         "A={} B={} C={} MHz".format(*constants) if constants[1] != constants[2] else "A={} B={} MHz".format(*constants)
     )
     top = Top.from_constants(text, dipole_abc_debye=dipole)
-    found = field_lines(
+    lines = field_lines(
         top, [1.0], j_highest=1, light=light, effects=with_nucleus(twice_i, chi), jmax=3, tolerance_mhz=1e9
     )
     energies, vectors = np.linalg.eigh(full_matrix(constants, twice_i, chi, kv_per_cm=1.0, dipole=np.array(dipole)))
     operator = dipole_with_spin(twice_i, LIGHTS[light], dipole)
     squares = 3 * np.abs(vectors.conj().T @ operator @ vectors) ** 2
-    assert_strengths(found, energies, squares, 1e-5, 1e-8)  # D²: 1e-11 MHz of round-off over gaps of 1e-3 MHz
+    assert_strengths(lines, energies, squares, 1e-5, 1e-8)  # D²: 1e-11 MHz of round-off over gaps of 1e-3 MHz
 
 
 def full_tilted(basis, field: float, direction, intensity: float) -> np.ndarray:
@@ -105,8 +105,8 @@ def test_strengths_of_mixed_m_are_those_of_the_full_matrix(light):
     axis = np.array(light) / np.linalg.norm(light)
     operator = contracted_vectors(basis, DIPOLE[[1, 2, 0]], axis)
     settings = {"intensity_w_per_cm2": intensity, "direction": direction, "jmax": 3, "tolerance_mhz": 1e9}
-    found = field_lines(SKEW, [field], j_highest=1, light=light, **settings)
-    assert_strengths(found, energies, 3 * np.abs(vectors.conj().T @ operator @ vectors) ** 2, 1e-5)
+    lines = field_lines(SKEW, [field], j_highest=1, light=light, **settings)
+    assert_strengths(lines, energies, 3 * np.abs(vectors.conj().T @ operator @ vectors) ** 2, 1e-5)
 
 
 def test_a_tilted_field_has_the_lines_of_the_straight_one():
@@ -115,7 +115,7 @@ def test_a_tilted_field_has_the_lines_of_the_straight_one():
         straight = field_lines(ROD, [0.0, 20.0], j_highest=1, light=light, temperature_k=5.0)
         tilted = field_lines(ROD, [0.0, 20.0], j_highest=1, light=light, temperature_k=5.0, direction=(1, 0, 1))
         for column in ("strength_debye2", "intensity_nm2_mhz"):
-            ours, theirs = (sums(one, column) for one in (tilted, straight))
+            ours, theirs = (sums(lines, column) for lines in (tilted, straight))
             assert ours.keys() == theirs.keys()
             assert list(ours.values()) == pytest.approx(list(theirs.values()), rel=1e-9)  # round-off
 
@@ -135,18 +135,18 @@ def sums(lines, column: str) -> dict[float, float]:
 def test_without_field_lines_with_spins_are_the_catalogue(top, light):
     """S μ² and intensities of the hyperfine lines, all M_F of them; every polarization is the same without a field."""
     effects = with_nucleus(2, np.diag([-4.0, 2.0, 2.0]))
-    found = field_lines(
+    lines = field_lines(
         top, [0.0], j_highest=1, light=light, temperature_k=20.0, effects=effects, jmax=3, tolerance_mhz=1e9
     )
-    found = found.where(found.frequency_mhz > 1e-4)  # MHz: M and M + 1 of one level of K = 1 are connected too
+    lines = lines.where(lines.frequency_mhz > 1e-4)  # MHz: M and M + 1 of one level of K = 1 are connected too
     free = line_list(top, jmax=1, temperature_k=20.0, min_lgint=-np.inf, effects=effects)
-    assert found.strength_debye2.sum() == pytest.approx(
+    assert lines.strength_debye2.sum() == pytest.approx(
         free.strength_debye2.sum(), rel=1e-9
     )  # lines below 1e-10 are cut
-    assert found.intensity_nm2_mhz.sum() == pytest.approx(free.intensity_nm2_mhz.sum(), rel=1e-6)  # Q to 1e-6
-    near = np.isclose(found.frequency_mhz, free.frequency_mhz[0], atol=1e-5)  # MHz: round-off of 1e4 MHz
+    assert lines.intensity_nm2_mhz.sum() == pytest.approx(free.intensity_nm2_mhz.sum(), rel=1e-6)  # Q to 1e-6
+    near = np.isclose(lines.frequency_mhz, free.frequency_mhz[0], atol=1e-5)  # MHz: round-off of 1e4 MHz
     same = np.isclose(free.frequency_mhz, free.frequency_mhz[0], atol=1e-5)
-    assert found.strength_debye2[near].sum() == pytest.approx(free.strength_debye2[same].sum(), rel=1e-9)
+    assert lines.strength_debye2[near].sum() == pytest.approx(free.strength_debye2[same].sum(), rel=1e-9)
 
 
 def test_sum_rule_of_isotropic_light():
@@ -154,8 +154,8 @@ def test_sum_rule_of_isotropic_light():
     effects = with_nucleus(2, np.diag([-4.0, 2.0, 2.0]))
     totals = []
     for field in (0.0, 0.5):
-        found = field_lines(ROD, [field], j_highest=2, light="isotropic", effects=effects, jmax=4, tolerance_mhz=1e9)
-        totals.append(found.strength_debye2.sum())
+        lines = field_lines(ROD, [field], j_highest=2, light="isotropic", effects=effects, jmax=4, tolerance_mhz=1e9)
+        totals.append(lines.strength_debye2.sum())
     assert totals[1] == pytest.approx(totals[0], rel=1e-3)  # what mixes with J = 3: (μE/6B)²
 
 
@@ -163,10 +163,10 @@ def test_executors_change_nothing():
     effects = with_nucleus(2, np.diag([-4.0, 2.0, 2.0]))
     with ThreadPoolExecutor(2) as pool:
         ours, spread = (
-            field_lines(ROD, [0.1], j_highest=1, effects=effects, jmax=3, tolerance_mhz=1e9, executor=one)
-            for one in (None, pool)
+            field_lines(ROD, [0.1], j_highest=1, effects=effects, jmax=3, tolerance_mhz=1e9, executor=executor)
+            for executor in (None, pool)
         )
-        plain, mixed = (field_mixture(ROD, [1.0], 1.0, executor=one) for one in (None, pool))
+        plain, mixed = (field_mixture(ROD, [1.0], 1.0, executor=executor) for executor in (None, pool))
     assert (ours.strength_debye2 == spread.strength_debye2).all()
     assert (plain.mu_eff_debye == mixed.mu_eff_debye).all()
 

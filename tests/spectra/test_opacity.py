@@ -46,15 +46,15 @@ def test_one_molecule_of_hitran(shared):
     """The rotational lines of 12C16O in HITRAN, with its abundance of 0.98654 and Q at 296 K."""
     theirs = read_hitran(shared / "reference" / "catalogues" / "hitran_CO_fragment.par")
     ours = line_list(CO, temperature_k=296.0, jmax=40)
-    found = 0
+    computed = 0
     for wavenumber, intensity in zip(theirs.wavenumber_cm, theirs.intensity_cm, strict=True):
         near = np.flatnonzero(np.abs(ours.frequency_mhz / 29979.2458 - wavenumber) < 1e-3)
         if len(near) == 1:
-            found += 1
+            computed += 1
             assert ours.intensity_cm_per_molecule[near[0]] * 0.98654 == pytest.approx(
                 intensity, rel=0.02
             )  # J dependence of μ
-    assert found >= 1
+    assert computed >= 1
 
 
 def test_conversion_is_that_of_hitran():

@@ -56,10 +56,10 @@ def test_linear_positions_and_strengths():
 
 def test_linear_sum_over_final_states():
     """Placzek and Teller: b(J→J) + b(J→J+2) + b(J→J-2) = 1."""
-    found = raman_transitions(solve_levels(top_of("B=1 cm-1", ROD), 12), ROD)
+    transitions = raman_transitions(solve_levels(top_of("B=1 cm-1", ROD), 12), ROD)
     for j in range(11):
         elastic = j * (j + 1) * (2 * j + 1) / ((2 * j - 1) * (2 * j + 3)) * 0.49
-        around = found.strength_angstrom6[(found.lower == j) | (found.upper == j)].sum()
+        around = transitions.strength_angstrom6[(transitions.lower == j) | (transitions.upper == j)].sum()
         assert elastic + around == pytest.approx((2 * j + 1) * 0.49, rel=1e-13)  # round-off
 
 
@@ -76,9 +76,9 @@ def b_symmetric(j: int, k: int, rise: int) -> float:
 @pytest.mark.parametrize(("text", "tensor", "gamma"), [("A=5 B=2 cm-1", ROD, 0.7), ("B=5 C=3 cm-1", DISC, 0.6)])
 def test_symmetric_strengths(text, tensor, gamma):
     levels = solve_levels(top_of(text, tensor), 9)
-    found = raman_transitions(levels, tensor)
+    transitions = raman_transitions(levels, tensor)
     seen = {}
-    for s, low, up in zip(found.strength_angstrom6, found.lower, found.upper, strict=True):
+    for s, low, up in zip(transitions.strength_angstrom6, transitions.lower, transitions.upper, strict=True):
         assert levels.quanta["k"][low] == levels.quanta["k"][up]
         j, k = int(levels.quanta["j"][low]), int(levels.quanta["k"][low])
         seen[j, k, int(levels.quanta["j"][up]) - j] = s / ((2 * j + 1) * (2 if k else 1) * gamma**2)
@@ -98,8 +98,8 @@ def test_a_tensor_that_is_not_axial_changes_k():
     """A top that is symmetric by numbers alone: the sum over all final states, elastic ones among them, is γ²."""
     tensor = SKEW
     levels = solve_levels(top_of("A=5 B=2 cm-1", tensor), 8)
-    found = raman_transitions(levels, tensor)
-    steps = set((levels.quanta["k"][found.upper] - levels.quanta["k"][found.lower]).tolist())
+    transitions = raman_transitions(levels, tensor)
+    steps = set((levels.quanta["k"][transitions.upper] - levels.quanta["k"][transitions.lower]).tolist())
     assert steps == {-2, -1, 0, 1, 2}
     for row in np.flatnonzero(levels.quanta["j"] <= 6):
         j, k = int(levels.quanta["j"][row]), int(levels.quanta["k"][row])
@@ -108,7 +108,7 @@ def test_a_tensor_that_is_not_axial_changes_k():
         if k == 1:  # k = 1 to -1 and back
             across = (tensor[1, 1] - tensor[2, 2]) ** 2 / 4 + tensor[1, 2] ** 2
             elastic += 2 * 1.5 * across * coupling(j, j, 2, 2, -1) ** 2
-        around = found.strength_angstrom6[(found.lower == row) | (found.upper == row)].sum()
+        around = transitions.strength_angstrom6[(transitions.lower == row) | (transitions.upper == row)].sum()
         expected = (2 * j + 1) * levels.components[row] * anisotropy_squared(tensor)
         assert elastic + around == pytest.approx(expected, rel=1e-12)  # round-off
 
@@ -142,7 +142,7 @@ def test_strengths_are_those_of_full_matrices(representation):
     values = {"A": 9.0, "B": 6.0, "C": 4.0, "DeltaK": 1e-3}
     top = Top(Constants(reduction="A", representation=representation, **values))
     levels = solve_levels(top, 5)
-    found = raman_transitions(levels, SKEW)
+    transitions = raman_transitions(levels, SKEW)
     rank = np.zeros(len(levels), dtype=int)
     for j in range(6):
         rows = np.flatnonzero(levels.quanta["j"] == j)
@@ -150,7 +150,7 @@ def test_strengths_are_those_of_full_matrices(representation):
 
     slow = slow_strengths(values, representation, SKEW, 5)
     total = 0.0
-    for s, low, up in zip(found.strength_angstrom6, found.lower, found.upper, strict=True):
+    for s, low, up in zip(transitions.strength_angstrom6, transitions.lower, transitions.upper, strict=True):
         (j, a), (j2, b) = sorted((int(levels.quanta["j"][row]), int(rank[row])) for row in (low, up))
         assert s == pytest.approx(slow[j, j2][b, a], abs=1e-9)  # near-degenerate vectors of the full matrix
         total += s
@@ -168,29 +168,29 @@ def test_sum_over_final_states(values, tensor):
     aa, bb, cc, ab, ac, bc = tensor
     alpha = np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]])
     levels = solve_levels(Top.from_constants(f"A={a!r} B={b!r} C={c!r} GHz"), 6)
-    found = raman_transitions(levels, alpha)
+    transitions = raman_transitions(levels, alpha)
     gamma2 = anisotropy_squared(alpha)
     polarizability = body_tensor(alpha, 2, levels.representation)
     for block in (block for block in levels.blocks if block.basis.j <= 4):
         elastic = 1.5 * np.diag(wang_amplitudes(block, block, polarizability)) ** 2
         for i in range(block.basis.size):
             row = block.start + i
-            around = found.strength_angstrom6[(found.lower == row) | (found.upper == row)].sum()
+            around = transitions.strength_angstrom6[(transitions.lower == row) | (transitions.upper == row)].sum()
             expected = (2 * block.basis.j + 1) * gamma2
             assert elastic[i] + around == pytest.approx(expected, rel=1e-10, abs=1e-12 + 1e-14 * expected)  # round-off
 
 
 def test_strengths_do_not_depend_on_the_representation():
     """One rigid top, six representations: the same strengths, to round-off of the vectors."""
-    found = []
+    results = []
     for representation in REPRESENTATIONS:
         levels = solve_levels(Top(Constants(A=9, B=6, C=4, representation=representation)), 6)
         t = raman_transitions(levels, SKEW)
         key = [tuple(levels_key(levels, row)) for row in range(len(levels))]
-        found.append({frozenset((key[a], key[b])): s for s, a, b, _ in zip(*dataclasses.astuple(t), strict=True)})
-    for other in found[1:]:
-        for pair in found[0].keys() | other.keys():
-            assert other.get(pair, 0.0) == pytest.approx(found[0].get(pair, 0.0), abs=1e-10)
+        results.append({frozenset((key[a], key[b])): s for s, a, b, _ in zip(*dataclasses.astuple(t), strict=True)})
+    for other in results[1:]:
+        for pair in results[0].keys() | other.keys():
+            assert other.get(pair, 0.0) == pytest.approx(results[0].get(pair, 0.0), abs=1e-10)
 
 
 def levels_key(levels, row):
@@ -224,16 +224,20 @@ def test_selection_rules_of_an_asymmetric_top():
     for (g, h), parity in changes.items():
         tensor = np.zeros((3, 3))
         tensor[g, h] = tensor[h, g] = 1.0
-        found = raman_transitions(levels, tensor)
+        transitions = raman_transitions(levels, tensor)
         seen = {
             (
                 (int(levels.quanta["ka"][u]) - int(levels.quanta["ka"][d])) % 2,
                 (int(levels.quanta["kc"][u]) - int(levels.quanta["kc"][d])) % 2,
             )
-            for u, d in zip(found.upper, found.lower, strict=True)
+            for u, d in zip(transitions.upper, transitions.lower, strict=True)
         }
         assert seen == {parity}
-        assert set(np.abs(levels.quanta["j"][found.upper] - levels.quanta["j"][found.lower]).tolist()) == {0, 1, 2}
+        assert set(np.abs(levels.quanta["j"][transitions.upper] - levels.quanta["j"][transitions.lower]).tolist()) == {
+            0,
+            1,
+            2,
+        }
 
 
 # Spherical tops

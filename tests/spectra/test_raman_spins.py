@@ -40,13 +40,13 @@ def by_rotation(lines: RamanLines) -> dict[tuple[int, ...], tuple[float, float]]
     """Strength and cross section between two rotational levels."""
     numbers = ["n" if "n" in lines.levels.quanta else "j", *({"k", "ka", "kc"} & set(lines.levels.quanta))]
     rows = np.column_stack([lines.levels.quanta[n][rows] for rows in (lines.initial, lines.final) for n in numbers])
-    found: dict[tuple[int, ...], tuple[float, float]] = {}
+    results: dict[tuple[int, ...], tuple[float, float]] = {}
     for key, *values in zip(
         map(tuple, rows.tolist()), lines.strength_angstrom6, lines.cross_section_cm2_per_sr, strict=True
     ):
-        before = found.get(key, (0.0, 0.0))
-        found[key] = (before[0] + values[0], before[1] + values[1])
-    return found
+        before = results.get(key, (0.0, 0.0))
+        results[key] = (before[0] + values[0], before[1] + values[1])
+    return results
 
 
 def test_strengths_of_a_direct_product():
@@ -75,14 +75,16 @@ def test_strengths_of_a_direct_product():
     top = Top.from_constants(dict(zip("ABC", ABC, strict=True)), spin_constants=SpinConstants(constants, {"14N": 2}))
     levels = solve_levels(top, 3, effects=effects_of(top, True))
     complete = levels.quanta["f"] <= 2
-    own = (np.abs(energies[:, None] - levels.energy_mhz) < 1e-6) & complete  # MHz; other levels are 1 MHz off and more
-    assert (own.sum(axis=0)[complete] == levels.multiplicity[complete]).all()
-    slow = 1.5 * own.T @ sum(np.abs(one) ** 2 for one in moved) @ own
-    found = raman_transitions(levels, SKEW)
-    known = complete[found.upper] & complete[found.lower]
+    members = (
+        np.abs(energies[:, None] - levels.energy_mhz) < 1e-6
+    ) & complete  # MHz; other levels are 1 MHz off and more
+    assert (members.sum(axis=0)[complete] == levels.multiplicity[complete]).all()
+    slow = 1.5 * members.T @ sum(np.abs(operator) ** 2 for operator in moved) @ members
+    transitions = raman_transitions(levels, SKEW)
+    known = complete[transitions.upper] & complete[transitions.lower]
     assert known.sum() > 200
-    upper, lower = found.upper[known], found.lower[known]
-    assert found.strength_angstrom6[known] == pytest.approx(
+    upper, lower = transitions.upper[known], transitions.lower[known]
+    assert transitions.strength_angstrom6[known] == pytest.approx(
         slow[upper, lower], abs=1e-9
     )  # round-off of strengths up to 3
     left = np.tril(slow, -1)
@@ -107,10 +109,10 @@ def test_components_add_up_to_the_line_without_spins(text, tensor, constants, jm
     top = Top.from_constants(text).with_polarizability(tensor, "made up")
     plain, split = both(top, constants, jmax=jmax)
     functions = np.prod([twice + 1 for twice in SpinConstants.parse(constants).twice.values()])
-    one, many = by_rotation(plain), by_rotation(split)
-    largest = max(strength for strength, _ in one.values())
-    assert all(key in one or strength < 1e-9 * largest for key, (strength, _) in many.items())
-    for key, (strength, section) in one.items():
+    single, many = by_rotation(plain), by_rotation(split)
+    largest = max(strength for strength, _ in single.values())
+    assert all(key in single or strength < 1e-9 * largest for key, (strength, _) in many.items())
+    for key, (strength, section) in single.items():
         assert many[key][0] == pytest.approx(
             functions * strength, abs=1e-9 * largest
         )  # couplings of 1e-6 of A mix states
@@ -138,10 +140,10 @@ def test_levels_without_weight_in_a_block_do_not_hide_the_others():
     bare, _ = both(
         Top.from_constants("A=30 B=20 C=15 GHz").with_polarizability(ROD, "made up"), "chi_aa(14N)=1 Hz", jmax=2
     )
-    one, many = by_rotation(bare), by_rotation(split)
-    assert all(key in one or strength < 1e-9 for key, (strength, _) in many.items())
+    single, many = by_rotation(bare), by_rotation(split)
+    assert all(key in single or strength < 1e-9 for key, (strength, _) in many.items())
     even = (10, 6)  # functions of even I (0 and 2: 1 + 5) and of odd I (1 and 3: 3 + 7) of two spins 3/2
-    for key, (strength, _) in one.items():
+    for key, (strength, _) in single.items():
         assert min(abs(many[key][0] / strength - count) for count in even) < 1e-6  # couplings of 1e-9 of A
 
 

@@ -61,28 +61,28 @@ def test_windows_change_nothing_that_can_be_seen(lines, shape, monkeypatch):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_area_is_the_integrated_absorption(lines, shape):
     grid = resolving_grid(lines, **shape)
-    made = Spectrum.from_lines(lines, grid, **shape)
-    area = np.trapezoid(made.intensity, made.frequency_mhz)
+    profile = Spectrum.from_lines(lines, grid, **shape)
+    area = np.trapezoid(profile.intensity, profile.frequency_mhz)
     assert area == pytest.approx(lines.intensity_nm2_mhz.sum(), rel=2.5e-3)  # what resolving_grid promises
 
 
 @settings(max_examples=20, deadline=None)
 @given(outside=st.floats(1e-6, 0.3))
 def test_truncation_stays_below_its_bound(lines, outside):
-    one = lines.where([5])
+    line = lines.where([5])
     reach = float(profiles.lorentzian_reach(1.0, outside))
-    grid = one.frequency_mhz[0] + np.linspace(-1.5 * reach, 1.5 * reach, 4001)
-    made = Spectrum.from_lines(one, grid, fwhm_mhz=1.0, profile="lorentzian", outside=outside)
-    lost = slow(one, grid, {"profile": "lorentzian", "fwhm_mhz": 1.0}) - made.intensity
-    edge = one.intensity_nm2_mhz[0] * float(profiles.lorentzian(reach, 1.0))
+    grid = line.frequency_mhz[0] + np.linspace(-1.5 * reach, 1.5 * reach, 4001)
+    profile = Spectrum.from_lines(line, grid, fwhm_mhz=1.0, profile="lorentzian", outside=outside)
+    lost = slow(line, grid, {"profile": "lorentzian", "fwhm_mhz": 1.0}) - profile.intensity
+    edge = line.intensity_nm2_mhz[0] * float(profiles.lorentzian(reach, 1.0))
     assert lost.max() <= edge * (1 + 1e-9)  # nothing larger than the shape at its reach is left out; round-off
-    assert (lost[np.abs(grid - one.frequency_mhz[0]) < 0.99 * reach] == 0).all()
+    assert (lost[np.abs(grid - line.frequency_mhz[0]) < 0.99 * reach] == 0).all()
 
 
 def test_a_voigt_line_is_as_wide_as_its_width_says(lines):
-    one = lines.where([40])
-    width = float(line_widths(one, "voigt", 0.2)[0])
-    doppler = float(profiles.doppler_fwhm(one.frequency_mhz, 20.0, 50.0)[0])
+    line = lines.where([40])
+    width = float(line_widths(line, "voigt", 0.2)[0])
+    doppler = float(profiles.doppler_fwhm(line.frequency_mhz, 20.0, 50.0)[0])
     ratio = profiles.voigt(width / 2, doppler, 0.2) / profiles.voigt(0.0, doppler, 0.2)
     assert float(ratio) == pytest.approx(0.5, rel=1e-3)  # the approximation is good to 2e-4 of the width
 
@@ -110,9 +110,9 @@ def test_a_grid_follows_only_the_lines_of_its_range(lines):
     ],
 )
 def test_what_makes_no_spectrum_is_refused(lines, change, rule):
-    given_ = {"grid_mhz": [1.0, 2.0], "fwhm_mhz": 1.0} | change
+    value = {"grid_mhz": [1.0, 2.0], "fwhm_mhz": 1.0} | change
     with pytest.raises(ValueError, match=rule):
-        Spectrum.from_lines(lines, given_.pop("grid_mhz"), **given_)
+        Spectrum.from_lines(lines, value.pop("grid_mhz"), **value)
 
 
 def test_doppler_without_a_mass_is_refused():
@@ -130,17 +130,19 @@ def test_a_grid_that_would_be_too_long_is_refused(lines, monkeypatch):
 
 
 def test_csv_holds_the_columns_and_where_they_are_from(lines, tmp_path):
-    made = Spectrum.from_lines(lines, np.linspace(1e4, 2e4, 11), fwhm_mhz=100.0)
+    profile = Spectrum.from_lines(lines, np.linspace(1e4, 2e4, 11), fwhm_mhz=100.0)
     path = tmp_path / "s.csv"
-    rotor.write(made, path, settings={"command": "by hand"})
+    rotor.write(profile, path, settings={"command": "by hand"})
     heading, *rows = path.read_text(encoding="utf-8").splitlines()
     assert heading == "frequency_mhz,cross_section_nm2"
-    assert [float(r.split(",")[1]) for r in rows] == made.intensity.tolist()
+    assert [float(r.split(",")[1]) for r in rows] == profile.intensity.tolist()
     provenance = json.loads((tmp_path / "s.csv.provenance.json").read_text(encoding="utf-8"))
     assert (provenance["command"], provenance["profile"], provenance["fwhm_mhz"]) == ("by hand", "gaussian", 100.0)
-    assert list(made.to_pandas().columns) == list(made.to_polars().columns) == ["frequency_mhz", "cross_section_nm2"]
+    assert (
+        list(profile.to_pandas().columns) == list(profile.to_polars().columns) == ["frequency_mhz", "cross_section_nm2"]
+    )
     with pytest.raises(ValueError, match=r"as \.csv"):
-        rotor.write(made, tmp_path / "s.txt")
+        rotor.write(profile, tmp_path / "s.txt")
 
 
 def test_columns_of_unlike_length_are_refused():

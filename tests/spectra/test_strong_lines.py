@@ -28,13 +28,13 @@ def by_states(lines: Lines | transitions.Transitions) -> tuple[np.ndarray, ...]:
     return lines.upper[order], lines.lower[order], lines.frequency_mhz[order], lines.strength_debye2[order]
 
 
-def assert_equal(found: Lines, expected: Lines, mu2: float) -> None:
+def assert_equal(computed: Lines, expected: Lines, mu2: float) -> None:
     """The same lines; strengths to round-off of the sum over all upper states, (2J+1) μ², of which weak ones are left over."""
-    one, other = by_states(found), by_states(expected)
+    first, other = by_states(computed), by_states(expected)
     for i in range(3):
-        assert np.array_equal(one[i], other[i])
-    j = found.levels.quanta["j"][one[1]]
-    assert (np.abs(one[3] - other[3]) <= 1e-12 * other[3] + 1e-15 * (2 * j + 3) * mu2).all()
+        assert np.array_equal(first[i], other[i])
+    j = computed.levels.quanta["j"][first[1]]
+    assert (np.abs(first[3] - other[3]) <= 1e-12 * other[3] + 1e-15 * (2 * j + 3) * mu2).all()
 
 
 @pytest.mark.parametrize("constants", TOPS.values(), ids=TOPS)
@@ -42,40 +42,40 @@ def assert_equal(found: Lines, expected: Lines, mu2: float) -> None:
 def test_a_cut_list_is_the_whole_list_cut(constants, dipole):
     top = Top.from_constants(constants, dipole_abc_debye=dipole)
     options = {"temperature_k": 20.0, "jmax": 14, "q": Q, "sort": False}
-    every = line_list(top, min_lgint=None, **options)
+    lines = line_list(top, min_lgint=None, **options)
     for least in (-11.0, -7.0):
-        found = line_list(top, min_lgint=least, **options)
-        expected = every[every.lgint >= least]
-        assert 0 < len(found) < len(every)
-        assert_equal(found, expected, sum(mu * mu for mu in dipole))
+        computed = line_list(top, min_lgint=least, **options)
+        expected = lines[lines.lgint >= least]
+        assert 0 < len(computed) < len(lines)
+        assert_equal(computed, expected, sum(mu * mu for mu in dipole))
 
 
 @pytest.mark.parametrize("weights", [{"ee": 1, "eo": 3, "oe": 3, "oo": 1}, {"ee": 1, "eo": 0, "oe": 0, "oo": 1}])
 def test_blocks_that_do_not_exist_and_a_range(weights):
     top = Top.from_constants(TOPS["prolate, Ir"], dipole_abc_debye=(0, 1.9, 0), spin_weights=weights)
     options = {"temperature_k": 20.0, "jmax": 20, "q": Q}
-    every = line_list(top, min_lgint=None, **options)
-    inside = (every.frequency_mhz >= 2e4) & (every.frequency_mhz <= 1.1e5)
-    found = line_list(top, min_lgint=-5.0, range_mhz=(2e4, 1.1e5), **options)
-    assert 50 < len(found) < inside.sum()
-    assert_equal(found, every[inside & (every.lgint >= -5.0)], 1.9**2)
+    lines = line_list(top, min_lgint=None, **options)
+    inside = (lines.frequency_mhz >= 2e4) & (lines.frequency_mhz <= 1.1e5)
+    computed = line_list(top, min_lgint=-5.0, range_mhz=(2e4, 1.1e5), **options)
+    assert 50 < len(computed) < inside.sum()
+    assert_equal(computed, lines[inside & (lines.lgint >= -5.0)], 1.9**2)
 
 
 def test_every_pair_of_blocks_is_there_once_with_its_elements():
     """All elements between stacked blocks, up to one sign for a pair, are those of each pair by itself."""
     levels = solve_levels(Top.from_constants(TOPS["prolate, Ir"]), 7)
     dipole = body_tensor((1.2, 1.9, 0.4), 1, "Ir")
-    vector, below, found = Vector(dipole), {}, {}
+    vector, below, computed = Vector(dipole), {}, {}
     for _, stacks in stacks_by_j(levels.blocks):
         for lows in (below, stacks):
             for up, (moved, low) in vector.products(stacks, lows):
                 pair = frozenset((up.start, low.start))
-                assert pair not in found
-                found[pair] = up, low, moved.T @ low.vectors
+                assert pair not in computed
+                computed[pair] = up, low, moved.T @ low.vectors
         below = stacks
     expected = {frozenset((up.start, low.start)) for up, low in connected_wang_blocks(levels.blocks, dipole)}
-    assert set(found) == expected
-    for up, low, elements in found.values():
+    assert set(computed) == expected
+    for up, low, elements in computed.values():
         alone = wang_amplitudes(up, low, dipole)
         sign = np.sign(np.sum(alone * elements))
         assert np.abs(alone - sign * elements).max() < 1e-14  # round-off of sums of some ten terms below 10
@@ -91,11 +91,11 @@ def test_cold_levels_alone_are_multiplied(monkeypatch):
         return plain(a, b, out=out)
 
     monkeypatch.setattr(strong_lines.np, "matmul", counting)
-    found = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=-9.0)
+    lines = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=-9.0)
     monkeypatch.undo()
-    every = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=None)
-    assert sum(sizes) < 0.1 * len(every)
-    assert_equal(found, every[every.lgint >= -9.0], 1.2**2 + 1.9**2 + 0.4**2)
+    value = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=None)
+    assert sum(sizes) < 0.1 * len(value)
+    assert_equal(lines, value[value.lgint >= -9.0], 1.2**2 + 1.9**2 + 0.4**2)
 
 
 def test_a_line_just_above_the_cut_is_not_lost_to_the_bounds():

@@ -84,17 +84,18 @@ def test_intensities_of_a_catalogue_are_met_with_vibration_alone(shared):
 
 def test_a_factor_lowers_every_line_alike():
     top = replace(rotor.read("CO2"), dipole_abc_debye=(0.1, 0.0, 0.0), symmetry_checked=False)
-    given = VibrationalStates.parse("667.4x2,1388,2349", harmonic=True)
+    parsed = VibrationalStates.parse("667.4x2,1388,2349", harmonic=True)
     for plain, counted in (
-        (line_list(top, jmax=10).intensity_nm2_mhz, line_list(top, jmax=10, vibrations=given).intensity_nm2_mhz),
+        (line_list(top, jmax=10).intensity_nm2_mhz, line_list(top, jmax=10, vibrations=parsed).intensity_nm2_mhz),
         (
             raman_lines(top, jmax=10).cross_section_cm2_per_sr,
-            raman_lines(top, jmax=10, vibrations=given).cross_section_cm2_per_sr,
+            raman_lines(top, jmax=10, vibrations=parsed).cross_section_cm2_per_sr,
         ),
     ):
-        assert plain / counted == pytest.approx(given.factor(300.0), rel=1e-12)  # round-off
+        assert plain / counted == pytest.approx(parsed.factor(300.0), rel=1e-12)  # round-off
     assert (
-        "fundamentals, harmonic, 667.4x2, 1388, 2349 cm-1" in line_list(top, jmax=10, vibrations=given).partition.source
+        "fundamentals, harmonic, 667.4x2, 1388, 2349 cm-1"
+        in line_list(top, jmax=10, vibrations=parsed).partition.source
     )
 
 
@@ -103,9 +104,9 @@ def test_a_factor_lowers_every_line_alike():
     [("667.4x2,1388,2349 cm-1", (667.4, 1388, 2349), (2, 1, 1)), ("100", (100,), (1,)), ("3×2 THz, 10 cm-1", (100.0692, 10), (2, 1))],
 )  # fmt: skip
 def test_texts(text, energies, degeneracies):
-    given = VibrationalStates.parse(text)
-    assert given.energies_cm == pytest.approx(energies, rel=1e-6)
-    assert given.degeneracies == degeneracies
+    parsed = VibrationalStates.parse(text)
+    assert parsed.energies_cm == pytest.approx(energies, rel=1e-6)
+    assert parsed.degeneracies == degeneracies
 
 
 @pytest.mark.parametrize(

@@ -68,11 +68,11 @@ def test_the_distance_of_distributions_is_scipys():
 @pytest.mark.parametrize("kt", [1.0, None])
 def test_honest_ensembles_are_rejected_as_often_as_stated(kt):
     """1000 seeds at 95 %: each statement at its own rate, the answer at most at 5 %."""
-    rng, found = np.random.default_rng(11), []
+    rng, computed = np.random.default_rng(11), []
     for _ in range(1000):
         test = equipartition({name: 0.5 * rng.normal(size=100) ** 2 for name in "xyzabc"}, kt, confidence=0.95)
-        found.append((test.chi2_p < 0.05, test.ks_p < 0.05, not test.accepted))
-    chi2, ks, rejected = np.mean(found, axis=0)
+        computed.append((test.chi2_p < 0.05, test.ks_p < 0.05, not test.accepted))
+    chi2, ks, rejected = np.mean(computed, axis=0)
     spread = math.sqrt(0.05 * 0.95 / 1000)  # 0.0069
     assert abs(chi2 - 0.05) < 3 * spread
     assert ks < 0.05 + 3 * spread
@@ -97,13 +97,13 @@ def test_one_honest_gas_in_a_hundred_is_rejected():
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_correlated_frames_are_rejected_as_often_as_stated(memory):
-    rng, found, effective = np.random.default_rng(12), [], []
+    rng, computed, effective = np.random.default_rng(12), [], []
     for _ in range(120):
         data = {name: 0.5 * ornstein_uhlenbeck(800, 10, memory, rng) ** 2 for name in "xa"}
         test = equipartition(data, 1.0, confidence=0.95)
-        found.append((test.chi2_p < 0.05, not test.accepted))
+        computed.append((test.chi2_p < 0.05, not test.accepted))
         effective.append(test.degrees[0].effective)
-    rates = np.mean(found, axis=0)
+    rates = np.mean(computed, axis=0)
     assert np.all(rates < 0.05 + 3 * math.sqrt(0.05 * 0.95 / 120))  # 3 σ of 120 trials
     true = 8000 * (1 - memory**2) / (1 + memory**2)  # of energies, whose correlation is that of velocities squared
     found_spread2 = np.mean(1 / np.array(effective))  # spreads² average without bias
@@ -166,20 +166,20 @@ def test_a_mixture_is_tested_kind_by_kind():
     momenta = rng.normal(size=(6000, 3)) * np.sqrt(moments)
     velocities = rng.normal(size=(6000, 3)) / np.sqrt(masses)[:, None]
     velocities -= masses @ velocities / masses.sum()
-    given = {
+    settings = {
         "masses": masses,
         "velocities": velocities,
         "moments": moments,
         "species": species,
         "momentum_removed": True,
     }
-    mixture = kinetic_degrees(momenta=momenta, **given)
+    mixture = kinetic_degrees(momenta=momenta, **settings)
     assert mixture.total == pytest.approx(count_degrees(moments, removed=3).total, rel=1e-12)
     assert len(mixture.energies) == 9 + 3 + 2
     assert equipartition(mixture, 1.0).accepted
     hot = momenta.copy()
     hot[:3000, 1] *= math.sqrt(1.2)
-    assert equipartition(kinetic_degrees(momenta=hot, **given), 1.0).failing == ("H2O: rotation b",)
+    assert equipartition(kinetic_degrees(momenta=hot, **settings), 1.0).failing == ("H2O: rotation b",)
 
 
 def test_two_temperatures_are_seen_without_knowing_either():
@@ -263,7 +263,7 @@ def test_energies_that_follow_the_law_too_well_have_an_answer():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("change", "said"),
     [
         ({"masses": [1, 2], "velocities": np.zeros((3, 3))}, r"velocities of shape \(3, 3\) for 2 bodies"),
         ({"masses": [1, 2], "velocities": np.zeros((2, 2))}, r"velocities of shape \(2, 2\) for 2 bodies"),
@@ -274,6 +274,6 @@ def test_energies_that_follow_the_law_too_well_have_an_answer():
         ),
     ],
 )
-def test_motions_of_other_bodies_than_there_are_are_refused(given, said):
+def test_motions_of_other_bodies_than_there_are_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
-        kinetic_degrees(**given)
+        kinetic_degrees(**change)

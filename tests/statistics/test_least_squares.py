@@ -24,12 +24,12 @@ def linear(design, data):
 def test_a_linear_problem_takes_one_step_whatever_the_units(seed, decades):
     rng = np.random.default_rng(seed)
     design, data, _ = straight_line(rng, np.array([1.0, 10.0**decades, 10.0**-decades]))
-    found = minimise(linear(design, data), np.zeros(3))
+    minimum = minimise(linear(design, data), np.zeros(3))
     scaled = design / np.linalg.norm(design, axis=0)
     expected = np.linalg.lstsq(scaled, data)[0] / np.linalg.norm(design, axis=0)
-    assert found.converged
-    assert len(found.iterations) == 1
-    assert found.parameters == pytest.approx(expected, rel=1e-8)  # round-off times the condition of random columns
+    assert minimum.converged
+    assert len(minimum.iterations) == 1
+    assert minimum.parameters == pytest.approx(expected, rel=1e-8)  # round-off times the condition of random columns
 
 
 def rosenbrock(p):
@@ -38,9 +38,9 @@ def rosenbrock(p):
 
 
 def test_a_curved_valley_is_followed_to_its_end():
-    found = minimise(rosenbrock, np.array([-1.2, 1.0]))
-    assert found.converged
-    assert found.parameters == pytest.approx(
+    minimum = minimise(rosenbrock, np.array([-1.2, 1.0]))
+    assert minimum.converged
+    assert minimum.parameters == pytest.approx(
         [1.0, 1.0], abs=1e-3
     )  # tolerance 1e-4 of the standard errors, 1 and 2 here
 
@@ -82,11 +82,13 @@ def test_a_square_that_should_be_negative_ends_at_zero_and_a_wrong_slope_does_no
         noise = 1e-8 * np.sin(1e9 * (p[0] + p[1]) + np.arange(50))
         return data - p[0] * x - p[1] ** 2 * x**2 + noise, sign * np.stack([x, 2 * p[1] * x**2], axis=1)
 
-    found = minimise(residuals, np.array([2.0, start]))
-    assert found.converged
-    assert "χ² allows none" in found.reason
-    assert abs(found.parameters[1]) < 1e-3  # (1e-3)² is 1e-5 of its standard error of about 0.6
-    assert found.parameters[0] == pytest.approx((data @ x) / (x @ x), abs=1e-3)  # the fit without p₁; its error is 0.2
+    minimum = minimise(residuals, np.array([2.0, start]))
+    assert minimum.converged
+    assert "χ² allows none" in minimum.reason
+    assert abs(minimum.parameters[1]) < 1e-3  # (1e-3)² is 1e-5 of its standard error of about 0.6
+    assert minimum.parameters[0] == pytest.approx(
+        (data @ x) / (x @ x), abs=1e-3
+    )  # the fit without p₁; its error is 0.2
     assert not minimise(lambda p: residuals(p, -1.0), np.array([2.0, start])).converged
 
 
@@ -95,10 +97,10 @@ def test_an_interrupt_leaves_the_best_point():
         if iteration.taken and iteration.number > 1:
             raise KeyboardInterrupt
 
-    found = minimise(rosenbrock, np.array([-1.2, 1.0]), progress=stop)
+    minimum = minimise(rosenbrock, np.array([-1.2, 1.0]), progress=stop)
     start = np.sum(rosenbrock(np.array([-1.2, 1.0]))[0] ** 2)
-    assert found.status == "interrupted"
-    assert np.sum(found.residuals**2) < start
+    assert minimum.status == "interrupted"
+    assert np.sum(minimum.residuals**2) < start
 
 
 def test_a_step_out_of_bounds_is_shortened():
@@ -107,33 +109,39 @@ def test_a_step_out_of_bounds_is_shortened():
             raise ValueError("the logarithm of nothing")
         return np.array([-2.0 - np.log(p[0])]), np.array([[1 / p[0]]])
 
-    found = minimise(logarithm, np.array([1.0]))
-    assert found.converged
-    assert found.parameters[0] == pytest.approx(np.exp(-2.0), rel=1e-4)  # the tolerance of the search
+    minimum = minimise(logarithm, np.array([1.0]))
+    assert minimum.converged
+    assert minimum.parameters[0] == pytest.approx(np.exp(-2.0), rel=1e-4)  # the tolerance of the search
 
 
 def test_covariance_leverages_and_dfbetas_are_those_of_the_normal_equations():
     rng = np.random.default_rng(1)
     design, data, _ = straight_line(rng, np.array([1.0, 50.0, 1e-3]))
-    found = regression(design, ["a", "b", "c"])
-    assert found.covariance == pytest.approx(np.linalg.inv(design.T @ design), rel=1e-9)  # a well-conditioned design
+    regressed = regression(design, ["a", "b", "c"])
+    assert regressed.covariance == pytest.approx(
+        np.linalg.inv(design.T @ design), rel=1e-9
+    )  # a well-conditioned design
     hat = design @ np.linalg.inv(design.T @ design) @ design.T
-    assert found.leverages == pytest.approx(np.diag(hat), abs=1e-12)  # round-off
+    assert regressed.leverages == pytest.approx(np.diag(hat), abs=1e-12)  # round-off
     solution = np.linalg.lstsq(design, data)[0]
-    moved = found.dfbetas(data - design @ solution)
+    moved = regressed.dfbetas(data - design @ solution)
     for left_out in (0, 7, 39):
         rest = np.arange(40) != left_out
         without = np.linalg.lstsq(design[rest], data[rest])[0]
         spread = np.sqrt(np.sum((data[rest] - design[rest] @ without) ** 2) / (39 - 3))
-        assert moved[left_out] == pytest.approx((solution - without) / (spread * found.errors), rel=1e-8)  # round-off
+        assert moved[left_out] == pytest.approx(
+            (solution - without) / (spread * regressed.errors), rel=1e-8
+        )  # round-off
 
 
 def test_standard_errors_are_the_scatter_of_repeated_fits():
     rng = np.random.default_rng(3)
     design = rng.normal(size=(30, 2)) * [1.0, 1e4]
     errors = regression(design, ["a", "b"]).errors
-    found = np.array([np.linalg.lstsq(design, rng.normal(size=30))[0] for _ in range(4000)])
-    assert found.std(axis=0) / errors == pytest.approx(1.0, abs=0.045)  # four standard errors of a σ from 4000 samples
+    computed = np.array([np.linalg.lstsq(design, rng.normal(size=30))[0] for _ in range(4000)])
+    assert computed.std(axis=0) / errors == pytest.approx(
+        1.0, abs=0.045
+    )  # four standard errors of a σ from 4000 samples
 
 
 def test_what_is_not_determined_is_named():
@@ -141,28 +149,28 @@ def test_what_is_not_determined_is_named():
     design = rng.normal(size=(20, 4))
     design[:, 1] = 0.0
     design[:, 3] = -3.0 * design[:, 2]
-    found = regression(design, ["A", "DK", "B", "C"])
-    assert {one.text for one in found.undetermined} == {"DK", "C + 1 B"}
-    assert np.isfinite(found.errors).tolist() == [True, False, False, False]
-    assert found.condition == np.inf
-    assert found.rank == 2
+    regressed = regression(design, ["A", "DK", "B", "C"])
+    assert {combination.text for combination in regressed.undetermined} == {"DK", "C + 1 B"}
+    assert np.isfinite(regressed.errors).tolist() == [True, False, False, False]
+    assert regressed.condition == np.inf
+    assert regressed.rank == 2
 
 
 def test_a_column_of_round_off_is_no_information():
     design = np.column_stack([np.ones(5), 1e-9 * np.array([1.0, -1, 1, -1, 1])])
     assert np.isfinite(regression(design, ["B", "A"]).errors).all()
     blind = regression(design, ["B", "A"], np.array([0.0, 1e-8]))
-    assert [one.text for one in blind.undetermined] == ["A"]
+    assert [combination.text for combination in blind.undetermined] == ["A"]
 
 
 def test_a_parameter_whose_column_is_round_off_is_not_moved():
     rng = np.random.default_rng(5)
     design = np.column_stack([np.ones(30), 1e-14 * rng.normal(size=30)])
     data = 3.0 + rng.normal(size=30)
-    found = minimise(linear(design, data), np.array([0.0, 7.0]), floor=np.array([0.0, 1e-10]))
-    assert found.converged
-    assert found.parameters[1] == 7.0
-    assert found.parameters[0] == pytest.approx(data.mean(), rel=1e-12)  # round-off
+    minimum = minimise(linear(design, data), np.array([0.0, 7.0]), floor=np.array([0.0, 1e-10]))
+    assert minimum.converged
+    assert minimum.parameters[1] == 7.0
+    assert minimum.parameters[0] == pytest.approx(data.mean(), rel=1e-12)  # round-off
 
 
 def test_a_narrow_curved_valley_is_followed_to_its_end():
@@ -172,9 +180,9 @@ def test_a_narrow_curved_valley_is_followed_to_its_end():
         x, y = p
         return np.array([300 * (y - x * x), 1 - x]), np.array([[600 * x, -300.0], [1.0, 0.0]])
 
-    found = minimise(valley, np.array([-1.2, 1.0]), most_iterations=700)
-    assert found.converged
-    assert found.parameters == pytest.approx([1.0, 1.0], abs=1e-6)  # of a step below 1e-4 standard errors at rms 0
+    minimum = minimise(valley, np.array([-1.2, 1.0]), most_iterations=700)
+    assert minimum.converged
+    assert minimum.parameters == pytest.approx([1.0, 1.0], abs=1e-6)  # of a step below 1e-4 standard errors at rms 0
 
 
 @pytest.mark.parametrize("start", [0.0, 0.5, 1.0, -3.0])
@@ -189,9 +197,9 @@ def test_a_kink_is_no_minimum(slope, start):
         r[3] += slope * max(p[0] - 1, 0.0)
         return r, x[:, None].copy()
 
-    found = minimise(kinked, np.array([start]))
-    assert not found.converged
-    assert found.distance > 10  # standard errors that seem to be left
+    minimum = minimise(kinked, np.array([start]))
+    assert not minimum.converged
+    assert minimum.distance > 10  # standard errors that seem to be left
 
 
 def test_a_long_curved_valley_takes_a_few_steps():
@@ -201,6 +209,6 @@ def test_a_long_curved_valley_takes_a_few_steps():
         x, y = p
         return np.array([300 * (y - x * x), 1 - x]), np.array([[600 * x, -300.0], [1.0, 0.0]])
 
-    found = minimise(valley, np.array([-1.2, 1.0]))
-    assert found.converged
-    assert len(found.iterations) < 5  # 393 without it
+    minimum = minimise(valley, np.array([-1.2, 1.0]))
+    assert minimum.converged
+    assert len(minimum.iterations) < 5  # 393 without it

@@ -52,9 +52,9 @@ def test_a_rigid_asymmetric_body_gives_the_place_of_every_atom_exactly(seed):
     atom = int(rng.integers(6))
     heavier = masses.copy()
     heavier[atom] += 1.0
-    found = kraitchman(moments, moments_of(heavier, places)[0], mass_u=masses.sum(), change_u=1.0)
+    substitution = kraitchman(moments, moments_of(heavier, places)[0], mass_u=masses.sum(), change_u=1.0)
     gap = np.diff(np.sort(planar_moments(moments))).min() / moments.max()
-    assert found.squares_angstrom2 == pytest.approx(
+    assert substitution.squares_angstrom2 == pytest.approx(
         coordinates[atom] ** 2, abs=1e-12 / max(gap, 1e-6)
     )  # round-off over the gap
 
@@ -73,9 +73,9 @@ def test_a_lighter_isotope_serves_as_well():
     )
     lighter = masses - [0, 0, 1, 0]
     parent, axes = moments_of(masses, places)
-    found = kraitchman(parent, moments_of(lighter, places)[0], mass_u=masses.sum(), change_u=-1.0)
+    substitution = kraitchman(parent, moments_of(lighter, places)[0], mass_u=masses.sum(), change_u=-1.0)
     coordinates = (places - masses @ places / masses.sum()) @ axes
-    assert found.coordinates_angstrom == pytest.approx(np.abs(coordinates[2]), rel=1e-9)  # round-off
+    assert substitution.coordinates_angstrom == pytest.approx(np.abs(coordinates[2]), rel=1e-9)  # round-off
 
 
 @pytest.mark.parametrize("pair", ["ab", "ac", "bc"])
@@ -84,11 +84,11 @@ def test_a_planar_molecule_by_each_pair_of_moments(pair):
     parent, other = (Top.from_molecule(m) for m in (formaldehyde, formaldehyde.with_isotopes("3=2H")))
     place = (formaldehyde.positions_angstrom[2] - parent.frame.centre) @ parent.frame.axes.T
     change = formaldehyde.with_isotopes("3=2H").mass_u - formaldehyde.mass_u
-    found = kraitchman(
+    substitution = kraitchman(
         parent.moments_u_angstrom2, other.moments_u_angstrom2, mass_u=formaldehyde.mass_u, change_u=change,
         shape="planar", pair=pair,
     )  # fmt: skip
-    assert found.coordinates_angstrom == pytest.approx(np.abs(place), abs=1e-9)  # round-off
+    assert substitution.coordinates_angstrom == pytest.approx(np.abs(place), abs=1e-9)  # round-off
 
 
 @pytest.mark.parametrize(
@@ -97,23 +97,23 @@ def test_a_planar_molecule_by_each_pair_of_moments(pair):
 def test_symmetric_tops_on_and_off_the_axis(name, isotopes):
     molecule = rotor.read(name).molecule
     atom = int(isotopes.split("=")[0]) - 1
-    found = substitution_structure(rigid_family(molecule, ["", isotopes])).atoms[0]
+    structure = substitution_structure(rigid_family(molecule, ["", isotopes])).atoms[0]
     top = Top.from_molecule(molecule)
     place = (molecule.positions_angstrom[atom] - top.frame.centre) @ top.frame.axes.T
     along = 0 if top.kind == "prolate" else 2
-    ours, theirs = found.coordinates_angstrom, place
+    ours, theirs = structure.coordinates_angstrom, place
     assert abs(ours[along]) == pytest.approx(
         abs(theirs[along]), abs=2e-5
     )  # geometries of files are symmetric to 1e-5 Å
-    across = [np.sqrt(one @ one - one[along] ** 2) for one in (ours, theirs)]  # axes across are free to turn
+    across = [np.sqrt(place @ place - place[along] ** 2) for place in (ours, theirs)]  # axes across are free to turn
     assert across[0] == pytest.approx(across[1], abs=2e-5)
 
 
 def test_an_imaginary_coordinate_is_reported_not_hidden():
-    found = kraitchman([10.0, 20.0, 30.2], [10.11, 20.1, 30.5], mass_u=30.0, change_u=1.0)
-    assert found.imaginary[2]
-    assert found.coordinates_angstrom[2] == 0.0
-    assert found.squares_angstrom2[2] < 0
+    substitution = kraitchman([10.0, 20.0, 30.2], [10.11, 20.1, 30.5], mass_u=30.0, change_u=1.0)
+    assert substitution.imaginary[2]
+    assert substitution.coordinates_angstrom[2] == 0.0
+    assert substitution.squares_angstrom2[2] < 0
 
 
 def test_errors_of_moments_are_carried_and_costains_rule_added():
@@ -174,9 +174,9 @@ def test_coordinates_are_set_without_loss_of_symmetry():
     molecule = symmetric_geometry(rotor.read("CH3CN").molecule)
     space, coordinates = symmetric_displacements(molecule), bonds_and_angles(molecule)[:4]
     changes = np.array([0.02, -0.01, 0.005, 1.5])
-    targets = changes + [one.value(molecule.positions_angstrom) for one in coordinates]
+    targets = changes + [coordinate.value(molecule.positions_angstrom) for coordinate in coordinates]
     moved = moved_to(molecule.positions_angstrom, space, coordinates, targets)
-    assert [one.value(moved) for one in coordinates] == pytest.approx(
+    assert [coordinate.value(moved) for coordinate in coordinates] == pytest.approx(
         targets, abs=1e-10
     )  # Newton's method to round-off
     assert symmetry_of(Molecule(molecule.symbols, moved), 1e-8).point_group == "C3v"
@@ -217,10 +217,10 @@ def test_an_exact_structure_comes_back_from_rigid_moments(name, substitutions, m
             continue
     start = Molecule(molecule.symbols, molecule.positions_angstrom * 1.02)
     together = rigid_family(molecule, usable, start)
-    found = fit_structure(together, "r0", leave_out=()) if method == "r0" else substitution_structure(together)
-    true = {one.name: one.value(molecule.positions_angstrom) for one in bonds_and_angles(molecule)}
-    assert found.values
-    for value in found.values:
+    computed = fit_structure(together, "r0", leave_out=()) if method == "r0" else substitution_structure(together)
+    true = {coordinate.name: coordinate.value(molecule.positions_angstrom) for coordinate in bonds_and_angles(molecule)}
+    assert computed.values
+    for value in computed.values:
         assert value.value == pytest.approx(
             true[value.name], rel=2e-6
         )  # moments to the 1e-6 of equal ones, geometry to 1e-4 of symmetry
@@ -230,7 +230,9 @@ def test_axes_are_matched_by_overlap_where_they_change_places():
     """Heavy isotopes on one side of a nearly symmetric rotor exchange a and b; the fit must not notice."""
     molecule = rotor.read("SO2").molecule
     swapped = [
-        one for one in ("", "1=18O", "2=18O", "3=18O", "1=34S") if not one or molecule.symbols[int(one[0]) - 1] in one
+        isotopes
+        for isotopes in ("", "1=18O", "2=18O", "3=18O", "1=34S")
+        if not isotopes or molecule.symbols[int(isotopes[0]) - 1] in isotopes
     ]
     together = rigid_family(molecule, swapped)
     assert fit_structure(together, "r0").rms_u_angstrom2 < 1e-5  # of moments of 50 u Å²
@@ -253,13 +255,13 @@ def test_vibrational_terms_are_recovered_when_they_are_there():
             (isotopes or "H2O", isotopes, dict(zip("ABC", ROTATIONAL_MHZ_U_ANGSTROM2 / changed, strict=True)), {})
         )
     together = family(water, measured)
-    found = fit_structure(together, "rm1")
-    assert [one.value for one in found.vibrational] == pytest.approx(
+    structure = fit_structure(together, "rm1")
+    assert [correction.value for correction in structure.vibrational] == pytest.approx(
         [0.01, 0.02, 0.03], abs=2e-3
     )  # c against r are 0.99 correlated
-    assert found.rms_u_angstrom2 < 0.05 * fit_structure(together, "r0").rms_u_angstrom2
-    true = {one.name: one.value(water.positions_angstrom) for one in bonds_and_angles(water)}
-    for value in found.values:
+    assert structure.rms_u_angstrom2 < 0.05 * fit_structure(together, "r0").rms_u_angstrom2
+    true = {coordinate.name: coordinate.value(water.positions_angstrom) for coordinate in bonds_and_angles(water)}
+    for value in structure.values:
         assert value.value == pytest.approx(true[value.name], rel=2e-3)
 
 
@@ -272,16 +274,18 @@ def test_the_rm_structure_of_a_diatomic_is_the_closed_form():
         equilibrium = ROTATIONAL_MHZ_U_ANGSTROM2 / Top.from_molecule(changed).moments_u_angstrom2[2]
         constants[name] = equilibrium - 0.5 * 0.009 * equilibrium**1.5 / 57898.0**0.5
     together = family(rod, [(name or "CO", name, {"B": b}, {}) for name, b in constants.items()])
-    mu = np.array([np.prod(one.molecule.masses_u) / one.molecule.masses_u.sum() for one in together.species])
-    moments = np.array([one.moments[1] for one in together.species])
+    mu = np.array(
+        [np.prod(component.molecule.masses_u) / component.molecule.masses_u.sum() for component in together.species]
+    )
+    moments = np.array([component.moments[1] for component in together.species])
     slope, offset = np.linalg.lstsq(np.stack([mu, np.sqrt(mu)], axis=1), moments)[0]
-    found = fit_structure(together, "rm1")
-    assert found.values[0].value == pytest.approx(np.sqrt(slope), abs=1e-9)  # digits of the constants
-    assert found.vibrational[0].value == pytest.approx(offset / np.sqrt(slope), abs=1e-8)  # the same
-    assert found.values[0].value == pytest.approx(
+    structure = fit_structure(together, "rm1")
+    assert structure.values[0].value == pytest.approx(np.sqrt(slope), abs=1e-9)  # digits of the constants
+    assert structure.vibrational[0].value == pytest.approx(offset / np.sqrt(slope), abs=1e-8)  # the same
+    assert structure.values[0].value == pytest.approx(
         1.12832, abs=3e-4
     )  # r_e of CO; r_m of a diatomic leaves out higher terms
-    assert any("1 degree of freedom" in text for text in found.notes)
+    assert any("1 degree of freedom" in text for text in structure.notes)
     wide = fit_structure(together, "rm2")  # d has the same mass factor as c √I: no isotopologue tells them apart
     assert set(wide.undetermined[0].names) == {"c_b", "d_b"}
 
@@ -296,10 +300,12 @@ def test_the_rm2_terms_of_a_linear_molecule_come_back():
         masses = changed.masses_u
         moment = rigid + 0.02 * np.sqrt(rigid) + 0.03 * (np.prod(masses) / masses.sum()) ** 0.25
         measured.append((isotopes or "OCS", isotopes, {"B": ROTATIONAL_MHZ_U_ANGSTROM2 / moment}, {}))
-    found = fit_structure(family(chain, measured), "rm2")
-    lengths = sorted(one.value for one in found.values)
+    structure = fit_structure(family(chain, measured), "rm2")
+    lengths = sorted(value.value for value in structure.values)
     assert lengths == pytest.approx([1.1562, 1.5614], abs=1e-5)  # 1e-9 of the moments times the condition
-    assert [one.value for one in found.vibrational] == pytest.approx([0.02, 0.03], abs=2e-4)  # the same
+    assert [correction.value for correction in structure.vibrational] == pytest.approx(
+        [0.02, 0.03], abs=2e-4
+    )  # the same
 
 
 def test_few_degrees_of_freedom_have_the_t_of_student():
@@ -327,8 +333,8 @@ def test_semi_experimental_structures_use_the_corrections():
         (name, isotopes, {"B": constants["B"] - 20.0}, errors) for name, isotopes, constants, errors in OCS_SPECIES
     ]
     plain = fit_structure(family(OCS, OCS_SPECIES), "r0")
-    found = fit_structure(family(OCS, shifted, corrections_mhz=[{"B": 20.0}] * 4), "re")
-    assert [v.value for v in found.values] == pytest.approx(
+    structure = fit_structure(family(OCS, shifted, corrections_mhz=[{"B": 20.0}] * 4), "re")
+    assert [v.value for v in structure.values] == pytest.approx(
         [v.value for v in plain.values], rel=1e-9
     )  # the same moments
     with pytest.raises(ValueError, match="no constant has a correction"):
@@ -375,7 +381,7 @@ def test_impossible_families_are_refused(measured, message):
 
 
 def test_the_substitution_structure_of_ocs():
-    values = {one.name: one for one in substitution_structure(family(OCS, OCS_SPECIES)).values}
+    values = {value.name: value for value in substitution_structure(family(OCS, OCS_SPECIES)).values}
     assert values["r(O1-C2)"].value == pytest.approx(1.16054, abs=1e-5)  # digits as published
     assert values["r(C2-S3)"].value == pytest.approx(1.55967, abs=1e-5)
     assert 0.001 < values["r(O1-C2)"].error < 0.005  # Costain's rule
@@ -412,7 +418,7 @@ def test_published_substitution_structures(shared, make):
 @pytest.mark.parametrize("name", ["OCS", "HC3N"])
 def test_bonds_from_measured_lines_without_a_typed_constant(shared, make, name):
     together, fits = make.of_lines(name, shared)
-    bonds = [one.value for one in substitution_structure(together).values if len(one.atoms) == 2]
+    bonds = [value.value for value in substitution_structure(together).values if len(value.atoms) == 2]
     assert all(fit.converged for fit in fits.values())
     digits = {"OCS": 1.5e-5, "HC3N": 1e-4}[name]  # one unit of the last digit published, r(CS) being 1.55967
     assert bonds == pytest.approx(make.PUBLISHED_RS[name], abs=digits)
@@ -420,10 +426,10 @@ def test_bonds_from_measured_lines_without_a_typed_constant(shared, make, name):
 
 def test_a_semi_experimental_structure_meets_the_published_one(make):
     """Maleic anhydride: constants, corrections and r_e of one publication."""
-    found = {one.atoms: one for one in make.maleic_anhydride().values}
+    computed = {value.atoms: value for value in make.maleic_anhydride().values}
     for atoms, theirs in make.PUBLISHED_RE.items():
-        assert abs(found[atoms].value - theirs) < 1.5 * found[atoms].error, atoms
-        assert found[atoms].error < (1e-3 if len(atoms) == 2 else 0.1)
+        assert abs(computed[atoms].value - theirs) < 1.5 * computed[atoms].error, atoms
+        assert computed[atoms].error < (1e-3 if len(atoms) == 2 else 0.1)
 
 
 @pytest.mark.parametrize("method", ["r0", "rm1", "rm2"])
@@ -475,7 +481,7 @@ def chain(wrong: str = "", shift_mhz: float = 0.0):
 
 def test_a_wrong_constant_of_an_isotopologue_in_a_plane_is_called_doubtful():
     assert not doubts(chain())
-    assert {(one.species, one.axis) for one in moments_across_planes(chain())} == {
+    assert {(difference.species, difference.axis) for difference in moments_across_planes(chain())} == {
         (name, "c") for name in ("2=13C", "3=13C", "4=13C", "1=18O", "6=2H")
     }
     for name, shift in (("3=13C", 1.0), ("4=13C", -10.0), ("1=18O", 1.0)):
@@ -489,13 +495,13 @@ def test_a_wrong_constant_of_an_isotopologue_in_a_plane_is_called_doubtful():
 def test_the_isotopologue_that_is_unlike_the_others_is_found():
     """Of the r_m fit, which has the vibration of this family exactly: without the wrong one nothing is left."""
     whole = chain("3=13C", 1.0)
-    found = without_each(whole, fit_structure(whole, "rm1"), partial(fit_structure, method="rm1"))
-    assert found[0].species == "3=13C"
-    assert found[0].rms_u_angstrom2 < 1e-6  # round-off of the constants
-    assert found[0].chance < 1e-6
-    assert all(one.chance > 0.1 for one in found[1:])
-    assert "without 3=13C" in gains("rm1", found, 0.003)[0]
-    assert not gains("rm1", found[1:], 0.003)
+    computed = without_each(whole, fit_structure(whole, "rm1"), partial(fit_structure, method="rm1"))
+    assert computed[0].species == "3=13C"
+    assert computed[0].rms_u_angstrom2 < 1e-6  # round-off of the constants
+    assert computed[0].chance < 1e-6
+    assert all(entry.chance > 0.1 for entry in computed[1:])
+    assert "without 3=13C" in gains("rm1", computed, 0.003)[0]
+    assert not gains("rm1", computed[1:], 0.003)
 
 
 def test_measured_families_have_no_false_alarm():
@@ -531,50 +537,52 @@ def shaken_family(molecule, substitutions, part=1e-4, seed=5):
     """Rigid moments, each constant changed by about `part` of itself, as vibration does."""
     rigid, rng = rigid_family(molecule, substitutions), np.random.default_rng(seed)
     measured = []
-    for one, isotopes in zip(rigid.species, substitutions, strict=True):
-        shaken = {name: value * (1 + part * rng.normal()) for name, value in one.constants_mhz.items()}
-        if len(set(np.round(list(one.constants_mhz.values()), 3))) < 3:  # equal constants stay equal
+    for component, isotopes in zip(rigid.species, substitutions, strict=True):
+        shaken = {name: value * (1 + part * rng.normal()) for name, value in component.constants_mhz.items()}
+        if len(set(np.round(list(component.constants_mhz.values()), 3))) < 3:  # equal constants stay equal
             factor = 1 + part * rng.normal()
-            shaken = {name: value * factor for name, value in one.constants_mhz.items()}
-        measured.append((one.name, isotopes, shaken, {}))
+            shaken = {name: value * factor for name, value in component.constants_mhz.items()}
+        measured.append((component.name, isotopes, shaken, {}))
     return family(molecule, measured)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_atoms_on_an_axis_stay_there(seed):
     """H2CO: O and C have b = 0 without an error, angles add up to 360 degrees, r(CH) has the 0.0020 Å of Costain's rule."""
-    found = substitution_structure(shaken_family(METHANAL, ["", "1=18O", "2=13C", "3=2H"], seed=seed))
-    values = {one.name: one for one in found.values}
-    assert np.array_equal(found.positions_angstrom[:2, 1:], np.zeros((2, 2)))
-    assert np.array_equal(found.errors_angstrom[:2, 1:], np.zeros((2, 2)))
+    structure = substitution_structure(shaken_family(METHANAL, ["", "1=18O", "2=13C", "3=2H"], seed=seed))
+    values = {value.name: value for value in structure.values}
+    assert np.array_equal(structure.positions_angstrom[:2, 1:], np.zeros((2, 2)))
+    assert np.array_equal(structure.errors_angstrom[:2, 1:], np.zeros((2, 2)))
     angles = 2 * values["a(O1-C2-H3)"].value + values["a(H3-C2-H4)"].value
     assert angles == pytest.approx(360, abs=1e-10)  # round-off
     assert 2 * values["a(O1-C2-H3)"].error == pytest.approx(values["a(H3-C2-H4)"].error, rel=1e-9)  # one move of both H
     assert values["r(C2-H3)"].error == pytest.approx(0.0020, abs=1e-4)  # 0.0015 Å²/|r| of a_C, a_H and b_H
     assert abs(values["r(C2-H3)"].value - 1.1039) < 0.0020
     assert abs(values["a(O1-C2-H3)"].value - 121.77) < values["a(O1-C2-H3)"].error
-    assert not [note for note in found.notes if "b²" in note or "|b|" in note]
+    assert not [note for note in structure.notes if "b²" in note or "|b|" in note]
 
 
 def test_the_centre_of_a_linear_molecule_has_no_error():
     dioxide = Molecule(("O", "C", "O"), [[0, 0, 1.16], [0, 0, 0], [0, 0, -1.16]])
-    found = substitution_structure(shaken_family(dioxide, ["", "2=13C", "1=18O"]))
-    (bond,) = found.values
-    assert not found.positions_angstrom[1].any()
-    assert not found.errors_angstrom[1].any()
+    structure = substitution_structure(shaken_family(dioxide, ["", "2=13C", "1=18O"]))
+    (bond,) = structure.values
+    assert not structure.positions_angstrom[1].any()
+    assert not structure.errors_angstrom[1].any()
     assert bond.error == pytest.approx(0.0015 / 1.16, rel=0.01)  # Costain's rule of O alone; vibration moves r by 1e-4
     assert abs(bond.value - 1.16) < bond.error
-    assert not found.notes
+    assert not structure.notes
 
 
 def test_errors_across_the_axis_of_a_symmetric_top_lie_along_the_distance():
     """NH3: δρ = K/ρ in the direction of H, not K/|b| and K/|c| of its two components, one of which may be 0."""
     exact = substitution_structure(rigid_family(PYRAMID, ["", "1=15N", "2=2H"]))
-    found = {one.atom: one for one in exact.atoms}[2]
-    assert np.linalg.norm(found.errors_angstrom[:2]) == pytest.approx(0.0015 / 0.94, rel=1e-3)  # ρ from rigid moments
-    bond = next(one for one in exact.values if len(one.atoms) == 2)
+    computed = {atom.atom: atom for atom in exact.atoms}[2]
+    assert np.linalg.norm(computed.errors_angstrom[:2]) == pytest.approx(
+        0.0015 / 0.94, rel=1e-3
+    )  # ρ from rigid moments
+    bond = next(value for value in exact.values if len(value.atoms) == 2)
     assert bond.value == pytest.approx(np.hypot(0.94, 0.37), abs=1e-6)  # round-off over gaps
-    n, h = (np.abs(one.coordinates_angstrom[2]) for one in exact.atoms)
+    n, h = (np.abs(atom.coordinates_angstrom[2]) for atom in exact.atoms)
     along = 0.37 / bond.value * np.hypot(0.0015 / n, 0.0015 / h)
     assert bond.error == pytest.approx(np.hypot(along, 0.94 / bond.value * 0.0015 / 0.94), rel=1e-3)
     assert not exact.atoms[0].errors_angstrom[:2].any()  # N is on the axis
@@ -587,17 +595,17 @@ def test_a_spherical_parent(constants):
     if constants:
         keep = [constants, "BC", "BC"]
         rows = [
-            (one.name, isotopes, {name: one.constants_mhz[name] for name in names}, {})
-            for one, isotopes, names in zip(methane.species, ("", "2=2H", "1=13C"), keep, strict=True)
+            (component.name, isotopes, {name: component.constants_mhz[name] for name in names}, {})
+            for component, isotopes, names in zip(methane.species, ("", "2=2H", "1=13C"), keep, strict=True)
         ]
         methane = family(METHANE, rows)
-    found = substitution_structure(methane)
-    bond, angle = found.values
+    structure = substitution_structure(methane)
+    bond, angle = structure.values
     assert bond.value == pytest.approx(0.63 * np.sqrt(3), rel=1e-9)  # round-off
     assert bond.error == pytest.approx(0.0015 / bond.value, rel=1e-9)
     assert angle.value == pytest.approx(np.degrees(np.arccos(-1 / 3)), abs=1e-9)
     assert angle.error < 1e-9
-    assert np.isfinite(found.errors_angstrom).all()
+    assert np.isfinite(structure.errors_angstrom).all()
     with pytest.raises(ValueError, match="shape 'spherical' need"):  # of a lighter one I_a and I_b are across
         kraitchman([10.0] * 3, [np.nan, np.nan, 10.0], mass_u=18.0, change_u=-1.0, shape="spherical")
     lighter = rigid_family(METHANE.with_isotopes("2=2H,3=2H,4=2H,5=2H"), ["", "2=1H"])
@@ -629,8 +637,8 @@ def test_formaldehyde_from_published_constants(call, folder, b_mhz):
 
 
 def test_imaginary_coordinates_have_digits():
-    found = substitution_structure(shaken_family(OCS, ["", "C=13C"], part=0.0))
-    assert not found.notes
+    structure = substitution_structure(shaken_family(OCS, ["", "C=13C"], part=0.0))
+    assert not structure.notes
     small = Molecule(("O", "C", "S"), [[0, 0, 1.16], [0, 0, 0], [0, 0, -1.1601]])
     near = family(small, [("parent", "", {"B": 9000.0}, {}), ("13C", "C=13C", {"B": 9000.001}, {})])
     (note,) = substitution_structure(near).notes
@@ -679,11 +687,11 @@ def test_the_bound_of_bond_lengths_holds_for_a_loose_search(monkeypatch):
 
     full, bounds = fitted(1e-13), []
     for tolerance in (1e3, 1e-1, 1e-3):
-        found = fitted(tolerance)
-        pairs = zip(found.values, full.values, strict=True)
-        actual = max(abs(one.value - true.value) for one, true in pairs if one.unit == "Å")
-        budget = lengths_budget("r0", found.values, found, "equal")
+        computed = fitted(tolerance)
+        pairs = zip(computed.values, full.values, strict=True)
+        actual = max(abs(single.value - true.value) for single, true in pairs if single.unit == "Å")
+        budget = lengths_budget("r0", computed.values, computed, "equal")
         assert actual <= budget.numerical
         bounds.append(budget.truncation.value)
     assert bounds[0] > bounds[-1]
-    assert budget.data.value == max(one.error for one in found.values if one.unit == "Å")
+    assert budget.data.value == max(value.error for value in computed.values if value.unit == "Å")

@@ -21,8 +21,8 @@ PUBLISHED = {"O2": 205.148, "NO": 210.744, "NO2": 240.170}
 
 
 def gas(top, temperatures=(298.15,), **settings):
-    found = thermodynamic_functions(top, temperatures, pressure_bar=1.0, **settings)
-    return found.gas
+    functions = thermodynamic_functions(top, temperatures, pressure_bar=1.0, **settings)
+    return functions.gas
 
 
 @pytest.mark.parametrize(
@@ -37,8 +37,8 @@ def test_entropies_of_radicals(name, vibration, electronic, off):
     """They were 5.8 to 11.3 J/(mol K) too low without the degeneracy."""
     states = None if electronic is None else ElectronicStates.parse(electronic)
     vibrations = VibrationalStates.parse(vibration, harmonic=True)
-    found = gas(rotor.read(name), vibrations=vibrations, electronic=states)
-    assert found.entropy_j_per_mol_k[0] == pytest.approx(PUBLISHED[name], abs=off)
+    computed = gas(rotor.read(name), vibrations=vibrations, electronic=states)
+    assert computed.entropy_j_per_mol_k[0] == pytest.approx(PUBLISHED[name], abs=off)
     closed = gas(rotor.read(name), vibrations=vibrations, electronic=ElectronicStates())
     assert PUBLISHED[name] - closed.entropy_j_per_mol_k[0] > 5
 

@@ -39,10 +39,10 @@ def test_energies_up_to_a_bound_are_those_of_the_whole_block(constants, monkeypa
     whole = diagonalise(bands, vectors=False)[0]
     for place in (0, 1, 3, 40):
         below = 0.5 * (whole[place] + whole[place + 1])
-        found = lowest_energies(bands, below)
-        assert len(found) >= place + 1
+        computed = lowest_energies(bands, below)
+        assert len(computed) >= place + 1
         assert (
-            np.abs(found - whole[: len(found)]).max() < 1e-13 * np.abs(whole).max()
+            np.abs(computed - whole[: len(computed)]).max() < 1e-13 * np.abs(whole).max()
         )  # both to round-off of the largest
     assert len(lowest_energies(bands, whole[0] - 1e-3 * np.abs(whole).max())) in (0, len(whole))
 
@@ -53,10 +53,10 @@ def test_levels_left_out_of_a_sum_do_not_count(monkeypatch):
     monkeypatch.setattr(wang_matrix, "SMALL", 8)
     few = level_sums(top, [top.spin_weights], temperatures, 1e-9)[0]
     monkeypatch.setattr(sums_module, "HIGHEST_KT", 1e9)
-    every = level_sums(top, [top.spin_weights], temperatures, 1e-9)[0]
-    assert few.jmax.tolist() == every.jmax.tolist()
+    complete = level_sums(top, [top.spin_weights], temperatures, 1e-9)[0]
+    assert few.jmax.tolist() == complete.jmax.tolist()
     for name in ("q", "energy_over_rt", "cv_over_r"):
-        assert getattr(few, name) == pytest.approx(getattr(every, name), rel=1e-12)  # round-off of energies over kT
+        assert getattr(few, name) == pytest.approx(getattr(complete, name), rel=1e-12)  # round-off of energies over kT
 
 
 def test_a_table_of_q_sums_once_where_one_temperature_is_out_of_reach(monkeypatch):

@@ -53,10 +53,10 @@ def test_methane_with_its_weights():
 def test_error_is_below_what_was_asked(temperature):
     top = Top.from_constants("A=8572 B=3640 C=2790 MHz")
     exact = partition_function(top, temperature, 1e-13).q
-    for asked in (1e-3, 1e-6):
-        found = partition_function(top, temperature, asked)
-        assert abs(found.q / exact - 1) < asked
-        assert found.relative_error < asked
+    for goal in (1e-3, 1e-6):
+        partition = partition_function(top, temperature, goal)
+        assert abs(partition.q / exact - 1) < goal
+        assert partition.relative_error < goal
 
 
 def test_levels_count_from_the_lowest_that_exists():
@@ -73,12 +73,12 @@ QUARTIC_WATER = Constants(
 
 def test_levels_that_distortion_does_not_serve_are_counted_with_their_error():
     """Quartic water at 1000 K: within the stated error of the sum with all its constants; at 10,000 K there is no answer."""
-    found = partition_function(Top(QUARTIC_WATER), 1000.0, 1e-9)
+    partition = partition_function(Top(QUARTIC_WATER), 1000.0, 1e-9)
     better = partition_function(Top(rotor.read("water").constants), 1000.0)
-    assert 1e-9 < found.relative_error < 0.05
+    assert 1e-9 < partition.relative_error < 0.05
     # what the series leaves out of trusted levels (DeltaK K⁴ is 9 % of A K² at Ka = 9) is no part of the error
-    assert found.q == pytest.approx(better.q, rel=found.relative_error + 0.02)
-    assert f"relative error about {found.relative_error:.0e}" in found.source
+    assert partition.q == pytest.approx(better.q, rel=partition.relative_error + 0.02)
+    assert f"relative error about {partition.relative_error:.0e}" in partition.source
     with pytest.raises(ValueError, match=r"Q\(10000 K\): the levels that count lie beyond the reach"):
         partition_function(Top(QUARTIC_WATER), [300.0, 10_000.0])
 
@@ -86,11 +86,15 @@ def test_levels_that_distortion_does_not_serve_are_counted_with_their_error():
 def test_a_diving_series_does_not_stop_the_sum():
     """Ketene at 300 K: P_KKJ J² K⁸ turns the levels of J >= 75 upside down; a sum of better ones is met."""
     constants = rotor.read("CH2CO").constants
-    kept = {name: value for name, value in constants.values.items() if name not in ("PKKJ", "PK", "LKKJ", "LK", "LJK")}
-    tame = Top(Constants(reduction="S", representation="Ir", **kept), spin_weights=rotor.read("CH2CO").spin_weights)
-    found = partition_function(rotor.read("CH2CO"), 300.0)
-    assert found.relative_error < 1e-4
-    assert found.q == pytest.approx(partition_function(tame, 300.0).q, rel=2e-4)  # what octic terms move of K <= 12
+    low_order = {
+        name: value for name, value in constants.values.items() if name not in ("PKKJ", "PK", "LKKJ", "LK", "LJK")
+    }
+    tame = Top(
+        Constants(reduction="S", representation="Ir", **low_order), spin_weights=rotor.read("CH2CO").spin_weights
+    )
+    partition = partition_function(rotor.read("CH2CO"), 300.0)
+    assert partition.relative_error < 1e-4
+    assert partition.q == pytest.approx(partition_function(tame, 300.0).q, rel=2e-4)  # what octic terms move of K <= 12
 
 
 def test_a_rigid_top_is_trusted_however_asymmetric():
@@ -129,9 +133,9 @@ def test_the_expansion_is_within_its_error_of_the_sum(name):
     assert (sums.jmax > 0).all()
     below = sums.ground_k / temperatures
     q, energy, cv = limit.corrected(temperatures)
-    found = [q * np.exp(below), energy - below, cv]
+    computed = [q * np.exp(below), energy - below, cv]
     exact = [sums.q, sums.energy_over_rt, sums.cv_over_r]
-    off = np.abs(np.array(found) / np.array(exact) - 1)
+    off = np.abs(np.array(computed) / np.array(exact) - 1)
     assert (off < limit.errors(temperatures) + 1e-11).all(), (off, limit.errors(temperatures))  # round-off of the sums
     assert limit.errors(temperatures)[0, -1] < 1e-2  # and it says something
 
@@ -140,12 +144,12 @@ def test_a_long_sum_is_replaced_where_that_is_as_good():
     """A = 430, B = 57, C = 55 MHz at 300 K: J = 9000 or the expansion, which knows Q to 1e-12 and takes no time."""
     top = Top.from_constants("A=430 B=57 C=55 MHz")
     start = time.perf_counter()
-    found = partition_function(top, 300.0)
+    partition = partition_function(top, 300.0)
     assert time.perf_counter() - start < 1.0  # 0.01 s; 39 s before
-    assert found.jmax is None
-    assert found.source == "classical with corrections, relative error below 1e-06"
+    assert partition.jmax is None
+    assert partition.source == "classical with corrections, relative error below 1e-06"
     theta = np.array(top.rotational_constants_mhz) / units.MHZ_PER_K
-    assert found.q == pytest.approx(math.sqrt(math.pi * 300.0**3 / np.prod(theta)), rel=1e-5)  # a/T is 2e-6
+    assert partition.q == pytest.approx(math.sqrt(math.pi * 300.0**3 / np.prod(theta)), rel=1e-5)  # a/T is 2e-6
     start = time.perf_counter()
     heavy = partition_function(Top.from_constants("A=0.03 B=0.025 C=0.02 MHz"), [5.0, 300.0])  # ten thousand atoms
     assert time.perf_counter() - start < 1.0
@@ -190,11 +194,13 @@ def test_many_temperatures_at_once():
 def test_every_molecule_of_the_library_has_a_partition_function(name):
     """At 10, 100 and 300 K, to 1e-3 or better, and near the classical limit at 300 K."""
     top = rotor.read(name)
-    found = partition_function(top, [10.0, 100.0, 300.0])
-    assert (np.diff(found.q) > 0).all()
-    assert (found.relative_error < 1e-3).all()
+    partition = partition_function(top, [10.0, 100.0, 300.0])
+    assert (np.diff(partition.q) > 0).all()
+    assert (partition.relative_error < 1e-3).all()
     if name != "H2":  # Θ = 85 K
-        assert found.q[-1] == pytest.approx(classical_partition_function(top, 300.0), rel=0.05)  # Θ/3T of HCl, 2DkT/B²
+        assert partition.q[-1] == pytest.approx(
+            classical_partition_function(top, 300.0), rel=0.05
+        )  # Θ/3T of HCl, 2DkT/B²
 
 
 @pytest.mark.parametrize("temperature", [0.0, -1.0, math.nan])
@@ -241,8 +247,8 @@ def test_published_sums_of_linear_molecules(shared: Path, tag, text, column, tem
 def test_weights_that_alternate_with_j_do_not_stop_the_sum(constants, weights):
     """The sum goes on where the terms of neighbouring J rise and fall; its classical limit is near."""
     top = Top.from_constants(constants, spin_weights=weights)
-    found = partition_function(top, 300.0)
-    assert found.q == pytest.approx(classical_partition_function(top, 300.0), rel=0.01)  # quantum correction ~ B/kT
+    partition = partition_function(top, 300.0)
+    assert partition.q == pytest.approx(classical_partition_function(top, 300.0), rel=0.01)  # quantum correction ~ B/kT
 
 
 def test_a_looser_error_costs_no_sum_that_a_tighter_one_does_without():

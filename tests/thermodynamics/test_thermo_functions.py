@@ -65,16 +65,16 @@ def hydrogen_levels(parity=None):
 
 @pytest.mark.parametrize(("species", "parity"), [("equilibrium", None), ("para", 0), ("ortho", 1)])
 def test_hydrogen_is_the_sum_over_its_levels_in_150_digits(species, parity):
-    found = thermodynamic_functions(rotor.read("H2"), COLD_TO_HOT, species=species, relative_error=1e-13)
+    functions = thermodynamic_functions(rotor.read("H2"), COLD_TO_HOT, species=species, relative_error=1e-13)
     for i, t in enumerate(COLD_TO_HOT):
         ln_q, mean, cv = plain_functions(*hydrogen_levels(parity), t)
         # round-off of some 20 terms, and of E/kT = 34 of ortho's lowest level at 5 K; truncation where H2's series ends
-        within = 2e-14 + 2 * found.relative_error[i]
-        assert found.relative_error[i] < (1e-13 if t < 900 else 1e-5)
-        assert math.log(found.q_rot[i]) == pytest.approx(ln_q, rel=0, abs=within * max(1, abs(ln_q)))
-        assert found.energy_j_per_mol[i] == pytest.approx(GAS_CONSTANT * t * mean, rel=within, abs=0)
-        assert found.cv_over_r[i] == pytest.approx(cv, rel=50 * within, abs=0)  # a difference of squares
-        assert found.entropy_j_per_mol_k[i] == pytest.approx(GAS_CONSTANT * (ln_q + mean), rel=within, abs=1e-12)
+        within = 2e-14 + 2 * functions.relative_error[i]
+        assert functions.relative_error[i] < (1e-13 if t < 900 else 1e-5)
+        assert math.log(functions.q_rot[i]) == pytest.approx(ln_q, rel=0, abs=within * max(1, abs(ln_q)))
+        assert functions.energy_j_per_mol[i] == pytest.approx(GAS_CONSTANT * t * mean, rel=within, abs=0)
+        assert functions.cv_over_r[i] == pytest.approx(cv, rel=50 * within, abs=0)  # a difference of squares
+        assert functions.entropy_j_per_mol_k[i] == pytest.approx(GAS_CONSTANT * (ln_q + mean), rel=within, abs=1e-12)
 
 
 def test_frozen_hydrogen_is_a_mixture_of_gases():
@@ -100,11 +100,11 @@ def test_species_add_up_to_all_levels(name):
     names = species_names(top)[2:]
     assert len(names) > 1
     parts = [thermodynamic_functions(top, temperatures, species=s, relative_error=1e-12) for s in names]
-    q = np.array([one.q_rot for one in parts])
+    q = np.array([part.q_rot for part in parts])
     assert np.allclose(q.sum(axis=0), whole.q_rot, rtol=1e-11, atol=0)  # truncation of every sum
     x = q / q.sum(axis=0)
-    u = np.array([one.energy_j_per_mol for one in parts]) / (GAS_CONSTANT * temperatures)
-    cv = (x * [one.cv_over_r for one in parts]).sum(axis=0) + (x * u**2).sum(axis=0) - (x * u).sum(axis=0) ** 2
+    u = np.array([part.energy_j_per_mol for part in parts]) / (GAS_CONSTANT * temperatures)
+    cv = (x * [part.cv_over_r for part in parts]).sum(axis=0) + (x * u**2).sum(axis=0) - (x * u).sum(axis=0) ** 2
     assert np.allclose(
         (x * u).sum(axis=0), whole.energy_j_per_mol / (GAS_CONSTANT * temperatures), rtol=1e-10, atol=1e-14
     )
@@ -177,9 +177,9 @@ def test_linear_heat_capacity_meets_its_series():
     top = Top.from_constants("B=57635.968 MHz")
     for t in (50.0, 100.0, 200.0):
         x = 57635.968 / units.MHZ_PER_K / t
-        found = thermodynamic_functions(top, [t], relative_error=1e-13)
+        functions = thermodynamic_functions(top, [t], relative_error=1e-13)
         series = 1 + x**2 / 45 + 16 * x**3 / 945
-        assert found.cv_over_r[0] == pytest.approx(series, rel=0, abs=0.02 * x**4)  # the next term is of that order
+        assert functions.cv_over_r[0] == pytest.approx(series, rel=0, abs=0.02 * x**4)  # the next term is of that order
 
 
 @pytest.mark.parametrize(
@@ -272,13 +272,13 @@ def test_derivatives_of_ln_q(a, b_over_a, c_over_b, t_over_theta, rule):
 def test_a_plain_sum_over_levels_of_water():
     top = rotor.read("water")
     levels = solve_levels(top, 30)
-    found = thermodynamic_functions(top, [40.0, 300.0], relative_error=1e-8)
+    functions = thermodynamic_functions(top, [40.0, 300.0], relative_error=1e-8)
     for i, t in enumerate((40.0, 300.0)):
         there = levels.weight > 0
         x = (levels.energy_mhz[there] / units.MHZ_PER_K).tolist()
         _, mean, cv = plain_functions(x, levels.degeneracy[there].tolist(), t)
-        assert found.energy_j_per_mol[i] == pytest.approx(GAS_CONSTANT * t * mean, rel=1e-8)  # truncation asked for
-        assert found.cv_over_r[i] == pytest.approx(cv, rel=1e-8)
+        assert functions.energy_j_per_mol[i] == pytest.approx(GAS_CONSTANT * t * mean, rel=1e-8)  # truncation asked for
+        assert functions.cv_over_r[i] == pytest.approx(cv, rel=1e-8)
 
 
 @pytest.mark.parametrize("species", ["equilibrium", "normal", "para", "ortho"])
@@ -299,13 +299,13 @@ def test_entropy_is_the_integral_of_heat_capacity(species):
 def test_the_lowest_temperatures(name, species):
     """Down to 1e-6 K nothing overflows, S is R ln g of the lowest level, and C_v falls to nothing."""
     top = rotor.read(name)
-    for one in species_names(top)[2:] if species == "each" else ["equilibrium"]:
-        found = thermodynamic_functions(top, [1e-6, 1e-3], species=one)
-        degeneracy = math.exp(found.entropy_j_per_mol_k[1] / GAS_CONSTANT)
+    for species_name in species_names(top)[2:] if species == "each" else ["equilibrium"]:
+        functions = thermodynamic_functions(top, [1e-6, 1e-3], species=species_name)
+        degeneracy = math.exp(functions.entropy_j_per_mol_k[1] / GAS_CONSTANT)
         assert degeneracy == pytest.approx(round(degeneracy), rel=1e-6)  # E/kT of some 1e5 cancels in 16 digits
         assert round(degeneracy) >= 1
-        assert found.cv_over_r[0] == 0.0
-        assert np.isfinite([found.energy_j_per_mol, found.entropy_j_per_mol_k]).all()
+        assert functions.cv_over_r[0] == 0.0
+        assert np.isfinite([functions.energy_j_per_mol, functions.entropy_j_per_mol_k]).all()
 
 
 @pytest.mark.parametrize("text", ["B=60 cm-1", "A=27.9 B=14.5 C=9.3 cm-1", "A=5 B=0.4 cm-1", "B=5 C=5 A=5 cm-1"])
@@ -313,16 +313,16 @@ def test_errors_are_below_what_was_asked(text):
     top = Top.from_constants(text)
     temperatures = np.array([2.0, 10.0, 50.0, 300.0])
     exact = level_sums(top, [top.spin_weights], temperatures, 1e-13)[0]
-    for asked in (1e-3, 1e-6):
-        found = level_sums(top, [top.spin_weights], temperatures, asked)[0]
+    for goal in (1e-3, 1e-6):
+        computed = level_sums(top, [top.spin_weights], temperatures, goal)[0]
         for name, claimed in (
-            ("q", found.error_q),
-            ("energy_over_rt", found.error_energy),
-            ("cv_over_r", found.error_cv),
+            ("q", computed.error_q),
+            ("energy_over_rt", computed.error_energy),
+            ("cv_over_r", computed.error_cv),
         ):
-            off = np.abs(getattr(found, name) / getattr(exact, name) - 1)
+            off = np.abs(getattr(computed, name) / getattr(exact, name) - 1)
             assert (off <= claimed + 2e-13).all()  # round-off, and the error of what is called exact
-            assert (claimed < asked).all()
+            assert (claimed < goal).all()
 
 
 def test_many_temperatures_at_once_are_each_by_itself():
@@ -339,8 +339,8 @@ def test_species_with_gaps_are_summed_to_the_end():
     """Icosahedral, one species: levels at J = 0, 6, 10, 12, 15 ...; the classical limit is met nevertheless."""
     only_a = {"A": 1, "F1": 0, "F2": 0, "G": 0, "H": 0}
     top = Top.from_constants("A=1 B=1 C=1 GHz", spin_weights=only_a)
-    found = partition_function(top, 300.0, 1e-9)
-    assert found.q == pytest.approx(float(classical_limit(top).corrected([300.0])[0][0]), rel=1e-8)  # truncation
+    partition = partition_function(top, 300.0, 1e-9)
+    assert partition.q == pytest.approx(float(classical_limit(top).corrected([300.0])[0][0]), rel=1e-8)  # truncation
     cold = thermodynamic_functions(top, [0.2])  # 0, then J = 6 with 13: x = 42 Θ/T
     x = 42e3 / units.MHZ_PER_K / 0.2
     assert cold.cv_over_r[0] == pytest.approx(
@@ -361,8 +361,8 @@ def test_weights_of_the_split_levels_of_methane():
 def test_distortion_beyond_its_reach():
     """Water's polynomial serves to some J: beyond, the error grows with temperature, and at last there is no answer."""
     top = rotor.read("water")
-    found = thermodynamic_functions(top, [300.0, 1000.0, 1200.0])
-    assert found.relative_error[0] < 1e-5 < found.relative_error[1] < found.relative_error[2] < 0.1
+    functions = thermodynamic_functions(top, [300.0, 1000.0, 1200.0])
+    assert functions.relative_error[0] < 1e-5 < functions.relative_error[1] < functions.relative_error[2] < 0.1
     with pytest.raises(ValueError, match=r"Q\(5000 K\): the levels that count lie .* can be had up to 300 K"):
         thermodynamic_functions(top, [300.0, 5000.0])
     with pytest.raises(ValueError, match="beyond the reach of the distortion constants"):

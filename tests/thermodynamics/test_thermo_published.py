@@ -82,7 +82,7 @@ def test_enthalpies_of_janaf(molecule):
 )
 def test_species_of_hydrogen(species, until, within):
     """C_v/R of rotation and vibration, from the lowest temperature of each published function."""
-    entry = next(one for one in KNOWN["einstein"] if one["species"] == species)
+    entry = next(row for row in KNOWN["einstein"] if row["species"] == species)
     t = np.geomspace(entry["range_k"][0], until, 60)
     ours = MAKE.computed("H2", t, species)
     theirs = MAKE.published_cp(entry, "einstein", t) / GAS_CONSTANT - 2.5
@@ -93,7 +93,7 @@ def test_species_of_hydrogen(species, until, within):
 @pytest.mark.parametrize(("molecule", "within"), [("HCl", 0.02), ("CH4", 0.03)])
 def test_remembered_tables_meet_the_equation_of_the_webbook(molecule, within):
     """What was typed from memory is the same data: the equation is a fit to the table, good to 0.1 %."""
-    entry, equation = table_of(molecule), next(one for one in KNOWN["shomate"] if one["molecule"] == molecule)
+    entry, equation = table_of(molecule), next(row for row in KNOWN["shomate"] if row["molecule"] == molecule)
     t = np.array(entry["temperature_k"], dtype=float)
     theirs = MAKE.published_cp(equation, "shomate", t)
     assert np.count_nonzero(np.isfinite(theirs)) >= 9
@@ -103,8 +103,8 @@ def test_remembered_tables_meet_the_equation_of_the_webbook(molecule, within):
 @pytest.mark.parametrize("entry", KNOWN["partition"], ids=lambda entry: entry["molecule"])
 def test_cold_partition_functions_of_jpl(entry):
     """From 9.4 K: four decimals of log10 Q are printed, and rounded."""
-    found = MAKE.computed(entry["molecule"], entry["temperature_k"])
-    ours = np.log10(entry["spin_states"] * found.q_rot * found.q_vib)
+    computed = MAKE.computed(entry["molecule"], entry["temperature_k"])
+    ours = np.log10(entry["spin_states"] * computed.q_rot * computed.q_vib)
     assert np.abs(ours - entry["log10_q"]).max() < 1.5e-4
 
 
@@ -112,8 +112,8 @@ def test_cold_partition_functions_of_jpl(entry):
 @pytest.mark.parametrize(("tag", "molecule"), [("36001", "HCl"), ("18003", "H2O")])
 def test_they_are_those_of_the_file(shared: Path, tag, molecule):
     lines = (shared / "reference" / "partition" / "jpl_catdir.cat").read_text(encoding="latin-1").splitlines()
-    line = next(one for one in lines if one.split()[0] == tag)
-    entry = next(one for one in KNOWN["partition"] if one["molecule"] == molecule)
+    line = next(line for line in lines if line.split()[0] == tag)
+    entry = next(row for row in KNOWN["partition"] if row["molecule"] == molecule)
     assert [float(word) for word in line.split()[3:10]] == entry["log10_q"][::-1]
 
 
@@ -135,7 +135,7 @@ def test_the_picture_has_every_curve_and_point():
     figure = heat_capacity_figure(MAKE.panels())
     labels = [{text.get_text() for text in axes.get_legend().get_texts()} for axes in figure.axes]
     assert labels[0] == {"classical", "corrected", "para", "ortho", "normal", "equilibrium"}
-    assert all(found == {"classical", "corrected", "quantum", "with vibration", "published"} for found in labels[1:])
+    assert all(label == {"classical", "corrected", "quantum", "with vibration", "published"} for label in labels[1:])
     with pytest.raises(ValueError, match="needs a panel"):
         heat_capacity_figure([])
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):

@@ -42,17 +42,17 @@ def test_schottky_anomaly_of_a_species_that_is_left_in_j_1():
     """Of a rotor of odd J alone F = 0, 1, 2 of J = 1 are all that there is below 1 K: their closed form, exact in N to 1e-4 MHz."""
     top = rod(spin_weights={"even": 0, "odd": 1})
     temperatures = np.array([0.2, 1.0, 5.0, 100.0]) * abs(CHI) * KELVIN
-    found = functions(top, temperatures)
+    computed = functions(top, temperatures)
     energies = CHI * KELVIN * np.array([casimir(1, f) for f in (0, 1, 2)])
     x = (energies - energies.min())[:, None] / temperatures
     terms = np.array([1, 3, 5])[:, None] * np.exp(-x)
     q = terms.sum(axis=0)
     mean, square = (terms * x).sum(axis=0) / q, (terms * x * x).sum(axis=0) / q
-    assert found.q_rot == pytest.approx(q, rel=1e-4)  # second order in χ: χ²/B = 5e-4 MHz of 4.7
-    assert found.cv_over_r == pytest.approx(square - mean**2, rel=1e-3)
-    assert found.cv_over_r[0] > 0.3
-    assert found.hyperfine is not None
-    assert found.hyperfine["summed_up_to_k"] == temperatures[-1]
+    assert computed.q_rot == pytest.approx(q, rel=1e-4)  # second order in χ: χ²/B = 5e-4 MHz of 4.7
+    assert computed.cv_over_r == pytest.approx(square - mean**2, rel=1e-3)
+    assert computed.cv_over_r[0] > 0.3
+    assert computed.hyperfine is not None
+    assert computed.hyperfine["summed_up_to_k"] == temperatures[-1]
 
 
 @pytest.mark.parametrize("species", ["equilibrium", "normal", "ortho"])
@@ -89,19 +89,19 @@ def test_the_product_is_as_good_as_it_says():
 
 def test_split_levels_are_summed_where_the_factor_is_not_good_enough():
     top = rod("chi_aa(127I)=-1900 MHz")
-    found = spin_sums(top, [top.spin_weights], np.array([1.0, 20.0, 300.0, 900.0]), 1e-6, effects_of(top, True))
-    assert found.split.tolist() == [True, True, False, False]
+    computed = spin_sums(top, [top.spin_weights], np.array([1.0, 20.0, 300.0, 900.0]), 1e-6, effects_of(top, True))
+    assert computed.split.tolist() == [True, True, False, False]
     exact = level_sums(top, [top.spin_weights], [300.0], 1e-9, effects=effects_of(top, True))[0]
-    assert found.sums[0].q[2] == pytest.approx(float(exact.q[0]), rel=1e-6)
+    assert computed.sums[0].q[2] == pytest.approx(float(exact.q[0]), rel=1e-6)
 
 
 def test_an_electron_spin_counts_in_the_classical_limit_but_not_as_a_nuclear_function():
     top = rod("gamma(S)=100 MHz", "S=1/2")
-    found, plain = functions(top, [300.0]), thermodynamic_functions(top, [300.0])
-    assert found.q_rot == pytest.approx(2 * plain.q_rot, rel=1e-4)
-    assert found.q_rot_classical == pytest.approx(2 * plain.q_rot_classical, rel=1e-12)
-    assert found.spin_factor == plain.spin_factor
-    assert found.q_rot == pytest.approx(found.q_rot_corrected, rel=1e-4)
+    computed, plain = functions(top, [300.0]), thermodynamic_functions(top, [300.0])
+    assert computed.q_rot == pytest.approx(2 * plain.q_rot, rel=1e-4)
+    assert computed.q_rot_classical == pytest.approx(2 * plain.q_rot_classical, rel=1e-12)
+    assert computed.spin_factor == plain.spin_factor
+    assert computed.q_rot == pytest.approx(computed.q_rot_corrected, rel=1e-4)
 
 
 def test_species_of_nuclei_with_a_total_spin_are_refused():
@@ -118,18 +118,18 @@ def test_the_answer_counts_the_effects():
     assert split["hyperfine"] == {
         "spin_functions": 3, "splitting_mhz": pytest.approx(4.7), "summed_up_to_k": None, "method": "exact"
     }  # fmt: skip
-    assert "nuclear quadrupole" in {one["name"] for one in split["effects"] if one["present"]}
+    assert "nuclear quadrupole" in {effect["name"] for effect in split["effects"] if effect["present"]}
     plain = answer_thermo(ThermoRequest(replace(top, spin_constants=None), (1.0,))).facts()
     assert plain["hyperfine"] is None
 
 
 def test_constants_of_zero_leave_the_rotation_times_the_functions():
     """No splitting, a frozen rotation: 0/0 is no error, and nothing is summed."""
-    found = functions(rod("chi_aa(14N)=0 MHz"), [1e-3, 1e-2, 1.0])
-    assert found.q_rot[:2] == pytest.approx([3.0, 3.0], rel=1e-14)  # exp of a logarithm
-    assert found.hyperfine is not None
-    assert found.hyperfine["summed_up_to_k"] is None
-    assert np.isfinite(found.relative_error).all()
+    computed = functions(rod("chi_aa(14N)=0 MHz"), [1e-3, 1e-2, 1.0])
+    assert computed.q_rot[:2] == pytest.approx([3.0, 3.0], rel=1e-14)  # exp of a logarithm
+    assert computed.hyperfine is not None
+    assert computed.hyperfine["summed_up_to_k"] is None
+    assert np.isfinite(computed.relative_error).all()
 
 
 @pytest.mark.parametrize("temperature", [0.05, 1.0, 20.0])
@@ -167,8 +167,8 @@ def test_the_corrected_limit_counts_from_the_lowest_level():
     triplet = Top.from_constants(
         "B=43.1 GHz", spin_constants=SpinConstants.parse("lambda(S)=59500 gamma(S)=-250 MHz", "S=1")
     )
-    found = functions(triplet, [30.0, 300.0])
-    assert found.q_rot_corrected[1] == pytest.approx(found.q_rot[1], rel=1e-4)  # second order: (2λ/3kT)² = 4e-5
-    assert found.q_rot_corrected[0] == pytest.approx(found.q_rot[0], rel=5e-3)  # the same, 4e-3
+    computed = functions(triplet, [30.0, 300.0])
+    assert computed.q_rot_corrected[1] == pytest.approx(computed.q_rot[1], rel=1e-4)  # second order: (2λ/3kT)² = 4e-5
+    assert computed.q_rot_corrected[0] == pytest.approx(computed.q_rot[0], rel=5e-3)  # the same, 4e-3
     odd = thermodynamic_functions(rod(spin_weights={"even": 0, "odd": 1}), [300.0])
     assert odd.q_rot_corrected == pytest.approx(odd.q_rot, rel=1e-6)  # relative error asked of Q

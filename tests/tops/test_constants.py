@@ -44,10 +44,10 @@ def test_given_kind_wins_when_it_fits():
         Constants(B=3, kind="round")
 
 
-@pytest.mark.parametrize("given", [{"A": 5}, {"A": 5, "C": 3}, {"C": 3}, {"DJ": 1}])
-def test_incomplete_constants_are_refused(given):
+@pytest.mark.parametrize("text", [{"A": 5}, {"A": 5, "C": 3}, {"C": 3}, {"DJ": 1}])
+def test_incomplete_constants_are_refused(text):
     with pytest.raises(ValueError, match="give B"):
-        Constants(**given)
+        Constants(**text)
 
 
 def test_reduction_is_told_by_the_names():

@@ -77,9 +77,9 @@ def test_the_sum_beside_a_given_q_is_made_once(call, folder, monkeypatch):
 def test_the_note_on_q_estimates_further_states(name, kelvin):
     """A sum over the coupled states of a file took 18 s for the sake of this note; a tenth is enough."""
     answer = answer_spectrum(SpectrumRequest(rotor.read(name), temperature_k=kelvin, jmax=3, q=1.0))
-    expected, of_states = _expected_q(answer.lines)
+    expected, state_sums = _expected_q(answer.lines)
     summed = rotor.thermodynamics.partition_function(answer.lines.top, kelvin, effects=answer.lines.levels.effects).q
-    assert of_states
+    assert state_sums
     assert expected == pytest.approx(summed, rel=0.05)  # half of what the note is about
     assert "about" in answer.notes[-1]
 

@@ -40,9 +40,9 @@ def molecule(label: str) -> Molecule:
     return make_spin_weights.molecule_of(SPECIES[label])
 
 
-def of_g2(name: str, isotopes: str = "") -> Molecule:
-    one = Molecule(tuple(g2[name].get_chemical_symbols()), g2[name].positions)
-    return one.with_isotopes(isotopes) if isotopes else one
+def g2_molecule(name: str, isotopes: str = "") -> Molecule:
+    isolated = Molecule(tuple(g2[name].get_chemical_symbols()), g2[name].positions)
+    return isolated.with_isotopes(isotopes) if isotopes else isolated
 
 
 # Ratios that textbooks give (Bunker and Jensen, chapter 8; Herzberg, Molecular Spectra and Molecular Structure II,
@@ -144,15 +144,15 @@ def moments(symmetry) -> np.ndarray:
     return np.round(symmetry.moments_u_angstrom2, 3)
 
 
-def brute_force_weights(one: Molecule, jmax: int, electronic: str = "even") -> list[tuple[float, int, int, int]]:
+def brute_force_weights(molecule_: Molecule, jmax: int, electronic: str = "even") -> list[tuple[float, int, int, int]]:
     """(energy, J, number of components, number of allowed spin-rotation functions) of each rigid-rotor level.
 
     Rotational functions of one energy times all products of spin functions; those kept by the projector on what
     every rotation with its permutation leaves alike are counted by its rank.
     """
-    symmetry = symmetry_of(one)
-    spins = [nucleus.spin for nucleus in one.nuclei if nucleus.spin]
-    atoms = [atom for atom, nucleus in enumerate(one.nuclei) if nucleus.spin]
+    symmetry = symmetry_of(molecule_)
+    spins = [nucleus.spin for nucleus in molecule_.nuclei if nucleus.spin]
+    atoms = [atom for atom, nucleus in enumerate(molecule_.nuclei) if nucleus.spin]
     rank_of = {atom: rank for rank, atom in enumerate(atoms)}
     constants = 1 / np.maximum(moments(symmetry), 1e-9)
     turns = []
@@ -170,9 +170,14 @@ def brute_force_weights(one: Molecule, jmax: int, electronic: str = "even") -> l
         else:
             energies, vectors = np.linalg.eigh(sum(c * p @ p for c, p in zip(constants, components, strict=True)))
         for level in np.split(np.arange(len(energies)), np.flatnonzero(np.diff(energies) > 1e-11) + 1):
-            own = vectors[:, level]
+            eigenvectors = vectors[:, level]
             projector = sum(
-                np.kron(own.conj().T @ expm(-1j * np.einsum("i,ijk->jk", vector, np.array(components))) @ own, spin)
+                np.kron(
+                    eigenvectors.conj().T
+                    @ expm(-1j * np.einsum("i,ijk->jk", vector, np.array(components)))
+                    @ eigenvectors,
+                    spin,
+                )
                 for vector, spin in turns
             ) / len(turns)
             assert np.allclose(projector @ projector, projector, atol=1e-6)  # g2's rounded axes are good to 1e-6
@@ -180,9 +185,9 @@ def brute_force_weights(one: Molecule, jmax: int, electronic: str = "even") -> l
     return levels
 
 
-def predicted(one: Molecule, levels, electronic: str = "even") -> list[int]:
+def predicted(molecule_: Molecule, levels, electronic: str = "even") -> list[int]:
     """What the weights say of the same levels: asymmetric in order of energy, symmetric by K, spherical by J."""
-    weights, symmetry = weights_of(one, electronic=electronic), symmetry_of(one)
+    weights, symmetry = weights_of(molecule_, electronic=electronic), symmetry_of(molecule_)
     if symmetry.linear:
         return [int(weights.of_j(j)) for _, j, _, _ in levels]
     kinds = len(set(moments(symmetry).tolist()))
@@ -241,10 +246,10 @@ def test_against_the_sum_over_all_spin_functions(label, jmax):
 @given(label=st.sampled_from([s for s in SPECIES if not SPECIES[s].inversion and "C60" not in s]), j=st.integers(0, 40))
 def test_all_levels_of_one_j_hold_the_right_number_of_spin_functions(label, j):
     """Σ over levels of the weight = Σ_R χ_J(R) f(R) / Σ 1, whatever the rule, up to the divisor taken out."""
-    species, one = SPECIES[label], molecule(label)
-    symmetry = symmetry_of(one)
-    f = spin_characters(symmetry, [nucleus.spin for nucleus in one.nuclei], species.electronic)
-    weights = weights_of(one, electronic=species.electronic)
+    species, sample = SPECIES[label], molecule(label)
+    symmetry = symmetry_of(sample)
+    f = spin_characters(symmetry, [nucleus.spin for nucleus in sample.nuclei], species.electronic)
+    weights = weights_of(sample, electronic=species.electronic)
 
     def allowed(jj):
         if symmetry.linear:
@@ -282,14 +287,16 @@ def test_irreps_fill_every_j(group, dimensions):
 )
 def test_rotation_shift_and_order_of_atoms_change_no_weight(label, seed):
     rng = np.random.default_rng(seed)
-    one, order = molecule(label), rng.permutation(len(molecule(label).symbols))
+    sample, order = molecule(label), rng.permutation(len(molecule(label).symbols))
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    moved = one.moved(turn * np.linalg.det(turn), rng.normal(size=3))
+    moved = sample.moved(turn * np.linalg.det(turn), rng.normal(size=3))
     mixed = Molecule(
-        tuple(one.symbols[i] for i in order), moved.positions_angstrom[order], tuple(one.mass_numbers[i] for i in order)
+        tuple(sample.symbols[i] for i in order),
+        moved.positions_angstrom[order],
+        tuple(sample.mass_numbers[i] for i in order),
     )
     inversion = SPECIES[label].inversion
-    assert weights_of(mixed, inversion=inversion) == weights_of(one, inversion=inversion)
+    assert weights_of(mixed, inversion=inversion) == weights_of(sample, inversion=inversion)
 
 
 # An accidental symmetric top keeps its asymmetric-top weights (and the same for a sphere)
@@ -323,12 +330,12 @@ def test_accidental_sphere_keeps_its_weights():
 
 def test_weights_follow_the_axis_that_the_isotopes_leave():
     """C2H4: D2 to C2(a) in CH2CD2, to nothing in C2H3D; hard case 13."""
-    one = of_g2("C2H4")
-    hydrogens = [i + 1 for i, symbol in enumerate(one.symbols) if symbol == "H"]
-    places = one.positions_angstrom[np.array(hydrogens) - 1]
+    ethene = g2_molecule("C2H4")
+    hydrogens = [i + 1 for i, symbol in enumerate(ethene.symbols) if symbol == "H"]
+    places = ethene.positions_angstrom[np.array(hydrogens) - 1]
     geminal = hydrogens[int(np.argsort(np.linalg.norm(places - places[0], axis=1))[1])]
-    assert weights_of(one.with_isotopes({hydrogens[0]: "2H"})).rule == "none"
-    pair = weights_of(one.with_isotopes({hydrogens[0]: "2H", geminal: "2H"})).to_mapping()
+    assert weights_of(ethene.with_isotopes({hydrogens[0]: "2H"})).rule == "none"
+    pair = weights_of(ethene.with_isotopes({hydrogens[0]: "2H", geminal: "2H"})).to_mapping()
     assert pair == {"ee": 5, "eo": 5, "oe": 7, "oo": 7}  # f = 2²·3² = 36 and -2·3 = -6 about a: 15 and 21
 
 
@@ -363,15 +370,15 @@ def geometry(name: str, isotopes: str) -> Molecule:
     if name == "glycolaldehyde":  # g2 lacks it; the library has a geometry made from SMILES
         return rotor.read(name).molecule
     if name not in TYPED:
-        return of_g2(name, isotopes)
+        return g2_molecule(name, isotopes)
     symbols, positions = TYPED[name]
-    one = Molecule(tuple(symbols), positions)
-    return one.with_isotopes(isotopes) if isotopes else one
+    sample = Molecule(tuple(symbols), positions)
+    return sample.with_isotopes(isotopes) if isotopes else sample
 
 
-def weight_per_level(one: Molecule, quanta) -> np.ndarray:
+def weight_per_level(molecule_: Molecule, quanta) -> np.ndarray:
     """Predicted weight, both signs of K together, of levels with the quanta of a catalogue."""
-    weights, j = weights_of(one), quanta[:, 0].astype(int)
+    weights, j = weights_of(molecule_), quanta[:, 0].astype(int)
     if weights.rule == "KaKc":
         parity = [f"{'eo'[ka % 2]}{'eo'[kc % 2]}" for ka, kc in quanta[:, 1:3].tolist()]
         return np.array([weights.of_ka_kc(species) for species in parity])
@@ -424,20 +431,20 @@ def test_rows_of_characters():
 
 def test_mistakes_are_told():
     water, ammonia = molecule("H2O"), molecule("NH3")
-    found, ethylene = symmetry_of(water), symmetry_of(molecule("C2H4"))
+    computed, ethylene = symmetry_of(water), symmetry_of(molecule("C2H4"))
     for call, message in [
-        (lambda: spin_weights(found, [0, 0.5]), "2 spins for 3 nuclei"),
-        (lambda: spin_weights(found, [0, 0.4, 0.4]), "multiples of 1/2"),
-        (lambda: spin_weights(found, [0, 0.5, 1]), "give both the same"),
-        (lambda: spin_weights(found, [0, 0.5, 0.5], "Sigma"), "'even', 'odd' for C2"),
+        (lambda: spin_weights(computed, [0, 0.5]), "2 spins for 3 nuclei"),
+        (lambda: spin_weights(computed, [0, 0.4, 0.4]), "multiples of 1/2"),
+        (lambda: spin_weights(computed, [0, 0.5, 1]), "give both the same"),
+        (lambda: spin_weights(computed, [0, 0.5, 0.5], "Sigma"), "'even', 'odd' for C2"),
         (lambda: spin_weights(ethylene, [0, 0, *[0.5] * 4], "odd"), "4 characters"),
         (lambda: spin_weights(ethylene, [0, 0, *[0.5] * 4], [1, -1, -1, -1]), "multiply like the rotations"),
         (lambda: weights_of(ammonia, inversion="up"), "'symmetric' or 'antisymmetric'"),
         (lambda: weights_of(ammonia, inversion="symmetric", electronic="odd"), "leave `electronic`"),
         (lambda: weights_of(water, inversion="symmetric"), "flat within"),
-        (lambda: weights_of(of_g2("C2H6"), inversion="symmetric"), "no plane to invert"),
-        (lambda: weights_of(of_g2("CH4"), inversion="symmetric"), "no plane to invert"),
-        (lambda: weights_of(of_g2("H2CCl2"), inversion="symmetric"), "nuclei meet"),
+        (lambda: weights_of(g2_molecule("C2H6"), inversion="symmetric"), "no plane to invert"),
+        (lambda: weights_of(g2_molecule("CH4"), inversion="symmetric"), "no plane to invert"),
+        (lambda: weights_of(g2_molecule("H2CCl2"), inversion="symmetric"), "nuclei meet"),
     ]:
         with pytest.raises(ValueError, match=message):
             call()

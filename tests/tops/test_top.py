@@ -57,12 +57,12 @@ def shaken(molecule: Molecule, seed: int) -> Molecule:
 @given(st.sampled_from([WATER, FORMIC, CHIRAL, AMMONIA, METHANE]), st.integers(0, 2**32 - 1))
 @settings(max_examples=60, deadline=None)
 def test_orientation_place_and_order_change_nothing(molecule, seed):
-    one, other = Top.from_molecule(molecule), Top.from_molecule(shaken(molecule, seed))
-    assert other.kind == one.kind
-    assert other.rotational_constants_mhz == pytest.approx(one.rotational_constants_mhz, rel=1e-12)  # round-off
-    if one.dipole_abc_debye is not None:
-        assert other.dipole_abc_debye == pytest.approx(one.dipole_abc_debye, abs=1e-9)
-    assert same_cloud(in_frame(one), in_frame(other))
+    first, other = Top.from_molecule(molecule), Top.from_molecule(shaken(molecule, seed))
+    assert other.kind == first.kind
+    assert other.rotational_constants_mhz == pytest.approx(first.rotational_constants_mhz, rel=1e-12)  # round-off
+    if first.dipole_abc_debye is not None:
+        assert other.dipole_abc_debye == pytest.approx(first.dipole_abc_debye, abs=1e-9)
+    assert same_cloud(in_frame(first), in_frame(other))
 
 
 def in_frame(top: Top) -> np.ndarray:
@@ -71,10 +71,10 @@ def in_frame(top: Top) -> np.ndarray:
     return np.column_stack([top.molecule.masses_u, positions])
 
 
-def same_cloud(one: np.ndarray, other: np.ndarray) -> bool:
+def same_cloud(cloud: np.ndarray, other: np.ndarray) -> bool:
     """Whether every atom of one has its own partner in the other, within what candidates of a frame may tie by."""
-    distances = np.abs(one[:, None, :] - other[None, :, :]).max(axis=2)
-    return bool((distances.min(axis=1) < 1e-4).all() and len(set(distances.argmin(axis=1))) == len(one))
+    distances = np.abs(cloud[:, None, :] - other[None, :, :]).max(axis=2)
+    return bool((distances.min(axis=1) < 1e-4).all() and len(set(distances.argmin(axis=1))) == len(cloud))
 
 
 def test_water():
@@ -167,17 +167,17 @@ def test_polarizability_turns_along(seed):
     turned = replace(WATER, polarizability_angstrom3=alpha).moved(
         Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
     )
-    found = np.array(Top.from_molecule(turned).polarizability_abc_angstrom3)
-    assert found == pytest.approx(np.diag([1.528, 1.468, 1.415]), abs=1e-12)  # round-off of a turn
-    assert not found[~np.eye(3, dtype=bool)].any()
+    computed = np.array(Top.from_molecule(turned).polarizability_abc_angstrom3)
+    assert computed == pytest.approx(np.diag([1.528, 1.468, 1.415]), abs=1e-12)  # round-off of a turn
+    assert not computed[~np.eye(3, dtype=bool)].any()
 
 
 @pytest.mark.parametrize("symbols", [("N", "N"), ("C", "O")])
 def test_noise_in_a_polarizability_that_symmetry_forbids_is_left_out(symbols):
     """A rod: α∥ along a, the mean of the others across; what is more than 0.001 of the whole is refused."""
     rod = Molecule(symbols, [[0, 0, 0], [0, 0, 1.1]])
-    found = Top.from_molecule(replace(rod, polarizability_angstrom3=np.diag([1.5, 1.5001, 2.2])))
-    assert np.diag(found.polarizability_abc_angstrom3) == pytest.approx([2.2, 1.50005, 1.50005], abs=1e-12)
+    computed = Top.from_molecule(replace(rod, polarizability_angstrom3=np.diag([1.5, 1.5001, 2.2])))
+    assert np.diag(computed.polarizability_abc_angstrom3) == pytest.approx([2.2, 1.50005, 1.50005], abs=1e-12)
     with pytest.raises(ValueError, match=r"not what (D∞h|C∞v) leaves alike; the part that it does is 2.2, 0, 0, 1.55"):
         Top.from_molecule(replace(rod, polarizability_angstrom3=np.diag([1.5, 1.6, 2.2])))
 
@@ -260,7 +260,7 @@ def test_spin_weights_tell_which_dipole_there_is(axis):
         {"ee": 1, "eo": 3, "oe": 1, "oo": 3},
         {"ee": 7, "eo": 3, "oe": 3, "oo": 3},
     ):
-        forbidden = any(weights[one] != weights[other] for one, other in pairs)
+        forbidden = any(weights[first] != weights[other] for first, other in pairs)
         if forbidden:
             with pytest.raises(ValueError, match=f"has none along {axis}"):
                 Top.from_constants("A=9 B=6 C=4 GHz", dipole_abc_debye=dipole, spin_weights=weights)

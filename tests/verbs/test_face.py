@@ -63,8 +63,8 @@ def test_a_text_with_a_unit_is_a_number():
     assert rotor.levels("CO", max_energy_mhz="50 cm-1").request.max_energy_mhz == pytest.approx(50 * 29979.2458)
     field = rotor.stark("OCS", fields_kv_per_cm="0:10kV/cm:3", j_highest=0).table.fields
     assert field.tolist() == [0.0, 5.0, 10.0]
-    given = rotor.stark("OCS", fields_kv_per_cm=[0.0, 5.0, 10.0], j_highest=0).table
-    assert (given.fields == field).all()
+    table = rotor.stark("OCS", fields_kv_per_cm=[0.0, 5.0, 10.0], j_highest=0).table
+    assert (table.fields == field).all()
 
 
 def test_wrong_arguments_are_named():
@@ -123,10 +123,10 @@ def imports_of(path):
     if path.suffix == ".ipynb":
         text = "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] == "code")
     pattern = r"^[ \t>]*(?:from (rotor[\w.]*) import (?:\(([^)]*)\)|([^\n(#]+))|import (rotor[\w.]*))"
-    for found in re.finditer(pattern, text, re.MULTILINE):
-        listed = re.sub("#.*", "", found[2] or found[3] or "")
+    for computed in re.finditer(pattern, text, re.MULTILINE):
+        listed = re.sub("#.*", "", computed[2] or computed[3] or "")
         names = [name.split(" as ")[0].strip() for name in listed.split(",")]
-        yield found[1] or found[4], [name for name in names if name]
+        yield computed[1] or computed[4], [name for name in names if name]
 
 
 def documents(root):

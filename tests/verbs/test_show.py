@@ -22,7 +22,7 @@ CO = "B=57635.968 D=0.1835 MHz"
 
 
 @pytest.fixture(scope="module")
-def things() -> dict[str, object]:
+def results() -> dict[str, object]:
     top, lines = rotor.read("water"), rotor.api.line_list("CO", jmax=8)
     gas = rotor.api.answer_gas(rotor.api.GasRequest(rotor.read("OCS"), 2000, times_ps=(0.0, 0.1, 0.2)))
     return {
@@ -58,8 +58,8 @@ KINDS = (
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_figure_of_everything(things, kind, tmp_path):
-    figure = rotor.plot(things[kind], tmp_path / "a.png")
+def test_a_figure_of_everything(results, kind, tmp_path):
+    figure = rotor.plot(results[kind], tmp_path / "a.png")
     assert isinstance(figure, Figure)
     axes = figure.axes[0]
     assert (
@@ -73,14 +73,14 @@ def test_a_figure_of_everything(things, kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_everything_has_a_short_text(things, kind):
-    text = repr(things[kind])
+def test_everything_has_a_short_text(results, kind):
+    text = repr(results[kind])
     assert 1 <= len(text.splitlines()) <= 10
     assert len(text) < 1500
     if kind != "motion":
-        assert "<" in things[kind]._repr_html_()
+        assert "<" in results[kind]._repr_html_()
     if kind.endswith("answer"):
-        assert html.escape(things[kind].errors.line()) in things[kind]._repr_html_()
+        assert html.escape(results[kind].errors.line()) in results[kind]._repr_html_()
 
 
 def test_a_notebook_shows_how_far_a_result_can_be_trusted():

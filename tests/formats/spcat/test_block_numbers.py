@@ -21,7 +21,7 @@ LONG = (
     "pyridine_oblate_s",
     "two_state_coriolis",
 )
-EVERY = [
+OPTION_CARDS = [
     pytest.param(path.parent.name, marks=[pytest.mark.slow] if path.parent.name in LONG else [])
     for path in sorted(SAMPLES.glob("*/sample.egy"))
 ]
@@ -29,11 +29,11 @@ EVERY = [
 
 def numbers(levels) -> list[tuple[int, ...]]:
     """Block, place, degeneracy and quantum numbers of every level."""
-    found = [levels.level(row) for row in range(len(levels))]
-    return [(level.block, level.rank, level.degeneracy, *level.quanta) for level in found]
+    computed = [levels.level(row) for row in range(len(levels))]
+    return [(level.block, level.rank, level.degeneracy, *level.quanta) for level in computed]
 
 
-@pytest.mark.parametrize("case", EVERY)
+@pytest.mark.parametrize("case", OPTION_CARDS)
 def test_samples_of_every_reference_case(case):
     ours = levels_of_file(SAMPLES / case / f"{case}.int", as_spcat=True)
     reference = numbers(read_egy(SAMPLES / case / "sample.egy"))
@@ -42,7 +42,7 @@ def test_samples_of_every_reference_case(case):
     assert len({block for block, *_ in reference}) > 5
 
 
-def made(options: str, parameters: str, fend: int = 2):
+def levels_of(options: str, parameters: str, fend: int = 2):
     """Levels of a file of A, B, C and more, J from 0 on."""
     file = read_par(f"a file\n9 1 1 0\n{options}\n10099 9000 0\n20099 3000 0\n30099 2500 0\n{parameters}".encode())
     light = read_int(f"a file\n1 91 1000 0 {fend} -20 -20 9999 300\n1 1.0\n".encode())
@@ -52,19 +52,19 @@ def made(options: str, parameters: str, fend: int = 2):
 def test_states_that_are_connected_share_blocks_and_others_do_not():
     """Two states have 8 blocks of each J, a coupling by Na 4; by Nb and Na together 2."""
     options = "a 1 2 0 20 0 1 1 1 0 1 0"
-    assert numbers(made(options, "11 1000 0\n", 0)) == [(1, 1, 1, 0, 0, 0, 0), (5, 1, 1, 0, 0, 0, 1)]
-    by_na = numbers(made(options, "11 1000 0\n200001 5 0\n", 1))
+    assert numbers(levels_of(options, "11 1000 0\n", 0)) == [(1, 1, 1, 0, 0, 0, 0), (5, 1, 1, 0, 0, 0, 1)]
+    by_na = numbers(levels_of(options, "11 1000 0\n200001 5 0\n", 1))
     assert (7, 1, 3, 1, 1, 1, 0) in by_na  # with 1 1 0 of the other state in one block, the later species first
     assert {block for block, *_ in by_na} == {1, 4, 5, 6, 7, 8}
-    by_both = numbers(made("a 1 2 0 20 0 1 1 1 0 1 0", "11 1000 0\n200001 5 0\n400001 5 0\n", 1))
+    by_both = numbers(levels_of("a 1 2 0 20 0 1 1 1 0 1 0", "11 1000 0\n200001 5 0\n400001 5 0\n", 1))
     assert max(block for block, *_ in by_both) == 4
 
 
 def test_patterns_of_spins_stand_in_order_of_n():
     """I = 1: of F = 1 and species A the levels of N = 0 and 2, the places of Ka = 2 after those of Ka = 0."""
-    found = numbers(made("a 3 1 0 20 0 1 1 1 0 1 0", "110010099 2 0\n", 1))
-    own = [row for row in found if row[0] == 5]
-    assert [(row[1], *row[3:]) for row in own] == [(1, 0, 0, 0, 1), (2, 2, 0, 2, 1), (3, 2, 2, 0, 1)]
+    computed = numbers(levels_of("a 3 1 0 20 0 1 1 1 0 1 0", "110010099 2 0\n", 1))
+    in_state = [row for row in computed if row[0] == 5]
+    assert [(row[1], *row[3:]) for row in in_state] == [(1, 0, 0, 0, 1), (2, 2, 0, 2, 1), (3, 2, 2, 0, 1)]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_file_of_transition_dipoles_is_refused_by_name():
     notes = [
         predict(file, read_int(f"a\n{flags} 91 1000 0 2 -20 -20 9999 300\n1 1.0\n".encode())).notes for flags in (11, 1)
     ]
-    assert ["a .str file" in " ".join(one) for one in notes] == [True, False]
+    assert ["a .str file" in " ".join(note) for note in notes] == [True, False]
 
 
 def test_l_doubled_states_count_by_energy():

@@ -21,9 +21,9 @@ CASES = ("h2co", "h2o_octic", "pyridine_oblate_s", "ch3cn", "so2", "ocs")
 
 
 def file_of(*parameters: tuple[int, float], options: Options | None = None) -> ParameterFile:
-    made = read_par(b"t\n0\na 1 1 0 20\n")
+    file = read_par(b"t\n0\na 1 1 0 20\n")
     lines = tuple(Parameter(code, value) for code, value in parameters)
-    return ParameterFile("t", made.header, (options or made.options[0],), lines)
+    return ParameterFile("t", file.header, (options or file.options[0],), lines)
 
 
 # Digits
@@ -248,8 +248,8 @@ def test_weights_that_are_not_computed_yet_are_refused(options, words):
 
 def test_weights_of_a_threefold_axis_with_one_class_missing():
     """NH3 of one inversion state: K = 0 has odd J; half of the E levels are there, at twice their weight (SPFIT's documentation)."""
-    found = model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2)).to_mapping()
-    assert found == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
+    computed = model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2)).to_mapping()
+    assert computed == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
     with pytest.raises(ValueError, match="IAX = 6 of an asymmetric top"):
         model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2), False)
 
@@ -262,8 +262,8 @@ def test_a_top_goes_to_files_and_comes_back(case):
     file, intensities = read_par(SAMPLES / f"{case}.var"), read_int(SAMPLES / f"{case}.int")
     top = model.top_of(file, intensities)
     again = read_par(format_par(model.parameter_file(top, file.options[0].knmax)))
-    given = {p.code: p.value for p in file.parameters}
-    assert {p.code: p.value for p in again.parameters} == pytest.approx(given, rel=4e-16)  # A - B: one rounding
+    values = {p.code: p.value for p in file.parameters}
+    assert {p.code: p.value for p in again.parameters} == pytest.approx(values, rel=4e-16)  # A - B: one rounding
     back = model.top_of(again, model.intensity_file(top, intensities.request))
     assert back.dipole_abc_debye == top.dipole_abc_debye
     assert back.spin_weights == top.spin_weights
@@ -281,8 +281,8 @@ def test_a_top_goes_to_files_and_comes_back(case):
 @pytest.mark.parametrize("representation", ["Ir", "IIIl"])
 def test_weights_go_to_an_option_line_and_come_back(weights, representation):
     constants = Constants(A=3.0, B=2.0, C=1.0, representation=representation)
-    made = SpinWeights.from_mapping(weights)
-    assert model.weights_of(model.options_of(constants, made, 10)) == made
+    spin_weights = SpinWeights.from_mapping(weights)
+    assert model.weights_of(model.options_of(constants, spin_weights, 10)) == spin_weights
 
 
 @pytest.mark.parametrize(
@@ -294,8 +294,8 @@ def test_weights_go_to_an_option_line_and_come_back(weights, representation):
     ],
 )
 def test_weights_of_symmetric_and_linear_tops_come_back(constants, weights):
-    made = SpinWeights.from_mapping(weights)
-    assert model.weights_of(model.options_of(constants, made, 10)) == made
+    spin_weights = SpinWeights.from_mapping(weights)
+    assert model.weights_of(model.options_of(constants, spin_weights, 10)) == spin_weights
 
 
 def test_what_the_files_cannot_say_is_refused():
@@ -322,7 +322,7 @@ def test_the_symmetry_axis_is_where_the_kind_says():
 def test_mutated_parameter_files_make_a_top_or_a_refusal():
     rng = np.random.default_rng(5)
     texts = [(SAMPLES / f"{case}.var").read_bytes() for case in CASES]
-    made = refused = 0
+    accepted = refused = 0
     for i in range(1_500):
         data = bytearray(texts[i % len(texts)])
         start = data.index(b"\n", data.index(b"\n") + 1)  # option line and parameters
@@ -334,8 +334,8 @@ def test_mutated_parameter_files_make_a_top_or_a_refusal():
             refused += 1
         else:
             assert model.parameter_file(top, 10).parameters
-            made += 1
-    assert min(made, refused) > 300  # both outcomes are really tried
+            accepted += 1
+    assert min(accepted, refused) > 300  # both outcomes are really tried
 
 
 def test_spelled_terms_are_written_by_their_code_and_others_refused():

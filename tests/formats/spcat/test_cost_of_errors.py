@@ -22,15 +22,15 @@ SPAN = 6  # F above FBGN
 
 def _files(name: str, span: int = SPAN):
     folder = KINDS / name if (KINDS / name).is_dir() else KINDS.parent / name
-    par, asked = read_par(folder / f"{name}.var"), read_int(folder / f"{name}.int")
-    first = asked.request.fbgn
-    return par, replace(asked, request=replace(asked.request, fend=min(asked.request.fend, first + span)))
+    par, request = read_par(folder / f"{name}.var"), read_int(folder / f"{name}.int")
+    first = request.request.fbgn
+    return par, replace(request, request=replace(request.request, fend=min(request.request.fend, first + span)))
 
 
-def _calls(par, asked) -> int:
+def _calls(par, request) -> int:
     profile = cProfile.Profile()
     profile.enable()
-    predict(par, asked)
+    predict(par, request)
     profile.disable()
     return int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
 
@@ -38,18 +38,18 @@ def _calls(par, asked) -> int:
 @pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad"])
 def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
     """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block."""
-    par, asked = _files(name)
+    par, request = _files(name)
     held = replace(par, parameters=tuple(replace(p, error=1e-37) for p in par.parameters), rest="")
     par = replace(par, parameters=tuple(replace(p, error=max(p.error, abs(p.value) * 1e-4)) for p in par.parameters))
     for file in (held, par):  # what is made once for a process is there
-        predict(file, asked)
-    assert _calls(par, asked) < 2.0 * _calls(held, asked)
+        predict(file, request)
+    assert _calls(par, request) < 2.0 * _calls(held, request)
 
 
 def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
     """CH3CN with ¹⁴N to F = 30, in calls of functions a level; 146 where every block was solved by itself."""
-    par, asked = _files("ch3cn_quad", span=30)
-    group = groups_of(par, asked)[0]
+    par, request = _files("ch3cn_quad", span=30)
+    group = groups_of(par, request)[0]
     group.levels((0, 60))
     profile = cProfile.Profile()
     profile.enable()
@@ -74,8 +74,8 @@ def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
 )
 def test_derivatives_are_differences(name: str):
     """∂E/∂c of every parameter beside central differences of solved levels, for each way that a file is solved."""
-    par, asked = _files(name)
-    for group in groups_of(par, asked):
+    par, request = _files(name)
+    for group in groups_of(par, request):
         twice_f = (2 * SPAN + sum(group.spins) % 2,) * 2
         levels, names = group.levels(twice_f), tuple(group.effect.parameters(group.top))
         slopes = level_derivatives(group.top, levels, names)

@@ -37,20 +37,20 @@ def _case(folder: Path) -> Case:
 
 
 def _levels(case: Case, block: Block) -> dict[tuple[int, ...], list[tuple[float, int]]]:
-    found = defaultdict(list)
+    groups = defaultdict(list)
     for quanta, energy, weight in zip(block.quanta, block.energy_mhz, block.weight, strict=True):
         if weight > 0:
-            found[quanta].append((energy / CM_MHZ, int(weight) * (block.f2 + 1)))
-    return found
+            groups[quanta].append((energy / CM_MHZ, int(weight) * (block.f2 + 1)))
+    return groups
 
 
 def _printed_levels(folder: Path) -> dict[tuple[int, ...], list[tuple[float, int]]]:
     levels = read_egy(unpacked(next(folder.glob("*.egy.gz"))))
-    found = defaultdict(list)
+    groups = defaultdict(list)
     for row in range(len(levels)):
         level = levels.level(row)
-        found[level.quanta].append((level.energy_cm, level.degeneracy))
-    return found
+        groups[level.quanta].append((level.energy_cm, level.degeneracy))
+    return groups
 
 
 def _level_disagreements(case: Case, folder: Path, top: int = 999) -> tuple[int, list[str]]:
@@ -101,7 +101,7 @@ def test_a_changed_parameter_is_seen(shared, name, code, change):
 
 def _lines(case: Case, blocks: list[Block]) -> dict[tuple, list[tuple[float, float]]]:
     """Frequency and LGINT of all lines by labels."""
-    request, found = case.intensities.request, defaultdict(list)
+    request, groups = case.intensities.request, defaultdict(list)
     for upper in blocks:
         for lower in blocks:
             if abs(upper.f2 - lower.f2) > 2:
@@ -111,17 +111,17 @@ def _lines(case: Case, blocks: list[Block]) -> dict[tuple, list[tuple[float, flo
             allowed = (nu > 5e-5) & (strength > 1e-25) & (upper.weight[:, None] > 0) & (lower.weight > 0)
             for i, j in zip(*np.nonzero(allowed), strict=True):
                 size = (strength[i, j], int(upper.weight[i]), lower.energy_mhz[j], request.temperature_k, request.qrot)
-                found[upper.quanta[i], lower.quanta[j]].append((nu[i, j], lgint(nu[i, j], *size)))
-    return found
+                groups[upper.quanta[i], lower.quanta[j]].append((nu[i, j], lgint(nu[i, j], *size)))
+    return groups
 
 
 def _printed_lines(folder: Path) -> dict[tuple, list[tuple[float, float]]]:
-    catalogue, found = read_cat(unpacked(next(folder.glob("*.cat.gz")))), defaultdict(list)
+    catalogue, groups = read_cat(unpacked(next(folder.glob("*.cat.gz")))), defaultdict(list)
     upper, lower = catalogue.quanta_upper.tolist(), catalogue.quanta_lower.tolist()
     for row in range(len(catalogue)):
         key = tuple(tuple(q for q in state[row] if q != BLANK) for state in (upper, lower))
-        found[key].append((catalogue.frequency_mhz[row], catalogue.lgint[row]))
-    return found
+        groups[key].append((catalogue.frequency_mhz[row], catalogue.lgint[row]))
+    return groups
 
 
 @pytest.mark.oracle
@@ -141,8 +141,8 @@ def test_intensities(shared, name, top):
     ours, pairs = _lines(case, [solve(case, f2) for f2 in _f2(case, top)]), []
     for (upper, lower), theirs in _printed_lines(folder).items():
         if max(upper[-1], lower[-1]) <= top and (case.states[0].spins2 or max(upper[0], lower[0]) <= top):
-            own = sorted(ours[upper, lower], key=lambda line: -line[1])[: len(theirs)]
-            pairs += [(*a, *b) for a, b in zip(sorted(own), sorted(theirs), strict=True)]
+            strongest = sorted(ours[upper, lower], key=lambda line: -line[1])[: len(theirs)]
+            pairs += [(*a, *b) for a, b in zip(sorted(strongest), sorted(theirs), strict=True)]
     nu, size, printed, lg = np.array(sorted(pairs)).T
     assert len(nu) > 100
     assert np.abs(nu - printed).max() < 5.1e-5  # four decimals are printed

@@ -57,23 +57,23 @@ def _operator(term, phi, momentum, spin, spins2, wide):
             return [(np.eye(wide), {})]
         return [(c[i, j] * momentum["abc"[i]] @ momentum["abc"[j]], {}) for i, j in axes]
     if len(term.spins) == 1:
-        (one,) = term.spins
+        (item,) = term.spins
         anti = lambda p, i, j: (phi[p, "abc"[i]] @ momentum["abc"[j]] + momentum["abc"[j]] @ phi[p, "abc"[i]]) / 2  # noqa: E731
-        return [(c[i, j] * anti(p, i, j), {one: spin[one, p]}) for p in "xyz" for i, j in axes]
-    one, two = term.spins
+        return [(c[i, j] * anti(p, i, j), {item: spin[item, p]}) for p in "xyz" for i, j in axes]
+    item, two = term.spins
     if term.kind:
         c = c - np.eye(3) * np.trace(c) / 3
         axes = [(i, j) for i in range(3) for j in range(3) if c[i, j]]
-    found = []
+    results = []
     for p, q in product("xyz", repeat=2):
         cosines = sum(c[i, j] * phi[p, "abc"[i]] @ phi[q, "abc"[j]] for i, j in axes)
-        if one == two:
-            size = spins2[one - 1] / 2
-            both = (spin[one, p] @ spin[one, q] + spin[one, q] @ spin[one, p]) / 2
-            found.append((cosines, {one: both / (2 * size * (2 * size - 1))}))
+        if item == two:
+            size = spins2[item - 1] / 2
+            both = (spin[item, p] @ spin[item, q] + spin[item, q] @ spin[item, p]) / 2
+            results.append((cosines, {item: both / (2 * size * (2 * size - 1))}))
         elif term.kind or p == q:
-            found.append((cosines if term.kind else np.eye(wide), {one: spin[one, p], two: spin[two, q]}))
-    return found
+            results.append((cosines if term.kind else np.eye(wide), {item: spin[item, p], two: spin[two, q]}))
+    return results
 
 
 def _coupled(case: Case, top: int) -> np.ndarray:

@@ -45,8 +45,14 @@ def full_matrix(j: int, pair: bool, to_ground: bool) -> np.ndarray:
     of = momenta(j, "a")
     a, b, c = (of[axis] for axis in "abc")
     square, size = j * (j + 1.0), 2 * j + 1
-    one = np.eye(size)
-    rotor = B * square * one + A_MINUS_B * a @ a - DJ * square**2 * one - DJK * square * a @ a - DK * a @ a @ a @ a
+    identity = np.eye(size)
+    rotor = (
+        B * square * identity
+        + A_MINUS_B * a @ a
+        - DJ * square**2 * identity
+        - DJK * square * a @ a
+        - DK * a @ a @ a @ a
+    )
     up = b - 1j * c  # raises k
     down = up.conj().T
     zero = np.zeros((size, size), complex)
@@ -59,8 +65,8 @@ def full_matrix(j: int, pair: bool, to_ground: bool) -> np.ndarray:
     to_minus = 1j * W1 * down / 2 if to_ground else zero
     blocks = [
         [rotor, to_plus.conj().T, to_minus.conj().T],
-        [to_plus, rotor + E8 * one + ZETA * a, plus_minus],
-        [to_minus, plus_minus.conj().T, rotor + E8 * one - ZETA * a],
+        [to_plus, rotor + E8 * identity + ZETA * a, plus_minus],
+        [to_minus, plus_minus.conj().T, rotor + E8 * identity - ZETA * a],
     ]
     return np.block(blocks)
 
@@ -88,11 +94,11 @@ def test_labels():
     """K l > 0 in the first state, K l ≤ 0 in the second, each K once with each parity; E levels without a sign."""
     levels = predict(_file(COMMON + PAIR), _wanted(), as_spcat=True).levels
     for j in range(6):
-        own = [tuple(q[1:]) for q in levels.quanta.tolist() if q[0] == j]
+        quanta = [tuple(q[1:]) for q in levels.quanta.tolist() if q[0] == j]
         for v, lowest in ((1, 1), (2, 0)):
-            ks = sorted(abs(k) for k, state in own if state == v)
+            ks = sorted(abs(k) for k, state in quanta if state == v)
             assert ks == sorted([*range(lowest, j + 1)] * 2)
-        signed = {(k, v) for k, v in own if k < 0}
+        signed = {(k, v) for k, v in quanta if k < 0}
         assert signed == {(-k, v) for v in (0, 1, 2) for k in range(1, j + 1) if (k - v) % 3 == 0}
     energy = {tuple(q): e * 29979.2458 for q, e in zip(levels.quanta.tolist(), levels.energy_cm, strict=True)}
     assert energy[4, 1, 1] - energy[4, -1, 1] != pytest.approx(0.0, abs=1.0)  # l-type doubling of K l = 1
@@ -105,7 +111,7 @@ def test_labels():
 def test_lines_of_a_degenerate_state():
     """J + 1 ← J of K l = 1 are 2 Q22 (J+1) on each side of those of K l = -1; μ is the same in both states."""
     catalogue = predict(_file(COMMON + PAIR), _wanted(), as_spcat=True).catalogue
-    found = {
+    computed = {
         (*up[:3], *low[:3]): (f, s)
         for up, low, f, s in zip(
             catalogue.quanta_upper.tolist(),
@@ -115,8 +121,8 @@ def test_lines_of_a_degenerate_state():
             strict=True,
         )
     }
-    centre = found[3, 1, 2, 2, 1, 2][0]
-    outer = sorted(found[key][0] for key in ((3, -1, 1, 2, 1, 1), (3, 1, 1, 2, -1, 1)))
+    centre = computed[3, 1, 2, 2, 1, 2][0]
+    outer = sorted(computed[key][0] for key in ((3, -1, 1, 2, 1, 1), (3, 1, 1, 2, -1, 1)))
     assert [x - centre for x in outer] == pytest.approx(
         [-6 * Q22, 6 * Q22], abs=0.2
     )  # second-order shifts of the centre

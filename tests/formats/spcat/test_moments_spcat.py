@@ -50,8 +50,8 @@ def _factors():
     return space_cosines(TOP + 1), momentum, keep
 
 
-def _anti(one, two):
-    return one @ two + two @ one
+def _anti(first, two):
+    return first @ two + two @ first
 
 
 def _documented(typ: int, sym: int, oblate: bool, space: str) -> np.ndarray:
@@ -60,12 +60,12 @@ def _documented(typ: int, sym: int, oblate: bool, space: str) -> np.ndarray:
     x, y, z = "bac" if oblate else "bca"
     i = -1j if oblate else 1j
     phi = {axis: cosines[space, axis] for axis in "abc"}
-    squared = sum(one @ one for one in n.values())
-    of_n = sum(phi[axis] @ n[axis] for axis in "abc")
-    base = phi["abc"[sym - 1]] if sym else of_n
-    one, two = (axis for axis in "abc" if axis != "abc"[sym - 1])
+    squared = sum(component @ component for component in n.values())
+    along_n = sum(phi[axis] @ n[axis] for axis in "abc")
+    base = phi["abc"[sym - 1]] if sym else along_n
+    first, two = (axis for axis in "abc" if axis != "abc"[sym - 1])
     if sym:
-        second = i * (_anti(phi[one], n[two]) + _anti(phi[two], n[one])) / 2
+        second = i * (_anti(phi[first], n[two]) + _anti(phi[two], n[first])) / 2
     elif typ == 1:
         second = (2 * phi[z] @ n[z] - phi[x] @ n[x] - phi[y] @ n[y]) / 2
         second = (second + second.conj().T) / 2
@@ -89,27 +89,27 @@ def _documented(typ: int, sym: int, oblate: bool, space: str) -> np.ndarray:
     if typ == 12:
         return -i * _anti(n[z], second) / 2  # the sign of the program
     if not sym:
-        return of_n @ across
+        return along_n @ across
     if sym == "abc".index(z) + 1:
         crossed = _anti(phi[y], _anti(n[y], n[z])) - _anti(phi[x], _anti(n[x], n[z]))
         return (_anti(phi[z], across) + crossed) / np.sqrt(6)
-    own, other, sign = (x, y, 1) if sym == "abc".index(x) + 1 else (y, x, -1)
-    return (_anti(phi[own], across) + sign * _anti(phi[other], _anti(n[x], n[y]))) / 2
+    axis_, other, sign = (x, y, 1) if sym == "abc".index(x) + 1 else (y, x, -1)
+    return (_anti(phi[axis_], across) + sign * _anti(phi[other], _anti(n[x], n[y]))) / 2
 
 
-def _direct(spins2: tuple[int, ...], of_space) -> tuple[np.ndarray, np.ndarray]:
+def _direct(spins2: tuple[int, ...], space_operator) -> tuple[np.ndarray, np.ndarray]:
     """Energies and Σ |⟨f|M_p|i⟩|² over p of M = |0⟩m⟨1| + its conjugate, m = `of_space`(p) over the rotor and the spin."""
     cosines, n, keep = _factors()
     inner = np.ix_(keep, keep)
     blocks = []
     for v, constants in enumerate(CONSTANTS):
         rigid = sum(value * n[axis] @ n[axis] for axis, value in constants.items()) + APART * v * np.eye(len(n["a"]))
-        own = on_spins(rigid[inner], spins2, {})
+        rotation = on_spins(rigid[inner], spins2, {})
         if spins2:
             for p in "xyz":
                 space_n = sum(cosines[p, axis] @ n[axis] for axis in "abc")
-                own = own + GAMMA * on_spins(space_n[inner], spins2, {1: qutip.jmat(0.5, p).full()})
-        blocks.append(own)
+                rotation = rotation + GAMMA * on_spins(space_n[inner], spins2, {1: qutip.jmat(0.5, p).full()})
+        blocks.append(rotation)
     size = len(blocks[0])
     energies, vectors = np.linalg.eigh(
         np.block([[blocks[0], np.zeros((size, size))], [np.zeros((size, size)), blocks[1]]])
@@ -117,27 +117,29 @@ def _direct(spins2: tuple[int, ...], of_space) -> tuple[np.ndarray, np.ndarray]:
     total = 0.0
     for p in "xyz":
         moment = np.zeros((2 * size, 2 * size), complex)
-        moment[:size, size:] = of_space(p)
+        moment[:size, size:] = space_operator(p)
         moment += moment.conj().T
         total = total + np.abs(vectors.conj().T @ moment @ vectors) ** 2
     return energies, total
 
 
-def _compare(spind: str, oblate: bool, dipoles: str, of_space) -> None:
-    levels, found = _ours(spind, oblate, dipoles)
-    energies, squares = _direct((1,) if spind == "2" else (), of_space)
-    low = [row for row in range(len(found.upper)) if max(_n(levels, found, row)) <= TOP]
+def _compare(spind: str, oblate: bool, dipoles: str, space_operator) -> None:
+    levels, computed = _ours(spind, oblate, dipoles)
+    energies, squares = _direct((1,) if spind == "2" else (), space_operator)
+    low = [row for row in range(len(computed.upper)) if max(_n(levels, computed, row)) <= TOP]
     assert len(low) >= 10
     for row in low:
-        where = [np.abs(energies - levels.energy_mhz[state]) < 1e-6 for state in (found.upper[row], found.lower[row])]
+        where = [
+            np.abs(energies - levels.energy_mhz[state]) < 1e-6 for state in (computed.upper[row], computed.lower[row])
+        ]
         expected = squares[np.ix_(*where)].sum()
         # sums of some hundred squares of numbers of about 10
-        assert found.strength_debye2[row] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    assert found.strength_debye2[low].sum() == pytest.approx(squares.sum() / 2, rel=1e-9)  # none is missing
+        assert computed.strength_debye2[row] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert computed.strength_debye2[low].sum() == pytest.approx(squares.sum() / 2, rel=1e-9)  # none is missing
 
 
-def _n(levels, found, row):
-    return [int(levels.rotational[state]) for state in (found.upper[row], found.lower[row])]
+def _n(levels, computed, row):
+    return [int(levels.rotational[state]) for state in (computed.upper[row], computed.lower[row])]
 
 
 KINDS = [
@@ -152,13 +154,13 @@ def test_moments_between_two_states(typ, sym, oblate):
     keep = _factors()[2]
     inner = np.ix_(keep, keep)
 
-    def of_space(p):
+    def space_operator(p):
         plain = _documented(3, sym, oblate, p) if not sym else sum(_factors()[0][p, axis] for axis in "abc")
         whole = DIPOLE * plain + 0.15 * _documented(typ, sym, oblate, p)
         return (whole if sym else MAGNETON * whole)[inner]
 
     first = "\n".join(f"{each} {DIPOLE}" for each in ((11, 12, 13) if sym else (30010,)))
-    _compare("1", oblate, f"{first}\n{code} 0.15\n", of_space)
+    _compare("1", oblate, f"{first}\n{code} 0.15\n", space_operator)
 
 
 @pytest.mark.parametrize("oblate", [False, True])
@@ -168,14 +170,14 @@ def test_moments_of_a_spin_between_two_states(typ, sym, oblate):
     x, y, z = "bac" if oblate else "bca"
     inner, spin = np.ix_(keep, keep), {p: qutip.jmat(0.5, p).full() for p in "xyz"}
     c = np.zeros((3, 3), complex)
-    one, two = (axis for axis in range(3) if axis != sym - 1) if sym else (0, 0)
+    first, two = (axis for axis in range(3) if axis != sym - 1) if sym else (0, 0)
     if sym:
-        c[one, two] = c[two, one] = -1j if oblate else 1j
+        c[first, two] = c[two, first] = -1j if oblate else 1j
     else:
         for axis, value in zip((x, y, z), (-0.5, -0.5, 1.0) if typ == 1 else (-1.0, 1.0, 0.0), strict=True):
             c["abc".index(axis), "abc".index(axis)] = value
 
-    def of_space(p):
+    def space_operator(p):
         if typ in (1, 2):
             total = 0.0
             for q in "xyz":
@@ -189,7 +191,7 @@ def test_moments_of_a_spin_between_two_states(typ, sym, oblate):
         return 0.15 * total + DIPOLE * plain if sym else MAGNETON * 0.15 * total
 
     plain = f"{10 + sym} {DIPOLE}\n" if sym else ""
-    _compare("2", oblate, f"{plain}{10_000 * typ + 1010 + sym} 0.15\n", of_space)
+    _compare("2", oblate, f"{plain}{10_000 * typ + 1010 + sym} 0.15\n", space_operator)
 
 
 @pytest.mark.parametrize("oblate", [False, True])
@@ -198,16 +200,16 @@ def test_a_spin_with_a_moment_and_n(oblate):
     cosines, n, keep = _factors()
     sym = 3 if oblate else 1
     inner, axis = np.ix_(keep, keep), "abc"[sym - 1]
-    space_n = {p: sum(cosines[p, one] @ n[one] for one in "abc") for p in "xyz"}
+    space_n = {p: sum(cosines[p, axis] @ n[axis] for axis in "abc") for p in "xyz"}
     both = {(p, q): _anti(cosines[p, axis], space_n[q]) / 2 for p in "xyz" for q in "xyz"}
     trace = sum(both[p, p] for p in "xyz") / 3
 
-    def of_space(p):
+    def space_operator(p):
         parts = {q: (both[p, q] + both[q, p]) / 2 - (trace if p == q else 0.0) for q in "xyz"}
         spins = sum(on_spins(parts[q][inner], (1,), {1: qutip.jmat(0.5, q).full()}) for q in "xyz")
         return 1.5 * 0.15 * spins + DIPOLE * on_spins(cosines[p, axis][inner], (1,), {})
 
-    _compare("2", oblate, f"{10 + sym} {DIPOLE}\n{1010 + sym} 0.15\n", of_space)
+    _compare("2", oblate, f"{10 + sym} {DIPOLE}\n{1010 + sym} 0.15\n", space_operator)
 
 
 @pytest.mark.parametrize("code", [10001, 20002, 81001, 110002, 110000])
@@ -220,15 +222,15 @@ def test_a_moment_that_time_reversal_turns_is_none_of_one_state(code):
 @pytest.mark.parametrize("beside", ["", "1 0.001\n"])
 def test_a_cosine_without_an_angle_is_the_plain_dipole(beside, as_spcat):
     """TYP 7 with n = 0 is TYP 0, between states that a coupling mixes too, alone and beside a dipole of a state."""
-    found = []
+    results = []
     for code in (103, 70103):
-        par, asked = _files("1", False, f"{code} 1.0\n{beside}")
+        par, request = _files("1", False, f"{code} 1.0\n{beside}")
         coupling = replace(par.parameters[-1], code=20010, value=100.0)
-        (group,) = groups_of(replace(par, parameters=(*par.parameters, coupling)), asked, as_spcat=as_spcat)
+        (group,) = groups_of(replace(par, parameters=(*par.parameters, coupling)), request, as_spcat=as_spcat)
         levels = group.levels((0, 8))
         lines = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
-        found.append(dict(zip(zip(lines.upper, lines.lower, strict=True), lines.strength_debye2, strict=True)))
-    plain, cosine = ({lines: value for lines, value in one.items() if value > 1e-12} for one in found)  # of 1 D²
+        results.append(dict(zip(zip(lines.upper, lines.lower, strict=True), lines.strength_debye2, strict=True)))
+    plain, cosine = ({lines: value for lines, value in entry.items() if value > 1e-12} for entry in results)  # of 1 D²
     assert len(plain) > 100
     assert cosine == pytest.approx(plain, rel=1e-6)  # 1e-12 of 1 D² where amplitudes cancel
 

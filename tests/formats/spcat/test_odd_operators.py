@@ -35,8 +35,8 @@ def _rigid(of):
     return sum(value * of[axis] @ of[axis] for axis, (_, value) in zip("abc", ABC, strict=True))
 
 
-def _both(of, one, other):
-    return of[one] @ of[other] + of[other] @ of[one]
+def _both(of, first, other):
+    return of[first] @ of[other] + of[other] @ of[first]
 
 
 @pytest.mark.parametrize(("nvib", "code"), [(1, 200099), (-1, 600099)])
@@ -44,9 +44,9 @@ def _both(of, one, other):
 def test_along_the_axis_of_a_symmetric_top(nvib, code, j):
     """B J(J+1) + (A - B) k² + g k for every signed k: K doublets are split by 2 g K."""
     b, off, g = 5000.0, 1234.5, 77.7
-    found = _energies(_file(((199, b), (1099, off), (code, g)), nvib=nvib), j)
+    energies = _energies(_file(((199, b), (1099, off), (code, g)), nvib=nvib), j)
     k = np.arange(-j, j + 1)
-    assert found == pytest.approx(np.sort(b * j * (j + 1) + off * k**2 + g * k), abs=ROUND_OFF_MHZ)
+    assert energies == pytest.approx(np.sort(b * j * (j + 1) + off * k**2 + g * k), abs=ROUND_OFF_MHZ)
 
 
 # codes and values beside the rigid rotor, and what they stand for
@@ -72,35 +72,35 @@ def test_levels_are_those_of_the_complex_matrix(name, nvib):
     whole = _rigid(of) + more(of, 1.0)
     if 201099 in codes:
         whole = whole + codes[201099] * (of[z] @ of[z] @ of["a"] + of["a"] @ of[z] @ of[z]) / 2
-    found = _energies(_file((*ABC, *codes.items()), nvib=nvib), j)
-    assert found == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
-    assert np.abs(found - _energies(_file(ABC, nvib=nvib), j)).max() > 5.0  # they act
+    energies = _energies(_file((*ABC, *codes.items()), nvib=nvib), j)
+    assert energies == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
+    assert np.abs(energies - _energies(_file(ABC, nvib=nvib), j)).max() > 5.0  # they act
 
 
 def test_strengths_are_those_of_the_complex_matrix():
     """Components of the dipole that are real and imaginary in these functions: their squares are added, not their sum squared."""
     mu = (1.0, 0.7, 0.4)
-    own = {200099: 90.0, 610099: 15.0}
-    asked = read_int(b"a case\n0 41 1 0 4 -90 -90 99999 300\n 1 1.0\n 2 0.7\n 3 0.4\n")
-    lines = predict(_file((*ABC, *own.items())), asked).lines
+    diagonal = {200099: 90.0, 610099: 15.0}
+    request = read_int(b"a case\n0 41 1 0 4 -90 -90 99999 300\n 1 1.0\n 2 0.7\n 3 0.4\n")
+    lines = predict(_file((*ABC, *diagonal.items())), request).lines
     states = {}
     for j in range(5):
         of = momenta(j, "a")
         states[j] = np.linalg.eigh(_rigid(of) + 90.0 * of["a"] + 15.0 * _both(of, "a", "b"))
-    found = {}
+    results = {}
     for j in range(5):
         for up in range(j, min(j + 2, 5)):
             amplitude = states[up][1].conj().T @ reduced_vector(up, j, np.array(mu), "a") @ states[j][1]
             for i, k in zip(*np.nonzero(np.abs(amplitude) > 1e-6), strict=True):
                 if up > j or i > k:
                     key = round(abs(states[up][0][i] - states[j][0][k]), 3)
-                    found[key] = abs(amplitude[i, k]) ** 2
+                    results[key] = abs(amplitude[i, k]) ** 2
     strong = lines.strength_debye2 > 1e-5
     assert strong.sum() > 150
     for frequency, strength in zip(lines.frequency_mhz[strong], lines.strength_debye2[strong], strict=True):
-        near = min(found, key=lambda one: abs(one - frequency))
+        near = min(results, key=lambda frequency_: abs(frequency_ - frequency))
         assert abs(near - frequency) < 2e-3  # the rounding of the keys
-        assert found[near] == pytest.approx(strength, rel=1e-7, abs=1e-12)  # round-off of levels that nearly coincide
+        assert results[near] == pytest.approx(strength, rel=1e-7, abs=1e-12)  # round-off of levels that nearly coincide
 
 
 @pytest.mark.parametrize("phase", [0, 3, 5, 6])
@@ -118,17 +118,17 @@ def test_two_states_with_each_phase(phase, nvib):
     pairs = {"a": "bc", "b": "ac", "c": "ab"}
     parameters = [*ABC, (11, 700.0)]
     between = np.zeros((size, size), dtype=complex)
-    own = np.zeros((size, size), dtype=complex)
+    coupling = np.zeros((size, size), dtype=complex)
     for axis in "abc":
         parameters += [(codes[axis], g[axis]), (codes[axis] + 10000, f[axis])]
         between += (1 if axis in odd else 1j) * sign * g[axis] * of[axis]
         between += (1j if axis in odd else 1) * f[axis] * _both(of, *pairs[axis])
         if axis in odd:
             parameters.append((codes[axis] + 10, within[axis]))
-            own += sign * within[axis] * of[axis]
-    whole = np.block([[_rigid(of), between], [between.conj().T, _rigid(of) + own + 700.0 * np.eye(size)]])
-    found = _energies(_file(parameters, nvib=nvib, phase=phase), j)
-    assert found == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
+            coupling += sign * within[axis] * of[axis]
+    whole = np.block([[_rigid(of), between], [between.conj().T, _rigid(of) + coupling + 700.0 * np.eye(size)]])
+    energies = _energies(_file(parameters, nvib=nvib, phase=phase), j)
+    assert energies == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
 
 
 def test_a_spin_along_the_axis():
@@ -156,8 +156,8 @@ def test_those_of_the_rarer_kind_are_left_out_with_a_note():
     assert [note[:16] for note in left_out(_file(both))] == ["parameter 200099"]
     assert [note[:16] for note in left_out(_file(both, phase=4))] == ["parameter 210099"]
     assert left_out(_file(both, phase=8)) == left_out(_file(both))
-    of_all_states = (*both[:3], (11, 9.0), (200099, 70.0), (210000, 20.0))  # the odd one counts twice
-    assert [note[:16] for note in left_out(_file(of_all_states, nvib=2))] == ["parameter 210000"]
+    common_parameters = (*both[:3], (11, 9.0), (200099, 70.0), (210000, 20.0))  # the odd one counts twice
+    assert [note[:16] for note in left_out(_file(common_parameters, nvib=2))] == ["parameter 210000"]
     assert _energies(_file(both), 3) == pytest.approx(_energies(_file((*ABC, both[-1])), 3), abs=ROUND_OFF_MHZ)
 
 
@@ -185,8 +185,8 @@ def test_sines_of_internal_rotation():
     j, rho, c = 4, 0.37, 55.5
     of, k = momenta(j, "a"), np.arange(-j, j + 1)
     whole = _rigid(of) + np.diag(c * np.sin(2 * np.pi / 3 * rho * k))
-    found = _energies(_file((*ABC, (910099, rho), (11_000_000_099, c))), j)
-    assert found == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
+    energies = _energies(_file((*ABC, (910099, rho), (11_000_000_099, c))), j)
+    assert energies == pytest.approx(np.linalg.eigvalsh(whole), abs=ROUND_OFF_MHZ)
 
 
 def test_weights_forbid_elements():
@@ -206,13 +206,13 @@ def test_weights_forbid_elements():
 def test_imaginary_l_doubling(weights, acts):
     """{Nb, Nc} with Δk = Δl = 2 is l-doubling with another phase of l: by itself it acts as N₊² + N₋² of half its size, where levels A1
     and A2 may mix, and with unlike weights of these not at all."""
-    own = ((1099, 148900.0), (199, 9198.9), (200000, -277854.0))
+    constants = ((1099, 148900.0), (199, 9198.9), (200000, -277854.0))
 
     def energies(*more):
-        lines = "".join(f"{code} {value!r} 0\n" for code, value in (*own, *more))
+        lines = "".join(f"{code} {value!r} 0\n" for code, value in (*constants, *more))
         options = f"s -1 2 0 30 0 6 {weights} -1 101 0\ns -1 1 0 30 0 6 {weights} 0 201 0\n"
         return _energies(read_par(f"a case\n {3 + len(more)} 1 1 0 0 1e6 1 1\n{options}{lines}".encode()), 5)
 
-    found, none, real = energies((210001, 40.0)), energies(), energies((40001, 20.0))
+    energies_, none, real = energies((210001, 40.0)), energies(), energies((40001, 20.0))
     assert np.abs(real - none).max() > 1.0
-    assert found == pytest.approx(real if acts else none, abs=ROUND_OFF_MHZ)
+    assert energies_ == pytest.approx(real if acts else none, abs=ROUND_OFF_MHZ)

@@ -89,9 +89,9 @@ def test_k_doublets_are_parted_as_the_program_parts_them():
 def test_own_q_is_that_of_the_file():
     """QROT of the case was summed by the program from the same levels to F = 20; the last digit is rounded."""
     parameters, request = files("h2co")
-    own, given = predict(parameters, request, own_q=True), predict(parameters, request)
-    assert own.q == pytest.approx(given.q, rel=1e-4)  # the file's Q is summed to J = 40
-    np.testing.assert_allclose(own.catalogue.lgint, given.catalogue.lgint[: len(own.catalogue)], atol=1e-4)
+    value, prediction = predict(parameters, request, own_q=True), predict(parameters, request)
+    assert value.q == pytest.approx(prediction.q, rel=1e-4)  # the file's Q is summed to J = 40
+    np.testing.assert_allclose(value.catalogue.lgint, prediction.catalogue.lgint[: len(value.catalogue)], atol=1e-4)
 
 
 def test_what_the_program_does_in_silence_is_said():
@@ -167,11 +167,11 @@ def test_mutated_files_are_predicted_or_refused():
         pair = list(texts[i % 2])
         pair[i % 3 == 0] = mutated(pair[i % 3 == 0], rng)
         pair[1] = pair[1].replace(b" 0 20 ", b" 0 6 ").replace(b" 0 100 ", b" 0 6 ")
-        found = read_or_refuse(*pair)
-        if isinstance(found, str):
-            refused += len(found) > 10
-        elif found is not None:
-            lines = found.catalogue
+        computed = read_or_refuse(*pair)
+        if isinstance(computed, str):
+            refused += len(computed) > 10
+        elif computed is not None:
+            lines = computed.catalogue
             assert np.isfinite([lines.frequency_mhz, lines.lgint, lines.energy_lower_cm]).all()
             predicted += 1
     assert min(predicted, refused) > 40  # both outcomes are really tried

@@ -110,13 +110,13 @@ def _wanted() -> IntensityFile:
 
 def _energies(par: ParameterFile, twice: int) -> np.ndarray:
     """Energies of one F from the package, over all groups of states and with K up to KNMAX, rising."""
-    own = []
+    errors = []
     for group in groups_of(par, _wanted(), as_spcat=True):
         if (sum(group.spins) - twice) % 2 == 0:
             levels = group.levels((twice, twice))
             here = levels.multiplicity == twice + 1
-            own.append(np.repeat(levels.energy_mhz[here], levels.components[here]))
-    return np.sort(np.concatenate(own))
+            errors.append(np.repeat(levels.energy_mhz[here], levels.components[here]))
+    return np.sort(np.concatenate(errors))
 
 
 def _compared(par: ParameterFile, twice: int) -> tuple[np.ndarray, np.ndarray]:
@@ -125,10 +125,10 @@ def _compared(par: ParameterFile, twice: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _assert_equal(par: ParameterFile, twice: int) -> None:
-    found, expected = _compared(par, twice)
-    assert len(found) == len(expected) > 0
+    computed, expected = _compared(par, twice)
+    assert len(computed) == len(expected) > 0
     assert (
-        np.abs(found - expected).max() < 1e-14 * np.abs(expected).max() + 2e-8
+        np.abs(computed - expected).max() < 1e-14 * np.abs(expected).max() + 2e-8
     )  # 1e-14 of the largest energy, and its sums
 
 
@@ -144,12 +144,12 @@ def test_published_files_are_the_full_matrix(name):
     """The whole parameter lists of fits that stand in the folder of kinds; of levels without weight the package has none."""
     par = read_par(KINDS / name / f"{name}.var")
     for twice in FILES[name]:
-        found, expected = _compared(par, twice)
-        assert len(expected) >= len(found) > 0
-        nearest = np.abs(found[:, None] - expected).min(axis=1)
+        computed, expected = _compared(par, twice)
+        assert len(expected) >= len(computed) > 0
+        nearest = np.abs(computed[:, None] - expected).min(axis=1)
         assert nearest.max() < 1e-14 * np.abs(expected).max() + 2e-8  # 1e-14 of the largest energy, and its sums
         if name == "h2coh":  # two protons, of which each state has one total spin
-            assert 2 * len(found) == len(expected)
+            assert 2 * len(computed) == len(expected)
 
 
 @pytest.mark.parametrize("kind", TEXTS)

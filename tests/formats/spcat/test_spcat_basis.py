@@ -27,16 +27,16 @@ TOP = (
     b"a top\n 4 900 9 0 0.0 1.0e6 1.0 1.0\na %s 1 %d %d 0 1 1 1 0 1 0\n"
     b"10000 9400.0 1e36\n20000 3100.0 1e36\n30000 2500.0 1e36\n200 -7.13e-4 1e36\n"
 )
-ASKED = b"a top\n1 76004 1000.0 0 %d -19.0 -19.0 9000.0 300.0\n1 1.2\n3 0.4\n"
+REQUEST = b"a top\n1 76004 1000.0 0 %d -19.0 -19.0 9000.0 300.0\n1 1.2\n3 0.4\n"
 LINEAR = b"bent\n 2 0 0 0 0.0 1.0e6 1.0 1.0\nl -1 1 0 1 0 1 1 1 0 1 0\n100 6030.0 0\n200 -1e-3 0\n"
 
 
 def _prediction(kmin: int, kmax: int, fend: int = 8, spind: bytes = b"1", **options: bool) -> Prediction:
-    return predict(read_par(TOP % (spind, kmin, kmax)), read_int(ASKED % fend), **options)
+    return predict(read_par(TOP % (spind, kmin, kmax)), read_int(REQUEST % fend), **options)
 
 
-def _by_label(found: Prediction) -> dict[tuple[int, ...], float]:
-    listed = found.catalogue
+def _by_label(computed: Prediction) -> dict[tuple[int, ...], float]:
+    listed = computed.catalogue
     labels = np.concatenate([listed.quanta_upper, listed.quanta_lower], axis=1)
     return dict(zip(map(tuple, labels.tolist()), listed.frequency_mhz.tolist(), strict=True))
 
@@ -85,20 +85,20 @@ def test_knmin_is_honoured_and_lifted():
 
 def test_k_is_l_of_a_linear_molecule():
     """Lines R(J) of J to 6: 6 of l = 0 and 5 of each component of l = 1."""
-    file, asked = read_par(LINEAR), read_int((ASKED % 6).replace(b"3 0.4\n", b""))
-    listed = predict(file, asked)
+    file, request = read_par(LINEAR), read_int((REQUEST % 6).replace(b"3 0.4\n", b""))
+    listed = predict(file, request)
     assert sorted(np.abs(listed.catalogue.quanta_upper[:, 1]).tolist()) == [0] * 6 + [1] * 10
     assert "at J = 6 these are 10 of 13 levels, and the others lie up to 0 MHz" in listed.notes[0]
-    assert np.abs(predict(file, asked, full_basis=True).catalogue.quanta_upper[:, 1]).max() == 5  # of R(5): K to 5
+    assert np.abs(predict(file, request, full_basis=True).catalogue.quanta_upper[:, 1]).max() == 5  # of R(5): K to 5
     one_l = read_par(LINEAR.replace(b"l -1 1 0 1", b"l -1 1 1 1"))
     for lifted in (False, True):  # l is a quantum number of this state
-        assert set(np.abs(predict(one_l, asked, full_basis=lifted).catalogue.quanta_upper[:, 1]).tolist()) == {1}
+        assert set(np.abs(predict(one_l, request, full_basis=lifted).catalogue.quanta_upper[:, 1]).tolist()) == {1}
 
 
 def test_a_fit_and_a_prediction_have_one_basis(tmp_path):
     """Lines that a file predicts fit back to its constants, with the cut that the file says."""
     par = read_par(TOP % (b"1", 0, 3))
-    listed = predict(par, read_int(ASKED % 8)).catalogue
+    listed = predict(par, read_int(REQUEST % 8)).catalogue
     rows = [
         "".join(f"{q:3d}" for q in (*up[:3], *low[:3])).ljust(36) + f" {frequency:.6f} 0.01"
         for up, low, frequency in zip(
@@ -106,10 +106,12 @@ def test_a_fit_and_a_prediction_have_one_basis(tmp_path):
         )
     ]
     (tmp_path / "a.lin").write_text("\n".join(rows) + "\n")
-    asked = spfit_input(par, read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
-    found = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
-    assert found.values == pytest.approx(asked.parameters.start, rel=1e-9)  # six decimals of frequencies
-    assert found.rms_mhz() < 1e-5  # six decimals
+    fit_input = spfit_input(par, read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
+    assert fit.values == pytest.approx(fit_input.parameters.start, rel=1e-9)  # six decimals of frequencies
+    assert fit.rms_mhz() < 1e-5  # six decimals
 
 
 def test_a_fit_says_which_constants_it_passes_over(tmp_path):
@@ -122,12 +124,12 @@ def test_a_fit_says_which_constants_it_passes_over(tmp_path):
 
 def test_levels_have_the_basis_of_the_lines(tmp_path):
     (tmp_path / "a.var").write_bytes(TOP % (b"1", 0, 3))
-    (tmp_path / "a.int").write_bytes(ASKED % 8)
-    every = levels_of_file(tmp_path / "a.int", full_basis=True)
+    (tmp_path / "a.int").write_bytes(REQUEST % 8)
+    all_levels = levels_of_file(tmp_path / "a.int", full_basis=True)
     cut = levels_of_file(tmp_path / "a.int")
-    assert len(every) == sum(2 * j + 1 for j in range(9))
+    assert len(all_levels) == sum(2 * j + 1 for j in range(9))
     assert len(cut) == sum(min(2 * j + 1, 7) for j in range(9))
-    for option, levels in (([], cut), (["--full-basis"], every)):
+    for option, levels in (([], cut), (["--full-basis"], all_levels)):
         assert run(["spectrum", str(tmp_path / "a.int"), "--egy", str(tmp_path / "a.egy"), "--top", "0", *option]) == 0
         assert len((tmp_path / "a.egy").read_text().splitlines()) == len(levels)
 
@@ -135,7 +137,7 @@ def test_levels_have_the_basis_of_the_lines(tmp_path):
 def test_a_comparison_lifts_the_limits_too(tmp_path, capsys):
     """`rotor cat --compare case.int` had no --full-basis: beside the list of the whole basis it lacks the lines of other K."""
     (tmp_path / "a.var").write_bytes(TOP % (b"1", 0, 3))
-    (tmp_path / "a.int").write_bytes(ASKED % 8)
+    (tmp_path / "a.int").write_bytes(REQUEST % 8)
     files = str(tmp_path / "a.int"), str(tmp_path / "a.cat")
     assert run(["spectrum", files[0], "--full-basis", "--cat", files[1]]) == 0
     missing = {}
@@ -156,19 +158,21 @@ def test_the_option_needs_an_int_file(capsys):
 @pytest.mark.parametrize("name", ["o2", "moment_of_n", "moments_alone"])
 def test_each_error_of_the_program_has_a_note(name):
     """Where --as-spcat changes a number, a note says so with and without it."""
-    par, asked = read_par(KINDS / name / f"{name}.var"), read_int(KINDS / name / f"{name}.int")
-    asked = replace(asked, request=replace(asked.request, fend=min(asked.request.fend, asked.request.fbgn + 4)))
-    ours, program = predict(par, asked), predict(par, asked, as_spcat=True)
-    lgint = [np.sort(found.catalogue.lgint) for found in (ours, program)]
+    par, request = read_par(KINDS / name / f"{name}.var"), read_int(KINDS / name / f"{name}.int")
+    request = replace(
+        request, request=replace(request.request, fend=min(request.request.fend, request.request.fbgn + 4))
+    )
+    ours, program = predict(par, request), predict(par, request, as_spcat=True)
+    lgint = [np.sort(computed.catalogue.lgint) for computed in (ours, program)]
     assert len(lgint[0]) != len(lgint[1]) or np.abs(lgint[0] - lgint[1]).max() > 1e-3  # above the digits printed
     assert sum("--as-spcat has SPCAT's" in note for note in ours.notes) == 1
     assert sum("so do these numbers" in note for note in program.notes) == 1
 
 
 def test_qrot_below_one_has_a_note():
-    asked = read_int((ASKED % 3).replace(b" 1000.0 ", b" 0.5 "))
+    request = read_int((REQUEST % 3).replace(b" 1000.0 ", b" 0.5 "))
     file = read_par(TOP % (b"1", 0, 60))
-    ours, program = predict(file, asked), predict(file, asked, as_spcat=True)
+    ours, program = predict(file, request), predict(file, request, as_spcat=True)
     assert program.catalogue.lgint == pytest.approx(ours.catalogue.lgint - np.log10(2), abs=1e-4)  # digits printed
     assert "QROT = 0.5 is below 1: SPCAT takes 1, these numbers do not" in ours.notes[0]
     assert "so do these numbers" in program.notes[0]
@@ -177,9 +181,11 @@ def test_qrot_below_one_has_a_note():
 def test_files_without_errors_of_the_program_have_no_such_note():
     """All kinds whose lines are equal either way."""
     for name in ("fso3", "dipoles_between", "water_diag1"):
-        par, asked = read_par(KINDS / name / f"{name}.var"), read_int(KINDS / name / f"{name}.int")
-        asked = replace(asked, request=replace(asked.request, fend=min(asked.request.fend, asked.request.fbgn + 2)))
-        assert not [note for note in predict(par, asked).notes if "as-spcat" in note]
+        par, request = read_par(KINDS / name / f"{name}.var"), read_int(KINDS / name / f"{name}.int")
+        request = replace(
+            request, request=replace(request.request, fend=min(request.request.fend, request.request.fbgn + 2))
+        )
+        assert not [note for note in predict(par, request).notes if "as-spcat" in note]
 
 
 @pytest.mark.oracle
@@ -233,7 +239,7 @@ def test_the_share_that_names_a_level_is_that_of_a_function_or_of_its_wang_block
     """States of a rigid top lie in one block of Wang's functions; DIAG = 1 names them by single functions."""
     text = (TOP % (b"1", 0, 60)).replace(b" 1 1 1 0 1 0\n", b" 1 1 1 0 1 %d\n" % diag)
     (tmp_path / "a.var").write_bytes(text)
-    (tmp_path / "a.int").write_bytes(ASKED % 8)
+    (tmp_path / "a.int").write_bytes(REQUEST % 8)
     mixing = levels_of_file(tmp_path / "a.int").mixing
     assert mixing.max() == pytest.approx(1.0, abs=1e-12)  # J = 0; round-off
     assert (mixing.min() > 1 - 1e-12) == whole

@@ -52,8 +52,8 @@ def _diagonal(file: ParameterFile, n: int, k: int) -> float:
 def test_k_is_that_of_the_function(options: str, chi: float):
     """Every line R(N) of one K lies at the difference of its diagonal elements; the term of third order moves it by less."""
     file = _file(options.replace("-1 ", "-3 ", 1) if chi else options, chi)
-    found = _prediction(file)
-    listed, count = found.catalogue, 0
+    computed = _prediction(file)
+    listed, count = computed.catalogue, 0
     for up, low, frequency in zip(
         listed.quanta_upper.tolist(), listed.quanta_lower.tolist(), listed.frequency_mhz.tolist(), strict=True
     ):
@@ -62,7 +62,7 @@ def test_k_is_that_of_the_function(options: str, chi: float):
             assert frequency == pytest.approx(_diagonal(file, n + 1, k) - _diagonal(file, n, k), abs=0.01)  # chi and h3
             count += 1
     assert count >= 36 if options.endswith("1 1 1 0 1 0") else count >= 20
-    assert any("on the diagonal of the Hamiltonian falls with K" in note for note in found.notes)
+    assert any("on the diagonal of the Hamiltonian falls with K" in note for note in computed.notes)
 
 
 def test_other_files_have_no_such_note():
@@ -116,8 +116,10 @@ def test_a_fit_finds_the_constants(options: str, tmp_path: Path):
     ]
     (tmp_path / "a.lin").write_text("\n".join(rows[:300]) + "\n")
     off = tuple(replace(p, value=1.001 * p.value) if p.code == 100 else p for p in true.parameters)
-    asked = spfit_input(replace(true, parameters=off), read_lin(tmp_path / "a.lin", width, 900), "a.lin")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = spfit_input(replace(true, parameters=off), read_lin(tmp_path / "a.lin", width, 900), "a.lin")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
     assert fit.converged, fit.reason
     assert fit.weighted_rms < 0.01
     expected = [p.value for p in true.parameters if p.error is not None and p.error > 1]
@@ -126,8 +128,10 @@ def test_a_fit_finds_the_constants(options: str, tmp_path: Path):
 
 def test_a_fit_with_spins_says_how_levels_are_named(tmp_path: Path):
     (tmp_path / "a.lin").write_text("  1  0  2  0  0  1".ljust(36) + " 266900.0 0.01\n")
-    asked = spfit_input(_file("-3 1 0 60 0 1 1 1 0 1 0", chi=0.001), read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
-    assert any("falls with K: with spins a fit names levels of a Wang block by energy" in note for note in asked.notes)
+    fit_input = spfit_input(_file("-3 1 0 60 0 1 1 1 0 1 0", chi=0.001), read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
+    assert any(
+        "falls with K: with spins a fit names levels of a Wang block by energy" in note for note in fit_input.notes
+    )
 
 
 @pytest.mark.parametrize(
@@ -143,8 +147,8 @@ def test_a_fit_with_spins_says_how_levels_are_named(tmp_path: Path):
 def test_a_fit_says_what_it_does_not_do_as_diag_says(options: str, chi: float, said: str, tmp_path: Path):
     numbers = "  1  0  2  0  0  1" if chi else "  1  0  0  0"
     (tmp_path / "a.lin").write_text(numbers.ljust(36) + " 266900.0 0.01\n")
-    asked = spfit_input(_file(options, chi), read_lin(tmp_path / "a.lin", 3 if chi else 2, 900), "a.lin")
-    named = [note for note in asked.notes if "DIAG" in note]
+    fit_input = spfit_input(_file(options, chi), read_lin(tmp_path / "a.lin", 3 if chi else 2, 900), "a.lin")
+    named = [note for note in fit_input.notes if "DIAG" in note]
     assert len(named) == bool(said), named
     assert not said or said in named[0]
 
@@ -184,7 +188,9 @@ def test_the_fit_of_spfit(shared: Path, tmp_path: Path, options: str):
     assert "\ns -1 1 0 20 0 1 1 1 0 1 1\n" in text
     (tmp_path / "x.par").write_text(text.replace("20 0 1 1 1 0 1 1", f"20 0 {options}"))
     (tmp_path / "x.lin").write_text((folder / "oblate_c3v_fit.lin").read_text())
-    asked = read_fit(tmp_path / "x.par")
-    fit = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    fit_input = read_fit(tmp_path / "x.par")
+    fit = fit_lines(
+        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
+    )
     assert fit.converged, fit.reason
     assert fit.weighted_rms == pytest.approx(1.094, abs=6e-4)  # as SPFIT prints it

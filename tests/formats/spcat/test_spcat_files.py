@@ -360,12 +360,12 @@ def survive(mutations: int, seed: int) -> tuple[int, int]:
     for i in range(mutations):
         form, text = texts[i % len(texts)]
         text = mutated(text, rng)
-        thing = read_or_refuse(form, text)
-        if isinstance(thing, str):
-            assert thing.startswith("the text given"), (thing, text)
+        content = read_or_refuse(form, text)
+        if isinstance(content, str):
+            assert content.startswith("the text given"), (content, text)
             refused += 1
         else:
-            assert form.text(thing) == text, text
+            assert form.text(content) == text, text
             read += 1
     return read, refused
 

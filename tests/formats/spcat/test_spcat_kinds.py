@@ -23,7 +23,7 @@ KINDS = ORACLES / "kinds"
 RANGES = {"h2coh": (6, 10), "o2": (0, 75), "fso3": (0, 9), "oc33s": (0, 22), "co": (0, 99)}  # F that the samples need
 
 # made here, lines of the compiled program: how many lines there are in all
-MADE = {
+WRITTEN_KINDS = {
     "l_doubled_quad": 194, "patterns_of_i_tot": 822, "three_states_oblate": 877, "dipoles_between": 657, "threefold_weights": 72,
     "threefold_asymmetric_quanta": 52, "forbidden_coupling": 654, "water_diag1": 339, "water_diag5": 398, "two_quadrupoles_i_tot": 1005,
     "eighteen_states": 958, "oblate_spin_orbit": 238, "three_protons_i_tot": 247, "methyl_i_tot": 215, "inversion_i_tot": 215,
@@ -40,21 +40,22 @@ MADE = {
 
 @cache
 def _predicted(name: str) -> Catalogue:
-    parameters, asked = (read(KINDS / name / f"{name}{s}") for read, s in ((read_par, ".var"), (read_int, ".int")))
-    first, last = RANGES.get(name, (asked.request.fbgn, asked.request.fend))
-    request = replace(asked.request, fbgn=first, fend=last)
-    return predict(parameters, replace(asked, request=request), as_spcat=True).catalogue
+    parameters, value = (read(KINDS / name / f"{name}{s}") for read, s in ((read_par, ".var"), (read_int, ".int")))
+    first, last = RANGES.get(name, (value.request.fbgn, value.request.fend))
+    request = replace(value.request, fbgn=first, fend=last)
+    return predict(parameters, replace(value, request=request), as_spcat=True).catalogue
 
 
 def _by_label(lines: Catalogue) -> dict[tuple[int, ...], list[int]]:
-    found: dict[tuple[int, ...], list[int]] = defaultdict(list)
+    groups: dict[tuple[int, ...], list[int]] = defaultdict(list)
     for row, pair in enumerate(zip(lines.quanta_upper.tolist(), lines.quanta_lower.tolist(), strict=True)):
-        found[*pair[0], *pair[1]].append(row)
-    return found
+        groups[*pair[0], *pair[1]].append(row)
+    return groups
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "h2coh" else one for one in (*RANGES, *MADE)]
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name == "h2coh" else name for name in (*RANGES, *WRITTEN_KINDS)],
 )
 def test_lines(name):
     """Frequencies to the digits printed, intensities to 1e-4 of LGINT and half a digit, E″, degeneracies, labels."""
@@ -63,17 +64,17 @@ def test_lines(name):
     for row, pair in enumerate(zip(reference.quanta_upper.tolist(), reference.quanta_lower.tolist(), strict=True)):
         near = rows[*pair[0], *pair[1]]
         assert near, reference.record(row)
-        own = min(near, key=lambda i: abs(ours.frequency_mhz[i] - reference.frequency_mhz[row]))
-        assert abs(ours.frequency_mhz[own] - reference.frequency_mhz[row]) < 5.1e-5, reference.record(row)
-        assert abs(ours.lgint[own] - reference.lgint[row]) < 1.6e-4, reference.record(row)
-        assert abs(ours.energy_lower_cm[own] - reference.energy_lower_cm[row]) < 5.1e-5
-        assert ours.g_upper[own] == reference.g_upper[row]
+        nearest = min(near, key=lambda i: abs(ours.frequency_mhz[i] - reference.frequency_mhz[row]))
+        assert abs(ours.frequency_mhz[nearest] - reference.frequency_mhz[row]) < 5.1e-5, reference.record(row)
+        assert abs(ours.lgint[nearest] - reference.lgint[row]) < 1.6e-4, reference.record(row)
+        assert abs(ours.energy_lower_cm[nearest] - reference.energy_lower_cm[row]) < 5.1e-5
+        assert ours.g_upper[nearest] == reference.g_upper[row]
     assert len(reference) >= 7
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", WRITTEN_KINDS)
 def test_no_line_is_missing_or_extra(name):
-    assert len(_predicted(name)) == MADE[name]
+    assert len(_predicted(name)) == WRITTEN_KINDS[name]
 
 
 @pytest.mark.parametrize(
@@ -82,13 +83,13 @@ def test_no_line_is_missing_or_extra(name):
 def test_levels_hold_the_lower_states_of_all_lines(name):
     """Energies, labels and degeneracies of the list of levels; of the last one's one state too, whose levels have other names here."""
     levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
-    found = {}
+    results = {}
     for quanta, energy in zip(levels.quanta.tolist(), levels.energy_cm, strict=True):
-        found.setdefault(tuple(q for q in quanta if q >= -99), []).append(energy)
+        results.setdefault(tuple(q for q in quanta if q >= -99), []).append(energy)
     lines = read_cat(KINDS / name / "sample.cat")
     for quanta, energy in zip(lines.quanta_lower.tolist(), lines.energy_lower_cm, strict=True):
-        near = found[tuple(q for q in quanta if q >= -99)]
-        assert min(abs(energy - one) for one in near) < 5.1e-5  # half a digit
+        near = results[tuple(q for q in quanta if q >= -99)]
+        assert min(abs(energy - level) for level in near) < 5.1e-5  # half a digit
 
 
 def test_a_state_with_quantum_numbers_of_its_own_has_no_number_of_a_pattern():
@@ -96,9 +97,9 @@ def test_a_state_with_quantum_numbers_of_its_own_has_no_number_of_a_pattern():
     name = "spin_of_size_zero_beside_three"
     levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
     assert levels.pattern is not None
-    own = levels.quanta[:, 3] == 0
-    assert set(levels.pattern[own].tolist()) == {-1}
-    assert set(levels.pattern[~own].tolist()) == set(range(24))  # 2 * 6 * 2 couplings
+    in_state = levels.quanta[:, 3] == 0
+    assert set(levels.pattern[in_state].tolist()) == {-1}
+    assert set(levels.pattern[~in_state].tolist()) == set(range(24))  # 2 * 6 * 2 couplings
 
 
 @pytest.mark.slow
@@ -225,11 +226,11 @@ def test_files_without_a_level_that_has_a_weight_are_refused():
 @pytest.mark.parametrize("str0", [-9.0, -5.5, -5.0])
 def test_the_lines_are_those_of_the_catalogue(str0):
     """l-doubled states: a line of two levels of ±K stands twice in the catalogue, the others once, at every cut."""
-    parameters, asked = (
+    parameters, request = (
         read(KINDS / "l_doubled_quad" / f"l_doubled_quad{s}") for read, s in ((read_par, ".var"), (read_int, ".int"))
     )
-    made = predict(parameters, replace(asked, request=replace(asked.request, str0=str0)))
-    components = made.lines.levels.components
-    times = np.maximum(components[made.lines.upper], components[made.lines.lower])
+    prediction = predict(parameters, replace(request, request=replace(request.request, str0=str0)))
+    components = prediction.lines.levels.components
+    times = np.maximum(components[prediction.lines.upper], components[prediction.lines.lower])
     assert set(times.tolist()) == {1, 2}
-    assert times.sum() == len(made.catalogue) > 20
+    assert times.sum() == len(prediction.catalogue) > 20

@@ -38,12 +38,12 @@ def test_levels_without_a_weight_to_maxv_are_refused():
     """State 0 has no weights, and MAXV = 0 leaves out state 1."""
     par = f"limits\n4 1 1 0\na 1 -2 0 8 0 1 0 0 -1\na 1 1 0 8 0 1 1 1 0\n{ABC.replace(chr(10), ' 0' + chr(10))}11 900.0 0\n"
     for maxv, message in ((0, "no level has a weight from FBGN = 0 to FEND = 3, MAXV = 0"), (1, None)):
-        asked = read_int(f"limits\n0 1 1000 0 3 -15 -15 99999 100 {maxv}\n111 1.0\n".encode())
+        request = read_int(f"limits\n0 1 1000 0 3 -15 -15 99999 100 {maxv}\n111 1.0\n".encode())
         if message:
             with pytest.raises(ValueError, match=message):
-                predict(read_par(par.encode()), asked, as_spcat=True)
+                predict(read_par(par.encode()), request, as_spcat=True)
         else:
-            assert len(predict(read_par(par.encode()), asked, as_spcat=True).catalogue) > 0
+            assert len(predict(read_par(par.encode()), request, as_spcat=True).catalogue) > 0
 
 
 def test_half_integer_f_begins_at_one_half():
@@ -55,9 +55,9 @@ def test_half_integer_f_begins_at_one_half():
 def test_a_state_without_levels_leaves_the_other(options):
     """State 0 has none to J = 3; state 1, which nothing couples with it, is as if it were alone."""
     alone = _predicted(f"a 1 1 0 8\n{ABC}", "1 1.0\n", 3).catalogue
-    found = _predicted(f"{options}\na 1 -1 0 8 0 1 1 1 0\n".replace(" 0\na", " -1\na") + ABC, "1 1.0\n111 1.0\n", 3)
-    assert set(found.catalogue.quanta_upper[:, 3].tolist()) == {1}
-    assert np.array_equal(found.catalogue.frequency_mhz, alone.frequency_mhz)
+    computed = _predicted(f"{options}\na 1 -1 0 8 0 1 1 1 0\n".replace(" 0\na", " -1\na") + ABC, "1 1.0\n111 1.0\n", 3)
+    assert set(computed.catalogue.quanta_upper[:, 3].tolist()) == {1}
+    assert np.array_equal(computed.catalogue.frequency_mhz, alone.frequency_mhz)
 
 
 @pytest.mark.parametrize("spin", ["", "110010000 -3.0\n"], ids=["without a spin", "with a spin"])
@@ -87,8 +87,8 @@ def test_q_of_states_apart_is_summed_to_the_highest_f_of_all():
     par = read_par(f"limits\n7 1 1 0\na 1 2 0 99\n{values}11 0.0 0\n".encode())
     groups = groups_of(par, read_int(b"limits\n0 1 1000 0 3 -15 -15 99999 100\n1 1.0\n111 1.0\n"))
     both, single = summed_q(groups, 100.0), [summed_q([group], 100.0) for group in groups]
-    for one, (a, b, c) in zip(single, (small, large), strict=True):
-        assert one.q == pytest.approx(
+    for state, (a, b, c) in zip(single, (small, large), strict=True):
+        assert state.q == pytest.approx(
             partition_function(Top.from_constants(f"A={a} B={b} C={c} MHz"), 100.0).q, rel=1e-6
         )
     assert single[0].jmax > single[1].jmax

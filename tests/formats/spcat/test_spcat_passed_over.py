@@ -23,29 +23,31 @@ TWO = (
     b"two states\n 5 9 1 0 0.0 1.0e6 1.0 1.0\na 1 2 0 60 0 1 1 1 0 1 0\n"
     b"10099 9400.0 1e36\n20099 3100.0 1e36\n30099 2500.0 1e36\n11 900.0 1e36\n1122 -1.5 1e36\n"
 )
-ASKED = b"two states\n1 76004 1000.0 0 3 -19.0 -19.0 9000.0 300.0\n1 1.2\n111 1.2\n"
+REQUEST = b"two states\n1 76004 1000.0 0 3 -19.0 -19.0 9000.0 300.0\n1 1.2\n111 1.2\n"
 SAID = "parameter 1122 is left out, as SPCAT does: state 2 does not exist, NVIB = 2 counts from 0"
 
 
 def test_a_parameter_of_a_state_that_does_not_exist_is_left_out():
-    found = predict(read_par(TWO), read_int(ASKED))
-    without = predict(read_par(TWO.replace(b"1122 -1.5 1e36\n", b"").replace(b" 5 9", b" 4 9")), read_int(ASKED))
-    assert SAID in found.notes
-    assert found.catalogue.frequency_mhz.tolist() == without.catalogue.frequency_mhz.tolist()
+    prediction = predict(read_par(TWO), read_int(REQUEST))
+    without = predict(read_par(TWO.replace(b"1122 -1.5 1e36\n", b"").replace(b" 5 9", b" 4 9")), read_int(REQUEST))
+    assert SAID in prediction.notes
+    assert prediction.catalogue.frequency_mhz.tolist() == without.catalogue.frequency_mhz.tolist()
     assert without.notes == ()
 
 
 def test_of_one_state_too():
     """A file whose constants have names otherwise."""
-    one = (
+    single_state = (
         TWO.replace(b"a 1 2 0", b"a 1 1 0")
         .replace(b"11 900.0 1e36\n", b"")
         .replace(b"1122", b"1111")
         .replace(b" 5 9", b" 4 9")
     )
-    found = predict(read_par(one), read_int(ASKED))
-    assert "parameter 1111 is left out, as SPCAT does: state 1 does not exist, NVIB = 1 counts from 0" in found.notes
-    assert len(found.catalogue) > 5
+    prediction = predict(read_par(single_state), read_int(REQUEST))
+    assert (
+        "parameter 1111 is left out, as SPCAT does: state 1 does not exist, NVIB = 1 counts from 0" in prediction.notes
+    )
+    assert len(prediction.catalogue) > 5
 
 
 def test_a_fit_passes_over_it_too(tmp_path: Path):
@@ -88,7 +90,7 @@ def test_levels_that_fit_no_column_leave_the_catalogue(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     wide = TWO.replace(b"11 900.0", b"11 9.0e14")
     (tmp_path / "a.var").write_bytes(wide)
-    (tmp_path / "a.int").write_bytes(ASKED)
+    (tmp_path / "a.int").write_bytes(REQUEST)
     assert run(["spectrum", "a.int", "--cat", "a.cat", "--egy", "a.egy", "--top", "0"]) == 1
     error = capsys.readouterr().err
     assert re.search(

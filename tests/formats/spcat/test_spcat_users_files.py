@@ -22,7 +22,7 @@ from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import format_par, read_par
 
 KINDS = ORACLES / "kinds"
-ASKED = b"a top\n1 76004 1000.0 0 3 -9.0 -9.0 60.0 300.0\n1 1.2\n3 0.4\n"
+REQUEST = b"a top\n1 76004 1000.0 0 3 -9.0 -9.0 60.0 300.0\n1 1.2\n3 0.4\n"
 TOP = b"a top\n 4 1 1 0 0.0 1.0e6 1.0 1.0\na -1 -1 0 60 0 1 1 1 0 1 0\n10000 8572.06 0\n20000 3640.11 0\n30000 2790.97 0\n200 -7.13e-4 0\n"
 WITH_K = b"""\
      493.4227  0.0000 -8.2777 3    2.0018  7  76004 202 3-1         3 2         
@@ -41,9 +41,9 @@ WITH_KA_KC = b"""\
 """  # noqa: W291
 
 
-def _same_lines(found: Prediction, reference: bytes) -> None:
+def _same_lines(computed: Prediction, reference: bytes) -> None:
     """Every line of the reference by its label, with frequency, E″, intensity and degeneracy."""
-    ours, theirs = found.catalogue, read_cat(reference)
+    ours, theirs = computed.catalogue, read_cat(reference)
     assert set(ours.qnfmt.tolist()) == set(theirs.qnfmt.tolist())
     for row in range(len(theirs)):
         same = (ours.quanta_upper == theirs.quanta_upper[row]).all(axis=1) & (
@@ -59,23 +59,23 @@ def _same_lines(found: Prediction, reference: bytes) -> None:
 @pytest.mark.parametrize("as_spcat", [False, True])
 def test_an_asymmetric_top_by_n_and_k(as_spcat):
     """SPIND = -1: K is that of the basis, here Kc, and its sign the species."""
-    found = predict(read_par(TOP), read_int(ASKED), as_spcat=as_spcat)
-    assert len(found.catalogue) == 41
-    _same_lines(found, WITH_K)
+    prediction = predict(read_par(TOP), read_int(REQUEST), as_spcat=as_spcat)
+    assert len(prediction.catalogue) == 41
+    _same_lines(prediction, WITH_K)
 
 
 def test_a_symmetric_top_by_ka_and_kc():
-    found = predict(read_par(SYMMETRIC), read_int(ASKED.replace(b"3 0.4\n", b"").replace(b"1 1.2", b"1 3.9")))
-    assert len(found.catalogue) == 9
-    _same_lines(found, WITH_KA_KC.replace(b"41505", b"76004"))
+    prediction = predict(read_par(SYMMETRIC), read_int(REQUEST.replace(b"3 0.4\n", b"").replace(b"1 1.2", b"1 3.9")))
+    assert len(prediction.catalogue) == 9
+    _same_lines(prediction, WITH_KA_KC.replace(b"41505", b"76004"))
 
 
 def test_constants_in_another_order_than_their_names():
     """B < C with a and c exchanged in the dipole is the same top seen from other axes: the same lines."""
-    one, other = TOP.replace(b"a -1 -1", b"a 1 1"), TOP.replace(b"a -1 -1", b"a 1 1")
+    first, other = TOP.replace(b"a -1 -1", b"a 1 1"), TOP.replace(b"a -1 -1", b"a 1 1")
     other = other.replace(b"20000 3640.11", b"20000 2790.97").replace(b"30000 2790.97", b"30000 3640.11")
-    asked, turned = read_int(ASKED), read_int(ASKED.replace(b"3 0.4", b"2 0.4"))
-    mine, theirs = (predict(read_par(p), i).catalogue for p, i in ((one, asked), (other, turned)))
+    request, turned = read_int(REQUEST), read_int(REQUEST.replace(b"3 0.4", b"2 0.4"))
+    mine, theirs = (predict(read_par(p), i).catalogue for p, i in ((first, request), (other, turned)))
     assert np.sort(mine.frequency_mhz) == pytest.approx(np.sort(theirs.frequency_mhz), abs=1e-6)  # round-off
     assert np.sort(mine.lgint) == pytest.approx(np.sort(theirs.lgint), abs=1e-6)  # round-off
 
@@ -94,10 +94,10 @@ def test_spins_that_spind_does_not_name():
     """As SPCAT does a term of theirs is left out, with a note."""
     chi = TOP.replace(b" 4 1 1", b" 5 1 1") + b"110010000 2.5 0\n"
     for file, says in ((chi, "spin 1 is not among the 0"), (chi.replace(b"a -1", b"a -2"), "no quadrupole moment")):
-        found = predict(read_par(file), read_int(ASKED))
-        assert any("left out, as SPCAT does" in note and says in note for note in found.notes)
-        alone = predict(read_par(file.replace(b"110010000 2.5", b"110010000 0.0")), read_int(ASKED))
-        assert found.catalogue.frequency_mhz == pytest.approx(
+        prediction = predict(read_par(file), read_int(REQUEST))
+        assert any("left out, as SPCAT does" in note and says in note for note in prediction.notes)
+        alone = predict(read_par(file.replace(b"110010000 2.5", b"110010000 0.0")), read_int(REQUEST))
+        assert prediction.catalogue.frequency_mhz == pytest.approx(
             alone.catalogue.frequency_mhz, abs=1e-9
         )  # the same numbers
 
@@ -106,15 +106,15 @@ def test_diagonal_elements_are_refused_or_noted():
     for option in (b"a -1 -1 0 60 0 1 1 1 0 1 -1", b"a 1 1 0 60 0 1 1 1 0 1 -1"):
         file = read_par(TOP.replace(b"a -1 -1 0 60 0 1 1 1 0 1 0", option))
         with pytest.raises(ValueError, match="DIAG = -1: diagonal elements"):
-            predict(file, read_int(ASKED), as_spcat=True)
-        assert any("DIAG is below 0" in note for note in predict(file, read_int(ASKED)).notes)
+            predict(file, read_int(REQUEST), as_spcat=True)
+        assert any("DIAG is below 0" in note for note in predict(file, read_int(REQUEST)).notes)
 
 
 def test_levels_with_more_than_six_quanta_have_all_of_them():
     """As the program writes them: the number of the pattern in brackets, then N, Ka, Kc, v, F1, ... F."""
     file = read_par((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.var").read_bytes())
-    asked = read_int((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.int").read_bytes())
-    group = groups_of(file, replace(asked, request=replace(asked.request, fend=0)), as_spcat=True)[0]
+    request = read_int((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.int").read_bytes())
+    group = groups_of(file, replace(request, request=replace(request.request, fend=0)), as_spcat=True)[0]
     levels = as_level_list([(group, group.levels((0, 0)))], format_of(file, [group]))
     written = format_level(levels.level(0))
     assert written[63:].startswith(":(")
@@ -129,8 +129,8 @@ def test_levels_with_more_than_six_quanta_have_all_of_them():
 def test_a_list_of_many_levels_fits_its_columns():
     """The program's list of this file has four blocks for every N; where its numbers are not known here, ranks go to 9999."""
     file = read_par(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
-    asked = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
-    group = groups_of(file, asked)[0]
+    request = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
+    group = groups_of(file, request)[0]
     solved, form = [(group, group.levels((0, 208)))], format_of(file, [group])
     levels = as_level_list(solved, form, blocks=blocks_of(file, [group]))
     assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 4 * 105, 53)
@@ -148,14 +148,18 @@ def test_a_spherical_top_with_a_dipole(option):
     file = read_par(
         f"a top\n 2 1 1 0 0.0 1.0e6 1.0 1.0\n{option} 0 50 0 1 1 1 0 1 0\n100 5000.0 0\n200 -0.01 0\n".encode()
     )
-    found = predict(file, read_int(ASKED.replace(b"3 0.4\n", b"").replace(b"1 1.2", b"1 3.9"))).catalogue
-    assert len(found) == 9
-    assert set(found.frequency_mhz.round(4).tolist()) == {9999.96, 19999.68, 29998.92}  # 2 B (N + 1) - 4 D (N + 1)³
+    prediction = predict(file, read_int(REQUEST.replace(b"3 0.4\n", b"").replace(b"1 1.2", b"1 3.9"))).catalogue
+    assert len(prediction) == 9
+    assert set(prediction.frequency_mhz.round(4).tolist()) == {
+        9999.96,
+        19999.68,
+        29998.92,
+    }  # 2 B (N + 1) - 4 D (N + 1)³
 
 
 def test_a_linear_molecule_in_the_oblate_basis():
     """Its axis is c there: a dipole along a makes no line, one along c makes all."""
     file = read_par(b"a rod\n 1 1 1 0 0.0 1.0e6 1.0 1.0\nl -1 -1 0 0 0 1 1 1 0 1 0\n100 5000.0 0\n")
-    asked = ASKED.replace(b"3 0.4\n", b"")
-    assert len(predict(file, read_int(asked)).catalogue) == 0
-    assert len(predict(file, read_int(asked.replace(b"1 1.2", b"3 1.2"))).catalogue) == 3
+    request = REQUEST.replace(b"3 0.4\n", b"")
+    assert len(predict(file, read_int(request)).catalogue) == 0
+    assert len(predict(file, read_int(request.replace(b"1 1.2", b"3 1.2"))).catalogue) == 3

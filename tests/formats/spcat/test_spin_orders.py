@@ -28,8 +28,8 @@ def _ours(spind: str, oblate: bool, code: int, value: float) -> list[tuple[int, 
     par = read_par(
         f"two\n9 1 1 0 0.0 1e6 1.0 1.0\n{option}\n{rigid}200001 30.0 1\n910000 0.13 1\n910011 0.21 1\n{code} {value} 1\n".encode()
     )
-    asked = read_int(b"two\n0 999 1000.0 0 3 -30 -30 9999.99 300.0\n11 1.0\n")
-    (group,) = groups_of(par, asked)
+    request = read_int(b"two\n0 999 1000.0 0 3 -30 -30 9999.99 300.0\n11 1.0\n")
+    (group,) = groups_of(par, request)
     total = sum(int(size) - 1 for size in spind)
     last = 2 * TOP - total
     levels = group.levels((total % 2, last))
@@ -43,20 +43,20 @@ def _n() -> dict[str, np.ndarray]:
 
 def _factors(spins2: tuple[int, ...], which: tuple[int, ...]):
     """N_i (0) or φ_i·S (number of the spin) over all functions, i = a, b, c, N up to TOP + 1."""
-    found = {}
+    results = {}
     for axis in "abc":
-        found[0, axis] = on_spins(_n()[axis], spins2, {})
+        results[0, axis] = on_spins(_n()[axis], spins2, {})
         for place in which:
             spin = (
                 qutip.jmat(spins2[place - 1] / 2, "x"),
                 qutip.jmat(spins2[place - 1] / 2, "y"),
                 qutip.jmat(spins2[place - 1] / 2, "z"),
             )
-            found[place, axis] = sum(
-                on_spins(space_cosines(TOP + 1)[p, axis], spins2, {place: one.full()})
-                for p, one in zip("xyz", spin, strict=True)
+            results[place, axis] = sum(
+                on_spins(space_cosines(TOP + 1)[p, axis], spins2, {place: matrix.full()})
+                for p, matrix in zip("xyz", spin, strict=True)
             )
-    return found
+    return results
 
 
 def _replaced(letters: list[dict[str, complex]], spins2: tuple[int, ...], which: tuple[int, ...]) -> np.ndarray:
@@ -64,11 +64,11 @@ def _replaced(letters: list[dict[str, complex]], spins2: tuple[int, ...], which:
     of, total, count = _factors(spins2, which), 0.0, 0
     kinds = [*which, *(0 for _ in letters[len(which) :])]
     for order in set(permutations(kinds)):
-        for own in permutations(range(len(letters))):
+        for value in permutations(range(len(letters))):
             product = None
-            for kind, at in zip(order, own, strict=True):
-                one = sum(c * of[kind, axis] for axis, c in letters[at].items())
-                product = one if product is None else product @ one
+            for kind, at in zip(order, value, strict=True):
+                factor = sum(c * of[kind, axis] for axis, c in letters[at].items())
+                product = factor if product is None else product @ factor
             total, count = total + product, count + 1
     return total / count
 

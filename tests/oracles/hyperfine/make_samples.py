@@ -12,20 +12,22 @@ HEAD = "frequency_mhz,error_mhz,upper,lower\n"  # quanta N (Ka Kc | K) F as the 
 HERE = Path(__file__).parent
 
 
-def of_catalogue(path: Path, n_max: int, k_max: int) -> list[str]:
+def catalogue_rows(path: Path, n_max: int, k_max: int) -> list[str]:
     """The measured lines (negative tag) of a catalogue up to N and K max."""
-    found = read_cat(gzip.decompress(path.read_bytes()))
+    catalogue = read_cat(gzip.decompress(path.read_bytes()))
     rows = []
-    for i in range(len(found)):
-        quanta = [[int(abs(x)) for x in side[i] if x > -100] for side in (found.quanta_upper, found.quanta_lower)]
-        width = {2: 3, 3: 4}[int(found.qnfmt[i]) // 100]
+    for i in range(len(catalogue)):
+        quanta = [
+            [int(abs(x)) for x in side[i] if x > -100] for side in (catalogue.quanta_upper, catalogue.quanta_lower)
+        ]
+        width = {2: 3, 3: 4}[int(catalogue.qnfmt[i]) // 100]
         up, low = (side[:width] for side in quanta)
-        if found.tag[i] < 0 and max(up[0], low[0]) <= n_max and max(up[1], low[1]) <= k_max:
-            rows.append(_row(float(found.frequency_mhz[i]), float(found.error_mhz[i]), up, low))
+        if catalogue.tag[i] < 0 and max(up[0], low[0]) <= n_max and max(up[1], low[1]) <= k_max:
+            rows.append(_row(float(catalogue.frequency_mhz[i]), float(catalogue.error_mhz[i]), up, low))
     return rows
 
 
-def of_lines(path: Path, columns: list[int], count: int) -> list[str]:
+def measured_rows(path: Path, columns: list[int], count: int) -> list[str]:
     """The first lines of a .lin file; columns: which of its quanta are N, K, F."""
     rows = []
     for line in path.read_text(encoding="utf-8").splitlines()[:count]:
@@ -43,10 +45,10 @@ def _row(frequency: float, error: float, up: list[int], low: list[int]) -> str:
 def main(shared: Path) -> None:
     reference = shared / "reference"
     samples = {
-        "ch3cl": of_catalogue(reference / "catalogues" / "c050007.cat.gz", 8, 9),
-        "hnco": of_catalogue(reference / "library_lines" / "c043002.cat.gz", 4, 1),
-        "ch3cn": of_lines(reference / "fits" / "ch3cn_MeCN" / "ch3cn_MeCN.lin", [0, 1, 3], 99),
-        "csf": of_lines(reference / "fits" / "csf" / "csf.lin", [0, 1, 2], 14),
+        "ch3cl": catalogue_rows(reference / "catalogues" / "c050007.cat.gz", 8, 9),
+        "hnco": catalogue_rows(reference / "library_lines" / "c043002.cat.gz", 4, 1),
+        "ch3cn": measured_rows(reference / "fits" / "ch3cn_MeCN" / "ch3cn_MeCN.lin", [0, 1, 3], 99),
+        "csf": measured_rows(reference / "fits" / "csf" / "csf.lin", [0, 1, 2], 14),
     }
     for name, rows in samples.items():
         (HERE / f"{name}.csv").write_text(HEAD + "".join(rows), encoding="utf-8")

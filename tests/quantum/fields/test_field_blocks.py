@@ -70,9 +70,9 @@ def test_absolute_cosine_squares_to_cosine_squared():
     space = field_space(top, 160, [square])
     for m in (0, 2):
         for block in space.blocks(m)[:4]:
-            found = (absolute_cosine(block) @ absolute_cosine(block))[:3, :3]
+            computed = (absolute_cosine(block) @ absolute_cosine(block))[:3, :3]
             assert np.allclose(
-                found, block.matrix(square)[:3, :3], atol=2e-6
+                computed, block.matrix(square)[:3, :3], atol=2e-6
             )  # |cosθ| has a kink: its series falls as J^-4
 
 
@@ -104,8 +104,8 @@ def test_a_tilted_field_is_a_rotated_one(text, a, b, c):
     field = Rotation.from_euler("zyz", [0.3, 0.7, -1.1]).apply(Z)
     turned = [Contraction([a, b, c], field), Contraction(tensor, np.outer(field, field))]
     for contractions in (straight, turned):
-        found = energies(tilted_space(top, 4, contractions), zip(contractions, (5.0, 3.0), strict=True), 4)
-        assert np.allclose(along, found, atol=1e-11)  # round-off of energies of 200 MHz
+        energies_ = energies(tilted_space(top, 4, contractions), zip(contractions, (5.0, 3.0), strict=True), 4)
+        assert np.allclose(along, energies_, atol=1e-11)  # round-off of energies of 200 MHz
 
 
 @pytest.mark.parametrize("representation", ["Ir", "Il", "IIIr", "IIIl"])
@@ -138,11 +138,11 @@ def test_direction_cosines_are_those_of_a_rotation(representation):
 
 def test_left_and_right_handed_representations_agree():
     dipole = Contraction(DIPOLE, Z)
-    found = []
+    results = []
     for representation in ("Ir", "Il", "IIr", "IIIr", "IIIl"):
         top = Top.from_constants(Constants(A=10.0, B=6.0, C=4.0, representation=representation))
-        found.append(energies(field_space(top, 4, [dipole]), [(dipole, 3.0)], 4))
-    assert np.ptp(found, axis=0).max() < 1e-11  # round-off of energies of 200 MHz
+        results.append(energies(field_space(top, 4, [dipole]), [(dipole, 3.0)], 4))
+    assert np.ptp(results, axis=0).max() < 1e-11  # round-off of energies of 200 MHz
 
 
 # Blocks

@@ -58,11 +58,11 @@ def evolved(
     """⟨O⟩ at times (observables, times) from one basis state, in the interaction picture: DOP853 in the window, phases after it."""
     energies, vectors = np.linalg.eigh(free)
     turn = lambda matrix: vectors.conj().T @ matrix @ vectors  # noqa: E731
-    omega, moved, shown = RAD_PER_PS * energies, [(turn(one), f) for one, f in acting], [turn(one) for one in seen]
+    omega, moved, shown = RAD_PER_PS * energies, [(turn(item), f) for item, f in acting], [turn(item) for item in seen]
 
     def rate(t: float, state: np.ndarray) -> np.ndarray:
         phases = np.exp(1j * omega * t)
-        return -1j * phases * sum(RAD_PER_PS * f(t) * (one @ (state / phases)) for one, f in moved)
+        return -1j * phases * sum(RAD_PER_PS * f(t) * (item @ (state / phases)) for item, f in moved)
 
     start = np.exp(1j * omega * window[0]) * vectors.conj().T[:, first]
     steps = {"rtol": 1e-11, "atol": 1e-13, "max_step": (window[1] - window[0]) / 40}
@@ -70,7 +70,7 @@ def evolved(
     out = []
     for t in times:
         state = np.exp(-1j * omega * t) * (solved.sol(t) if t < window[1] else solved.y[:, -1])
-        out.append([float((state.conj() @ one @ state).real) for one in shown])
+        out.append([float((state.conj() @ item @ state).real) for item in shown])
     return np.array(out).T
 
 
@@ -82,9 +82,9 @@ def gaussian(size: float, fwhm: float, centre: float = 0.0, thz: float = 0.0, ph
 
 def agree(trace, reference: np.ndarray) -> None:
     """To the error that the trace states, and to what DOP853 leaves."""
-    found = np.array(list(trace.cosines.values()))
-    assert np.abs(found - reference).max() <= trace.error_estimate + 1e-8  # DOP853 at 1e-11, J max of the matrix
-    assert np.ptp(found) > 0.01  # something happens
+    computed = np.array(list(trace.cosines.values()))
+    assert np.abs(computed - reference).max() <= trace.error_estimate + 1e-8  # DOP853 at 1e-11, J max of the matrix
+    assert np.ptp(computed) > 0.01  # something happens
 
 
 def test_elliptical_light_on_an_asymmetric_top():
@@ -154,15 +154,15 @@ def test_maps_of_m_above_0_beside_a_laser(m):
     """Three dipole components: M and -M in blocks of complex matrices; energies and cosines by rank."""
     dipole, alpha = np.array([1.2, 0.8, 0.5]), np.diag([9.0, 6.0, 4.5])
     top = Top.from_constants("A=8100 B=3900 C=2900 MHz", dipole_abc_debye=tuple(dipole)).with_polarizability(alpha, "")
-    found = stark_map(top, [10.0], j_highest=3, m_values=(m,), intensity_w_per_cm2=2e9, tolerance_mhz=1e-5)
+    stark = stark_map(top, [10.0], j_highest=3, m_values=(m,), intensity_w_per_cm2=2e9, tolerance_mhz=1e-5)
     basis = [state for state in states(12) if state[2] == m]
     fixed = rigid(basis, 3900.0, 2900.0, 8100.0) - LIGHT_MHZ * 2e9 * contracted_tensors(
         basis, np.diag(alpha.diagonal()[ABC]), ZZ
     )
     energies, vectors = np.linalg.eigh(fixed - DIPOLE_MHZ * 10 * contracted_vectors(basis, dipole[ABC], Z))
     cosine = np.einsum("is,ik,ks->s", vectors.conj(), contracted_vectors(basis, Z, Z), vectors).real
-    assert set(found.m.tolist()) == {m, -m}
-    assert found.energy_mhz == pytest.approx(
-        energies[found.rank], abs=found.accuracy_mhz + 1e-8
+    assert set(stark.m.tolist()) == {m, -m}
+    assert stark.energy_mhz == pytest.approx(
+        energies[stark.rank], abs=stark.accuracy_mhz + 1e-8
     )  # round-off of QuTiP's sums
-    assert found.cosines["costheta"] == pytest.approx(cosine[found.rank], abs=1e-9)  # the same
+    assert stark.cosines["costheta"] == pytest.approx(cosine[stark.rank], abs=1e-9)  # the same

@@ -95,9 +95,9 @@ def test_internal_rotation_with_a_nucleus_in_a_field_is_the_rigid_top_where_noth
     rigid = replace(top, internal_rotation=None)
     expected, states = (
         stark_map(
-            one, [0.0, 2.0], j_highest=1, effects=effects_of(one, True), jmax=4, tolerance_mhz=1e3, most_at_edge=1.0
+            item, [0.0, 2.0], j_highest=1, effects=effects_of(item, True), jmax=4, tolerance_mhz=1e3, most_at_edge=1.0
         )
-        for one in (rigid, top)
+        for item in (rigid, top)
     )
     for species, copies in (("A", 1), ("E", 2)):
         named = np.char.startswith(states.label, species)

@@ -44,25 +44,25 @@ def table(shared: Path, name: str) -> np.ndarray:
 def test_ocs_to_a_hertz(shared):
     """To the accuracy of the file, 1e-6 MHz."""
     reference = table(shared, "stark_ocs")
-    found = stark_map(OCS, reference[:, 0], j_highest=5)
+    stark = stark_map(OCS, reference[:, 0], j_highest=5)
     names = ["J0M0", "J1M0", "J2M0", "J3M0", "J1M1", "J2M1", "J3M1", "J4M1", "J2M2", "J3M2", "J4M2", "J5M2"]
     for column, name in enumerate(names, 1):
-        rows = found.curve(name[1], int(name[3]))
-        assert np.abs(found.energy_mhz[rows] - reference[:, column]).max() < 1e-6
+        rows = stark.curve(name[1], int(name[3]))
+        assert np.abs(stark.energy_mhz[rows] - reference[:, column]).max() < 1e-6
 
 
 @pytest.mark.oracle
 def test_ch3cn(shared):
     """To 2e-6 MHz, the accuracy of the file; signs of K and M there are those of the other sign of the field here or there."""
     reference = table(shared, "stark_ch3cn")
-    found = stark_map(CH3CN, reference[:, 0], j_highest=6, m_values=(0, 1, 2))
+    stark = stark_map(CH3CN, reference[:, 0], j_highest=6, m_values=(0, 1, 2))
     for m in range(3):
         for k in range(-3, 4):
             first = 1 + 4 * ((k + 3) + 7 * m)
             curves = [
-                c for c in found.curves() if found.m[c.start] == m and found.block[c.start] == f"k={k if m else abs(k)}"
+                c for c in stark.curves() if stark.m[c.start] == m and stark.block[c.start] == f"k={k if m else abs(k)}"
             ]
-            ours = np.array([found.energy_mhz[c] for c in curves[:4]]).T
+            ours = np.array([stark.energy_mhz[c] for c in curves[:4]]).T
             assert np.abs(ours - reference[:, first : first + 4]).max() < 2e-6, (k, m)
 
 
@@ -70,17 +70,17 @@ def test_ch3cn(shared):
 def test_h2co(shared):
     """The lowest 16 states of M = 0, 1, 2 to 1e-5 MHz, the accuracy of the file, from the ground state without field."""
     reference = table(shared, "stark_H2CO_Jmax15")
-    found = stark_map(H2CO, reference[::5, 0], j_highest=9, m_values=(0, 1, 2), tolerance_mhz=1e-4)
+    stark = stark_map(H2CO, reference[::5, 0], j_highest=9, m_values=(0, 1, 2), tolerance_mhz=1e-4)
     for m in range(3):
-        curves = [found.energy_mhz[c] for c in found.curves() if found.m[c.start] == m]
+        curves = [stark.energy_mhz[c] for c in stark.curves() if stark.m[c.start] == m]
         lowest = np.sort(np.array(curves), axis=0)[:16].T
         assert np.abs(lowest - reference[::5, 1 + 16 * m : 17 + 16 * m]).max() < 1e-5
 
 
 def test_benzonitrile_ground_state_at_100_kv_per_cm():
     """-1.34489847e-22 J: the test of CMIstark (the same constants, J ≤ 15)."""
-    found = stark_map(BENZONITRILE, [100.0], j_highest=0, jmax=15)
-    joule = found.energy_mhz[0] * 1e6 * PLANCK_J_S
+    stark = stark_map(BENZONITRILE, [100.0], j_highest=0, jmax=15)
+    joule = stark.energy_mhz[0] * 1e6 * PLANCK_J_S
     assert joule == pytest.approx(-1.34489847e-22, rel=3e-8)  # its constants are of an older CODATA, 1.4e-8 apart
 
 
@@ -88,13 +88,13 @@ def test_benzonitrile_ground_state_at_100_kv_per_cm():
 
 
 def test_without_field_levels_are_those_of_the_free_top():
-    found = stark_map(H2CO, [0.0], j_highest=2, tolerance_mhz=1e-3)
+    stark = stark_map(H2CO, [0.0], j_highest=2, tolerance_mhz=1e-3)
     space = field_space(H2CO, 2, [Contraction(H2CO.dipole_abc_debye, [0, 0, 1])])
     labels = {space.levels.label(row): energy for row, energy in enumerate(space.levels.energy_mhz)}
-    assert [found.energy_mhz[i] for i in range(len(found))] == pytest.approx(
-        [labels[str(name)] for name in found.label], abs=1e-6
+    assert [stark.energy_mhz[i] for i in range(len(stark))] == pytest.approx(
+        [labels[str(name)] for name in stark.label], abs=1e-6
     )  # round-off of 1e6 MHz
-    assert np.abs(found.slope).max() < 1e-6  # no dipole without a field
+    assert np.abs(stark.slope).max() < 1e-6  # no dipole without a field
 
 
 @pytest.mark.parametrize(
@@ -107,9 +107,9 @@ def test_without_field_levels_are_those_of_the_free_top():
 def test_second_order_coefficients_of_ocs(j, m, coefficient):
     """W/E² = (μ²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], in MHz/(kV/cm)², for the rigid top."""
     rigid = Top.from_constants("B=6081.492475 MHz", dipole_abc_debye=(0.71519, 0, 0))
-    found = stark_map(rigid, [0.0, 0.05], j_highest=3, tolerance_mhz=1e-9)
-    rows = found.curve(str(j), m)
-    energies = found.energy_mhz[rows]
+    stark = stark_map(rigid, [0.0, 0.05], j_highest=3, tolerance_mhz=1e-9)
+    rows = stark.curve(str(j), m)
+    energies = stark.energy_mhz[rows]
     assert (energies[1] - energies[0]) / 0.0025 == pytest.approx(coefficient, abs=5e-6)  # fourth order: 2e-6
 
 
@@ -117,11 +117,11 @@ def test_second_order_coefficients_of_ocs(j, m, coefficient):
 @settings(max_examples=12, deadline=None)
 def test_first_order_of_a_symmetric_top(k, m):
     """dW/dE = -μ KM/[J(J+1)]; the slope of (K, M) and that of (-K, M) are opposite."""
-    found = stark_map(CH3CN, [0.0], j_highest=3, m_values=(m,))
-    for rows in found.curves():
-        j, state_k = (int(part) for part in found.label[rows.start].split())
+    stark = stark_map(CH3CN, [0.0], j_highest=3, m_values=(m,))
+    for rows in stark.curves():
+        j, state_k = (int(part) for part in stark.label[rows.start].split())
         if state_k == k and j >= m:
-            assert found.slope[rows.start] == pytest.approx(3.92197 * k * m / (j * (j + 1)) if j else 0.0, abs=1e-6)
+            assert stark.slope[rows.start] == pytest.approx(3.92197 * k * m / (j * (j + 1)) if j else 0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("omega", [1.0, 50.0, 500.0])
@@ -131,10 +131,10 @@ def test_pendular_energies_are_spheroidal_characteristic_values(omega):
     top = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.0, 0, 0)).with_polarizability(
         np.diag([4.0, 0, 0]), "test"
     )
-    found = stark_map(top, [0.0], j_highest=2, intensity_w_per_cm2=intensity, tolerance_mhz=1e-7)
-    for rows in found.curves():
-        j, m = int(found.label[rows.start]), int(found.m[rows.start])
-        assert found.energy_mhz[rows.start] / 6000.0 == pytest.approx(obl_cv(m, j, np.sqrt(omega)), abs=1e-10)
+    stark = stark_map(top, [0.0], j_highest=2, intensity_w_per_cm2=intensity, tolerance_mhz=1e-7)
+    for rows in stark.curves():
+        j, m = int(stark.label[rows.start]), int(stark.m[rows.start])
+        assert stark.energy_mhz[rows.start] / 6000.0 == pytest.approx(obl_cv(m, j, np.sqrt(omega)), abs=1e-10)
 
 
 @pytest.mark.oracle
@@ -144,28 +144,28 @@ def test_pendular_cosines(shared):
         omega, j, m, energy, cosine = row[0], int(row[1]), int(row[2]), row[3], row[4]
         intensity = omega * 6000.0 / (MHZ_ANGSTROM3_W_PER_CM2 * 4.0)
         top = Top.from_constants("B=6000 MHz").with_polarizability(np.diag([4.0, 0, 0]), "test")
-        found = stark_map(top, [0.0], j_highest=j, m_values=(m,), intensity_w_per_cm2=intensity)
-        place = found.curve(str(j), m).start
-        assert found.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
-        assert found.cosines["cos2theta"][place] == pytest.approx(
+        stark = stark_map(top, [0.0], j_highest=j, m_values=(m,), intensity_w_per_cm2=intensity)
+        place = stark.curve(str(j), m).start
+        assert stark.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
+        assert stark.cosines["cos2theta"][place] == pytest.approx(
             cosine, abs=1e-7
         )  # a vector is as good as √ of the energy
     for omega, j, m, energy, cosine in table(shared, "pendular_orientation"):
         field = omega * 6000.0 / MHZ_PER_DEBYE_KV_PER_CM
         top = Top.from_constants("B=6000 MHz", dipole_abc_debye=(1.0, 0, 0))
-        found = stark_map(top, [field], j_highest=int(j), m_values=(int(m),))
-        place = found.curve(str(int(j)), int(m)).start
-        assert found.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
-        assert found.cosines["costheta"][place] == pytest.approx(cosine, abs=1e-7)  # as above
+        stark = stark_map(top, [field], j_highest=int(j), m_values=(int(m),))
+        place = stark.curve(str(int(j)), int(m)).start
+        assert stark.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
+        assert stark.cosines["costheta"][place] == pytest.approx(cosine, abs=1e-7)  # as above
 
 
 def test_effective_dipole_is_minus_the_slope_of_the_energy():
     fields = np.array([49.99, 50.0, 50.01])
-    found = stark_map(BENZONITRILE, fields, j_highest=1, tolerance_mhz=1e-6)
-    for rows in found.curves():
-        slope = (found.energy_mhz[rows][2] - found.energy_mhz[rows][0]) / 0.02
+    stark = stark_map(BENZONITRILE, fields, j_highest=1, tolerance_mhz=1e-6)
+    for rows in stark.curves():
+        slope = (stark.energy_mhz[rows][2] - stark.energy_mhz[rows][0]) / 0.02
         assert -slope / MHZ_PER_DEBYE_KV_PER_CM == pytest.approx(
-            found.slope[rows][1], abs=2e-6
+            stark.slope[rows][1], abs=2e-6
         )  # third derivative, round-off
 
 
@@ -184,7 +184,7 @@ def test_processes_change_no_number():
     with ThreadPoolExecutor(2) as pool:
         for top, fields in ((OCS, 50), (nearly_c2v(0.1), 3), (OCS, 20_000)):
             grid = np.linspace(0, 100, fields)
-            maps = [stark_map(top, grid, j_highest=2, tolerance_mhz=1e-3, executor=one) for one in (None, pool)]
+            maps = [stark_map(top, grid, j_highest=2, tolerance_mhz=1e-3, executor=item) for item in (None, pool)]
             assert (maps[0].energy_mhz == maps[1].energy_mhz).all()
             assert (maps[0].cosines["costheta"] == maps[1].cosines["costheta"]).all()
 
@@ -198,12 +198,12 @@ def test_a_j_max_too_small_is_refused():
 
 def test_accuracy_and_leakage_stand_beside_each_state():
     """The highest state is the least accurate; a tolerance of energies alone would leave cosines wrong: J max rises for those too."""
-    found = stark_map(OCS, [0.0, 1000.0], j_highest=3, tolerance_mhz=1e-6)
+    stark = stark_map(OCS, [0.0, 1000.0], j_highest=3, tolerance_mhz=1e-6)
     finer = stark_map(OCS, [0.0, 1000.0], j_highest=3, tolerance_mhz=1e-8)
-    assert found.truncation_mhz.max() < 1e-6
-    error = np.abs(found.energy_mhz - finer.energy_mhz)
-    assert (error <= found.truncation_mhz + 2 * found.round_off_mhz).all()  # both maps have round-off
-    assert error[found.curve("3", 0)][1] > 1e-8 > found.truncation_mhz[found.curve("0", 0)][1]
+    assert stark.truncation_mhz.max() < 1e-6
+    error = np.abs(stark.energy_mhz - finer.energy_mhz)
+    assert (error <= stark.truncation_mhz + 2 * stark.round_off_mhz).all()  # both maps have round-off
+    assert error[stark.curve("3", 0)][1] > 1e-8 > stark.truncation_mhz[stark.curve("0", 0)][1]
     rough = stark_map(OCS, [300.0], j_highest=1, tolerance_mhz=1e3)
     assert rough.edge_population.max() <= 1e-6  # the rule
     assert np.abs(rough.cosines["costheta"] - stark_map(OCS, [300.0], j_highest=1).cosines["costheta"]).max() < 1e-5
@@ -230,13 +230,15 @@ def nearly_c2v(mu_b: float) -> Top:
 @pytest.mark.slow
 def test_adiabatic_labels_do_not_depend_on_the_grid():
     """76 to 2401 fields: at those that all grids have, each label has one energy."""
-    found = [
+    computed = [
         stark_map(nearly_c2v(0.05), np.linspace(0, 150, n), j_highest=2, m_values=(1,), tolerance_mhz=1e-3)
         for n in (76, 601, 2401)
     ]
-    for rows in zip(*(one.curves() for one in found), strict=True):
-        assert len({str(one.label[r.start]) for one, r in zip(found, rows, strict=True)}) == 1
-        sampled = [one.energy_mhz[r][:: (len(one.fields) - 1) // 75] for one, r in zip(found, rows, strict=True)]
+    for rows in zip(*(entry.curves() for entry in computed), strict=True):
+        assert len({str(entry.label[r.start]) for entry, r in zip(computed, rows, strict=True)}) == 1
+        sampled = [
+            entry.energy_mhz[r][:: (len(entry.fields) - 1) // 75] for entry, r in zip(computed, rows, strict=True)
+        ]
         assert np.ptp(sampled, axis=0).max() < 2e-3  # the tolerance, twice
 
 
@@ -259,15 +261,17 @@ def test_labels_by_overlap_would_depend_on_the_grid():
 def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
     """With μ_b = 1e-4 D the crossings of C2v species are avoided by below 5 MHz, and its true gaps are above."""
 
-    def ends(found, column: str) -> dict:
-        names = getattr(found, column)
-        return {(str(names[r.stop - 1]), int(found.m[r.start])): found.energy_mhz[r][-1] for r in found.curves()}
+    def ends(computed, column: str) -> dict:
+        names = getattr(computed, column)
+        return {
+            (str(names[r.stop - 1]), int(computed.m[r.start])): computed.energy_mhz[r][-1] for r in computed.curves()
+        }
 
     settings = {"j_highest": 2, "m_values": (1,), "tolerance_mhz": 1e-3, "diabatic_gap_mhz": 5.0}
     symmetric = ends(stark_map(nearly_c2v(0.0), np.linspace(0, 100, 11), **settings), "diabatic_label")
     coarse, fine = (stark_map(nearly_c2v(1e-4), np.linspace(0, 100, n), **settings) for n in (11, 41))
-    for found in (coarse, fine):
-        named = ends(found, "diabatic_label")
+    for computed in (coarse, fine):
+        named = ends(computed, "diabatic_label")
         assert {key: named[key] for key in symmetric} == pytest.approx(
             symmetric, abs=5e-3
         )  # μ_b to second order: 1e-3 MHz
@@ -285,9 +289,9 @@ def test_two_crossings_between_two_fields_are_seen():
         order = np.argsort(levels, axis=-1)
         return np.take_along_axis(levels, order, -1), np.take_along_axis(slopes, order, -1)
 
-    found = crossings(solve, np.array([0.0, 1.0]), 1.0)
-    assert [rank for _, rank in found] == [0, 0]
-    assert [at for at, _ in found] == pytest.approx([(np.pi - 0.4) / 9, (2 * np.pi - 0.4) / 9], abs=1e-4)
+    computed = crossings(solve, np.array([0.0, 1.0]), 1.0)
+    assert [rank for _, rank in computed] == [0, 0]
+    assert [at for at, _ in computed] == pytest.approx([(np.pi - 0.4) / 9, (2 * np.pi - 0.4) / 9], abs=1e-4)
 
 
 # Bad input
@@ -329,11 +333,11 @@ def test_chains_have_the_states_of_the_full_matrix_or_none(seed, size):
     slope = np.diag(beside, 1) + np.diag(beside, -1) + np.diag(rng.normal(size=size))
     fields, count = np.linspace(-200, 300, 61), 3
     assert is_chain((fixed, slope))
-    found = chain_states([((fixed, slope), count)], fields)
+    computed = chain_states([((fixed, slope), count)], fields)
     matrices = fixed + fields[:, None, None] * slope
-    if found is None:
+    if computed is None:
         return
-    energies, vectors = found[0]
+    energies, vectors = computed[0]
     assert np.abs(energies - np.linalg.eigvalsh(matrices)[:, :count]).max() < 1e-9  # round-off of 1e5
     residual = matrices @ vectors - energies[:, None, :] * vectors
     assert np.abs(residual).max() < 1e-4  # the last change: 1e-9 of a gap, which is at most 1e5; seen: 4e-7
@@ -360,17 +364,17 @@ def test_chains_of_a_top_are_solved_without_lapack():
 @pytest.mark.parametrize(("field", "jmax"), [(200.0, 25), (20000.0, 60)])
 def test_round_off_is_stated(field, jmax):
     """Energies of 40 digits differ by less than what is stated, and by more than a ten-thousandth of it."""
-    found = stark_map(OCS, [field], j_highest=1, m_values=(0,), jmax=jmax)
+    stark = stark_map(OCS, [field], j_highest=1, m_values=(0,), jmax=jmax)
     with mpmath.workdps(40):
         b, d = (mpmath.mpf(OCS.constants.values[name]) for name in ("B", "D"))
         scale = mpmath.mpf(MHZ_PER_DEBYE_KV_PER_CM) * mpmath.mpf(OCS.dipole_abc_debye[0]) * field
-        size = found.jmax + 20
+        size = stark.jmax + 20
         main = [b * j * (j + 1) - d * (j * (j + 1)) ** 2 for j in range(size)]
         squares = [(scale * j) ** 2 / (4 * j * j - 1) for j in range(1, size)]
-        lowest = [_nth_energy(main, squares, rank, found.energy_mhz[rank]) for rank in (0, 1)]
-    errors = [abs(float(true - mpmath.mpf(one))) for true, one in zip(lowest, found.energy_mhz.tolist(), strict=True)]
-    assert found.round_off_mhz[0] <= found.accuracy_mhz
-    assert 1e-4 * found.round_off_mhz[0] < max(errors) <= found.round_off_mhz[0]
+        lowest = [_nth_energy(main, squares, rank, stark.energy_mhz[rank]) for rank in (0, 1)]
+    errors = [abs(float(true - mpmath.mpf(item))) for true, item in zip(lowest, stark.energy_mhz.tolist(), strict=True)]
+    assert stark.round_off_mhz[0] <= stark.accuracy_mhz
+    assert 1e-4 * stark.round_off_mhz[0] < max(errors) <= stark.round_off_mhz[0]
 
 
 def _nth_energy(main, squares, rank, near):

@@ -42,13 +42,13 @@ def direct_product(sigma, m, jmax, strength, waves=10):
                 cosines[kk - k][row, column] = root * symbol(jj, 1, j, -m, 0, m) * symbol(jj, 1, j, -kk, kk - k, k)
     along_a, along_b = cosines[0], (cosines[-1] - cosines[1]) / np.sqrt(2)
     waves_m = 3.0 * np.arange(-waves, waves + 1) + sigma
-    p, one = np.diag(waves_m), np.eye(2 * waves + 1)
-    cos3 = (np.eye(len(one), k=1) + np.eye(len(one), k=-1)) / 2
+    p, identity = np.diag(waves_m), np.eye(2 * waves + 1)
+    cos3 = (np.eye(len(identity), k=1) + np.eye(len(identity), k=-1)) / 2
     rotation = ABC["A"] * pa @ pa + ABC["B"] * pb @ pb + (ABC["C"] * pc @ pc).real + 700.0 * (pa @ pb + pb @ pa)
     rotation = rotation - strength * (DIPOLE[0] * along_a + DIPOLE[1] * along_b)
-    slip = np.kron(np.eye(n), p) - 0.08 * np.kron(pa, one)
+    slip = np.kron(np.eye(n), p) - 0.08 * np.kron(pa, identity)
     return np.linalg.eigvalsh(
-        np.kron(rotation, one) + 5.2 * CM * slip @ slip + np.kron(np.eye(n), 20.0 * CM * (one - cos3))
+        np.kron(rotation, identity) + 5.2 * CM * slip @ slip + np.kron(np.eye(n), 20.0 * CM * (identity - cos3))
     )
 
 
@@ -79,16 +79,18 @@ def test_without_coupling_both_species_have_the_map_of_the_rigid_top(intensity):
         top.constants, dipole_abc_debye=DIPOLE, polarizability_abc_angstrom3=polarizability
     )
     top = replace(top, polarizability_abc_angstrom3=rigid.polarizability_abc_angstrom3)
-    expected, found = (
-        rotor.api.stark_map(one, fields, j_highest=2, intensity_w_per_cm2=intensity) for one in (rigid, top)
+    expected, computed = (
+        rotor.api.stark_map(item, fields, j_highest=2, intensity_w_per_cm2=intensity) for item in (rigid, top)
     )
     for strength in fields:
         at = expected.field == strength
         known = np.sort(np.repeat(expected.energy_mhz[at], expected.copies[at]))
         for species, copies in (("A", 1), ("E", 2)):
-            named = np.char.startswith(found.label, species)
-            here = named & (found.field == strength)
-            energies = np.sort(np.repeat(found.energy_mhz[here], found.copies[here])) - found.free_mhz[named].min()
+            named = np.char.startswith(computed.label, species)
+            here = named & (computed.field == strength)
+            energies = (
+                np.sort(np.repeat(computed.energy_mhz[here], computed.copies[here])) - computed.free_mhz[named].min()
+            )
             assert np.abs(energies - np.repeat(known, copies)).max() < 1e-5  # rounding of 1e7 MHz
 
 
@@ -110,7 +112,7 @@ def test_maps_do_not_depend_on_the_frame():
     same = rotor.Top.from_constants(
         constants, dipole_abc_debye=turned, internal_rotation=InternalRotationConstants(values, "RAM", vt_max=0)
     )
-    ours, others = (rotor.api.stark_map(one, [0.0, 3.0], j_highest=1) for one in (top, same))
+    ours, others = (rotor.api.stark_map(item, [0.0, 3.0], j_highest=1) for item in (top, same))
     assert np.abs(np.sort(ours.energy_mhz) - np.sort(others.energy_mhz)).max() < 1e-5
 
 

@@ -22,24 +22,24 @@ from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 def test_a_linear_top_is_linear_in_the_field():
     """E = E0 - g μ_N B M, exactly."""
     top = Top.from_constants("B=6000 D=0.001 MHz")
-    found = zeeman_map(top, [0.0, 2.0], -0.03, j_highest=2)
-    for rows in found.curves():
-        j, m = int(found.label[rows.start]), int(found.m[rows.start])
+    zeeman = zeeman_map(top, [0.0, 2.0], -0.03, j_highest=2)
+    for rows in zeeman.curves():
+        j, m = int(zeeman.label[rows.start]), int(zeeman.m[rows.start])
         free = 6000.0 * j * (j + 1) - 0.001 * (j * (j + 1)) ** 2
         shift = 0.03 * NUCLEAR_MAGNETON_MHZ_PER_T * 2.0 * m
-        assert found.energy_mhz[rows].tolist() == pytest.approx([free, free + shift], abs=1e-9)  # round-off of 36 GHz
-        assert found.slope[rows.start] == pytest.approx(-0.03 * m, abs=1e-12)
+        assert zeeman.energy_mhz[rows].tolist() == pytest.approx([free, free + shift], abs=1e-9)  # round-off of 36 GHz
+        assert zeeman.slope[rows.start] == pytest.approx(-0.03 * m, abs=1e-12)
 
 
 def test_a_symmetric_top_to_first_order():
     """-μ_N B M [g⊥ + (g∥ - g⊥) K²/(J(J+1))] (Flygare)."""
     top = Top.from_constants("A=20000 B=9000 MHz")
-    found = zeeman_map(top, [0.0], [0.3, 0.1, 0.1], j_highest=2)
-    for rows in found.curves():
-        j, k = (int(part) for part in found.label[rows.start].split())
-        m = int(found.m[rows.start])
+    zeeman = zeeman_map(top, [0.0], [0.3, 0.1, 0.1], j_highest=2)
+    for rows in zeeman.curves():
+        j, k = (int(part) for part in zeeman.label[rows.start].split())
+        m = int(zeeman.m[rows.start])
         first = m * (0.1 + 0.2 * k * k / (j * (j + 1))) if j else 0.0
-        assert found.slope[rows.start] == pytest.approx(first, abs=1e-12)
+        assert zeeman.slope[rows.start] == pytest.approx(first, abs=1e-12)
 
 
 @pytest.mark.parametrize("g", [np.diag([0.6, -0.2, 0.3]), np.array([[0.6, 0.1, 0], [0.1, -0.2, 0], [0, 0, 0.3]])])
@@ -86,15 +86,15 @@ def test_what_of_the_field_is_left_out_is_said():
         replace(rotor.read("HC3N"), spin_constants=SpinConstants.parse("chi_aa(14N)=-4.3 MHz")),
         np.diag([0.0, -0.01, -0.01]),
     )
-    found = {}
+    results = {}
     for spins, chi in ((False, None), (True, tensor_for("linear", [-1.0]))):
         top = replace(hc3n, magnetic=MagneticTensors(g, chi))
         request = ZeemanRequest(top, (-0.5, 0.25), j_highest=1, hyperfine=spins)
-        found[spins] = {one.name: one.size_mhz for one in magnetic_limits(request)}
+        results[spins] = {item.name: item.size_mhz for item in magnetic_limits(request)}
         listed = answer_zeeman(request).facts()["limits"]
-        assert {one["name"] for one in listed} >= found[spins].keys()
-        sizes = [one["size_mhz"] for one in listed if one["size_mhz"] is not None]
+        assert {limit["name"] for limit in listed} >= results[spins].keys()
+        sizes = [limit["size_mhz"] for limit in listed if limit["size_mhz"] is not None]
         assert sizes == sorted(sizes, reverse=True)
     proton = 2.7928473 * NUCLEAR_MAGNETON_MHZ_PER_T * 0.5
-    assert found[False] == {"magnetic moments of nuclei": pytest.approx(proton, rel=1e-4), "magnetisability": None}
-    assert found[True] == {}
+    assert results[False] == {"magnetic moments of nuclei": pytest.approx(proton, rel=1e-4), "magnetisability": None}
+    assert results[True] == {}

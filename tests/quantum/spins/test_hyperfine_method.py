@@ -174,13 +174,13 @@ def test_unresolved_components_are_one_line(capsys):
     top = rotor.read("HCONH2")
     lines = line_list(top, jmax=4, temperature_k=300.0, effects=effects_of(top, True))
     for resolution in (1e-6, 0.5, 50.0):
-        found = patterns(lines, resolution)
-        assert found.components.sum() == len(lines)
-        assert found.intensity_nm2_mhz.sum() == pytest.approx(lines.intensity_nm2_mhz.sum(), rel=1e-12)
+        pattern = patterns(lines, resolution)
+        assert pattern.components.sum() == len(lines)
+        assert pattern.intensity_nm2_mhz.sum() == pytest.approx(lines.intensity_nm2_mhz.sum(), rel=1e-12)
     plain = line_list(top, jmax=4, temperature_k=300.0)
-    strong = found.intensity_nm2_mhz > 1e-7
+    strong = pattern.intensity_nm2_mhz > 1e-7
     assert strong.sum() > 30
-    for frequency in found.frequency_mhz[strong]:
+    for frequency in pattern.frequency_mhz[strong]:
         assert np.abs(plain.frequency_mhz - frequency).min() < 0.02  # second order, χ²/(B + C) is 1 kHz; and the cut
     command = ["spectrum", "HCONH2", "--hyperfine", "--jmax", "2", "--range", "21206:21209"]
     assert run([*command, "--resolution", "0.7"]) == 0
@@ -204,9 +204,9 @@ def test_levels_beyond_the_reach_of_the_constants_make_no_lines_with_spins_eithe
     )
     assert bare_kept == split_kept
     low = line_list(top, jmax=2, min_lgint=None, q=1.0, effects=effects_of(top, True))
-    ends = [np.hstack([one.quanta(one.upper), one.quanta(one.lower)]).tolist() for one in (low, split)]
-    of_split = [ends[1].index(quanta) for quanta in ends[0]]
-    assert split.lgint[of_split] == pytest.approx(low.lgint, abs=1e-12)  # the same arithmetic
+    ends = [np.hstack([item.quanta(item.upper), item.quanta(item.lower)]).tolist() for item in (low, split)]
+    split_rows = [ends[1].index(quanta) for quanta in ends[0]]
+    assert split.lgint[split_rows] == pytest.approx(low.lgint, abs=1e-12)  # the same arithmetic
 
 
 def random_tops(seed: int, count: int):
@@ -248,9 +248,9 @@ def test_states_whose_levels_fall_below_the_ground_keep_their_lines_of_low_j(spi
     effects = effects_of(top, spins is not None)
     high, low = (line_list(top, jmax=j, min_lgint=None, q=1.0, effects=effects) for j in (36, 3))
     assert high.untrusted > 0 == low.untrusted
-    kept = high.levels.rotational[high.levels.weight > 0]
-    assert 20 < kept.max() < 36
-    ends = [np.hstack([one.quanta(one.upper), one.quanta(one.lower)]).tolist() for one in (low, high)]
+    selected = high.levels.rotational[high.levels.weight > 0]
+    assert 20 < selected.max() < 36
+    ends = [np.hstack([item.quanta(item.upper), item.quanta(item.lower)]).tolist() for item in (low, high)]
     rows = [ends[1].index(quanta) for quanta in ends[0]]
     assert high.lgint[rows] == pytest.approx(
         low.lgint, abs=1e-9

@@ -42,9 +42,9 @@ CASES = {  # spins, one-spin terms (kind, spin, tensor), two-spin terms (spins, 
 
 
 def _named(name: str) -> SpinConstants:
-    twice, ones, pairs = CASES[name]
+    twice, singles, pairs = CASES[name]
     values = {}
-    for kind, spin, tensor in [*ones, *(("T", f"{one},{two}", t) for one, two, _, t in pairs)]:
+    for kind, spin, tensor in [*singles, *(("T", f"{first},{two}", t) for first, two, _, t in pairs)]:
         m = TENSORS[tensor]
         for i, k in ((0, 1), (0, 2), (1, 2)):
             values[f"{kind}_{'abc'[i]}{'abc'[k]}({spin})"] = m[i, k]
@@ -52,8 +52,8 @@ def _named(name: str) -> SpinConstants:
                 values[f"{kind}_{'abc'[k]}{'abc'[i]}({spin})"] = m[k, i]
         for i in range(3):
             values[f"{kind}_{'abc'[i] * 2}({spin})"] = m[i, i]
-    for one, two, scalar, _ in pairs:
-        values[f"{'b_F' if one == 'S' else 'J'}({one},{two})"] = scalar
+    for first, two, scalar, _ in pairs:
+        values[f"{'b_F' if first == 'S' else 'J'}({first},{two})"] = scalar
     return SpinConstants(values, twice)
 
 
@@ -79,14 +79,14 @@ def _ascending(n: int, p: str) -> np.ndarray:
 
 def _direct(name: str, twice_f: int) -> tuple[np.ndarray, float]:
     """Energies of one F, and the largest energy of all."""
-    twice, ones, pairs = CASES[name]
+    twice, singles, pairs = CASES[name]
     sizes, names = tuple(twice.values()), list(twice)
     keep, spin, raising, projection = _operators(twice)
     phi, n = space_cosines(TOP_N + 1), {axis: rotor_matrix(axis, TOP_N + 1) for axis in "abc"}
     cut = lambda matrix: matrix[np.ix_(keep, keep)]  # noqa: E731
     total = on_spins(cut(sum(x * n[axis] @ n[axis] for x, axis in zip(ABC, "abc", strict=True))), sizes, {})
-    for kind, one, tensor in ones:
-        at, m, size = names.index(one) + 1, TENSORS[tensor], twice[one] / 2
+    for kind, item, tensor in singles:
+        at, m, size = names.index(item) + 1, TENSORS[tensor], twice[item] / 2
         if kind in ("C", "eps"):
             for p, i, j in product("xyz", range(3), range(3)):
                 both = phi[p, "abc"[i]] @ n["abc"[j]] + n["abc"[j]] @ phi[p, "abc"[i]]
@@ -97,16 +97,16 @@ def _direct(name: str, twice_f: int) -> tuple[np.ndarray, float]:
             cosines = sum(m[i, j] * phi[p, "abc"[i]] @ phi[q, "abc"[j]] for i in range(3) for j in range(3))
             squares = (spin[at, p] @ spin[at, q] + spin[at, q] @ spin[at, p]) / 2
             total = total + scale * on_spins(cut(cosines), sizes, {at: squares})
-    for one, two, scalar, tensor in pairs:
-        a, b, m = names.index(one) + 1, names.index(two) + 1, TENSORS[tensor]
+    for item, two, scalar, tensor in pairs:
+        a, b, m = names.index(item) + 1, names.index(two) + 1, TENSORS[tensor]
         for p, q in product("xyz", repeat=2):
             cosines = sum(m[i, j] * phi[p, "abc"[i]] @ phi[q, "abc"[j]] for i in range(3) for j in range(3))
             rotor = cut(cosines) + (scalar * np.eye(len(keep)) if p == q else 0.0)
             total = total + on_spins(rotor, sizes, {a: spin[a, p], b: spin[b, q]})
     here, above = (np.flatnonzero(np.abs(projection - m) < 1e-3) for m in (twice_f / 2, twice_f / 2 + 1))
     highest = null_space(raising[np.ix_(above, here)])
-    own = highest.conj().T @ total[np.ix_(here, here)] @ highest
-    return np.linalg.eigvalsh(own), float(np.abs(np.linalg.norm(total[np.ix_(here, here)], 2)))
+    block = highest.conj().T @ total[np.ix_(here, here)] @ highest
+    return np.linalg.eigvalsh(block), float(np.abs(np.linalg.norm(total[np.ix_(here, here)], 2)))
 
 
 SLOW = [pytest.param(name, marks=[] if "orders" in name else pytest.mark.slow) for name in CASES]
@@ -120,9 +120,11 @@ def test_levels(name):
     total, compared = sum(constants.twice.values()), 0
     for twice_f in range(total % 2, 2 * TOP_N - total + 1, 2):
         slow, size = _direct(name, twice_f)
-        found = np.sort(levels.energy_mhz[levels.multiplicity == twice_f + 1])
-        assert len(found) == len(slow)
-        np.testing.assert_allclose(found, slow, rtol=0, atol=1e-14 * size + 1e-9)  # round-off of energies up to 1e5 MHz
+        sorted_energies = np.sort(levels.energy_mhz[levels.multiplicity == twice_f + 1])
+        assert len(sorted_energies) == len(slow)
+        np.testing.assert_allclose(
+            sorted_energies, slow, rtol=0, atol=1e-14 * size + 1e-9
+        )  # round-off of energies up to 1e5 MHz
         compared += len(slow)
     assert compared >= 12
 

@@ -80,9 +80,9 @@ def test_first_order_pattern_of_a_linear_molecule():
     assert "f" not in lines.levels.halves
     upper = lines.levels.quanta["f"][lines.upper]
     at_n1 = np.abs(lines.frequency_mhz - centre) < 100
-    found = dict(zip(upper[at_n1].tolist(), (lines.frequency_mhz - centre)[at_n1], strict=True))
-    assert set(found) == {0, 1, 2}
-    for f, shift in found.items():
+    by_name = dict(zip(upper[at_n1].tolist(), (lines.frequency_mhz - centre)[at_n1], strict=True))
+    assert set(by_name) == {0, 1, 2}
+    for f, shift in by_name.items():
         assert shift == pytest.approx(_casimir(f), abs=2e-3), f  # second order is about χ²/B
 
 
@@ -193,8 +193,8 @@ def test_perpendicular_spin_rotation_of_a_linear_molecule_is_the_scalar():
     """N has no component along the axis."""
     texts = ("C_bb(1H)=2 C_cc(1H)=2 MHz", "C_iso(1H)=2 MHz")
     tops = [Top.from_constants("B=9400 MHz", spin_constants=SpinConstants.parse(text)) for text in texts]
-    found = [solve_levels(top, 2, effects=effects_of(top, True)).energy_mhz for top in tops]
-    assert found[0] == pytest.approx(found[1], abs=1e-9)  # round-off of 56 GHz
+    computed = [solve_levels(top, 2, effects=effects_of(top, True)).energy_mhz for top in tops]
+    assert computed[0] == pytest.approx(computed[1], abs=1e-9)  # round-off of 56 GHz
 
 
 @pytest.mark.parametrize("spins", ["X=1/3", "X=0.75", "X=-1", "X=3/4", "X"])
@@ -209,8 +209,8 @@ def test_the_classical_limit_counts_the_spins_that_q_counts():
     top = Top.from_constants(
         "B=3000 MHz", dipole_abc_debye=(1, 0, 0), spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz")
     )
-    found = answer_spectrum(SpectrumRequest(top, jmax=2, effects=effects_of(top, True))).facts()["q"]
-    assert found["classical"] == pytest.approx(found["q"], rel=1e-3)  # B/3kT of 1.6e-4
+    computed = answer_spectrum(SpectrumRequest(top, jmax=2, effects=effects_of(top, True))).facts()["q"]
+    assert computed["classical"] == pytest.approx(computed["q"], rel=1e-3)  # B/3kT of 1.6e-4
 
 
 NAMED = {"A": "9.4 GHz", "B": 3100.0, "C": 2500.0, "chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"}
@@ -227,12 +227,12 @@ def test_a_mapping_divides_into_constants_spins_and_states():
 
 
 def test_constants_of_spins_as_text_or_mapping_are_the_same():
-    found = [
-        Top.from_constants("A=9.4 B=3.1 C=2.5 GHz", spin_constants=given, spins="S=1/2").spin_constants
-        for given in ("chi_aa(14N)=-4.2 eps_aa(S)=300 MHz", {"chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"})
+    computed = [
+        Top.from_constants("A=9.4 B=3.1 C=2.5 GHz", spin_constants=source, spins="S=1/2").spin_constants
+        for source in ("chi_aa(14N)=-4.2 eps_aa(S)=300 MHz", {"chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"})
     ]
-    assert [dict(one.values) for one in found] == [{"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0}] * 2
-    assert list(found[0].twice) == ["S", "14N"]
+    assert [dict(entry.values) for entry in computed] == [{"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0}] * 2
+    assert list(computed[0].twice) == ["S", "14N"]
 
 
 def test_what_a_mapping_refuses():
@@ -254,10 +254,10 @@ def test_the_public_names_make_hyperfine_lines():
 
 def test_a_file_says_spins_as_text_or_number(tmp_path):
     head = "constants = { A = 9400.0, B = 3100.0, C = 2500.0 }\n[spins.X]\nC_iso = 0.003\n"
-    found = [
+    computed = [
         parse_molecule_file(f"{head}spin = {size}").spin_constants.twice["X"] for size in ('"3/2"', "1.5", "2", '"2"')
     ]
-    assert found == [3, 3, 4, 4]
+    assert computed == [3, 3, 4, 4]
     for size in ("0.75", '"1/3"', "-1"):
         with pytest.raises(ValueError, match="each a multiple of 1/2"):
             parse_molecule_file(f"{head}spin = {size}")

@@ -36,12 +36,12 @@ def one_way(up, low, pieces: list, representation: str) -> np.ndarray | None:
     for piece in pieces:
         for left in up.parts:
             for right in low.parts:
-                found = piece.rotor.elements(left.basis, right.basis, representation)
-                if acts(piece, left.v, right.v) and found is not None and found.any():
+                computed = piece.rotor.elements(left.basis, right.basis, representation)
+                if acts(piece, left.v, right.v) and computed is not None and computed.any():
                     m, n = left.basis.j, right.basis.j
                     bra, ket = (part.basis.k.astype(float) ** (2 * piece.nz2) for part in (left, right))
                     powers = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
-                    scaled = powers * (bra[:, None] + ket) / 2 * found
+                    scaled = powers * (bra[:, None] + ket) / 2 * computed
                     moved = up.vectors[left.place].T @ scaled @ low.vectors[right.place]
                     total = moved if total is None else total + moved
     return total
@@ -49,12 +49,12 @@ def one_way(up, low, pieces: list, representation: str) -> np.ndarray | None:
 
 def both_ways(up, low, pieces: list, representation: str) -> np.ndarray | None:
     """With the conjugates of pieces between different states; coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p')."""
-    found = one_way(up, low, pieces, representation)
+    computed = one_way(up, low, pieces, representation)
     back = one_way(low, up, [piece for piece in pieces if piece.bra != piece.ket], representation)
     if back is None:
-        return found
+        return computed
     turned = (-1.0) ** (up.n - low.n) * back.T
-    return turned if found is None else found + turned
+    return turned if computed is None else computed + turned
 
 
 def plain_tensor(up, low, tensors: dict) -> np.ndarray | None:
@@ -62,9 +62,9 @@ def plain_tensor(up, low, tensors: dict) -> np.ndarray | None:
     total = None
     for left in up.parts:
         for right in low.parts:
-            found = tensor_elements(left.basis, right.basis, tensor_between(tensors, left.v, right.v))
-            if found is not None and found.any():
-                moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
+            computed = tensor_elements(left.basis, right.basis, tensor_between(tensors, left.v, right.v))
+            if computed is not None and computed.any():
+                moved = up.vectors[left.place].T @ computed @ low.vectors[right.place]
                 total = moved if total is None else total + moved
     return total
 
@@ -87,18 +87,18 @@ def test_operators_are_those_of_pairs(name, effects):
     """Every pair of blocks up to ΔN = 2, one by one; of blocks with one Wang function too."""
     blocks, representation = _blocks(effects)
     for piece in PIECES[name]:
-        found = by_numbers(operators_of_stacks(stacks_of(blocks), 2, [[piece]], representation)[0])
+        computed = by_numbers(operators_of_stacks(stacks_of(blocks), 2, [[piece]], representation)[0])
         expected = {}
         for i, up in enumerate(blocks):
             for k, low in enumerate(blocks[: i + 1]):
                 near = abs(up.n - low.n) <= piece.rotor.rank <= up.n + low.n
-                one = both_ways(up, low, [piece], representation) if near else None
-                if one is not None and one.any():
-                    expected[i, k] = one
-        assert found.keys() == expected.keys()
-        largest = max((np.abs(one).max() for one in expected.values()), default=0.0)
-        for pair, one in expected.items():
-            assert np.abs(found[pair] - one).max() <= 1e-14 * largest  # two orders of summation
+                item = both_ways(up, low, [piece], representation) if near else None
+                if item is not None and item.any():
+                    expected[i, k] = item
+        assert computed.keys() == expected.keys()
+        largest = max((np.abs(item).max() for item in expected.values()), default=0.0)
+        for pair, item in expected.items():
+            assert np.abs(computed[pair] - item).max() <= 1e-14 * largest  # two orders of summation
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0], ids=["alike", "with the sign of the order"])
@@ -108,15 +108,15 @@ def test_dipoles_are_those_of_pairs(sign):
     along = np.array([1.2, 0.7, 0.4])
     tensors = {(v, w): body_tensor((1 + v + w) * along, 1, representation) for v, w in ((0, 0), (1, 1), (0, 1))}
     tensors[1, 0] = body_tensor(sign * 2 * along, 1, representation)
-    found = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
+    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
-            one = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
-            assert (one is None) == ((i, k) not in found)
-            if one is not None:
+            item = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
+            assert (item is None) == ((i, k) not in computed)
+            if item is not None:
                 count += 1
-                assert np.abs(found[i, k] - one).max() < 1e-13  # elements of up to 30, two orders of summation
+                assert np.abs(computed[i, k] - item).max() < 1e-13  # elements of up to 30, two orders of summation
     assert count > 40
 
 
@@ -126,17 +126,17 @@ def test_tensors_of_axial_tops_are_those_of_pairs(body):
     blocks, representation = solved_rotor(Top(Constants(A=9400.0, B=3100.0)), SEMI_RIGID, [], 0, 6, None)
     rank = np.ndim(body)
     tensors = {(0, 0): body_tensor(body, rank, representation)}
-    found = by_numbers(tensors_of_axial_stacks(stacks_of(blocks), tensors))
+    computed = by_numbers(tensors_of_axial_stacks(stacks_of(blocks), tensors))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
-            one = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= rank <= up.n + low.n else None
-            assert (one is None) == ((i, k) not in found)
-            if one is not None:
+            item = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= rank <= up.n + low.n else None
+            assert (item is None) == ((i, k) not in computed)
+            if item is not None:
                 count += 1
                 both = 2.0 if max(up.parts[0].basis.axial_k, low.parts[0].basis.axial_k) else 1.0
-                assert found[i, k][0, 0] ** 2 == pytest.approx(
-                    both * one[0, 0] ** 2, rel=1e-12
+                assert computed[i, k][0, 0] ** 2 == pytest.approx(
+                    both * item[0, 0] ** 2, rel=1e-12
                 )  # round-off of 3j symbols
     assert count > 60
 

@@ -58,10 +58,10 @@ def _pair(total: str) -> tuple[QuantumEffect, ...]:
 @pytest.mark.parametrize("f", [0, 1, 4, 7])
 def test_recoupling_is_orthogonal(spins, f):
     twice = 2 * f + sum(spins) % 2
-    one, total = patterns(spins, twice), patterns_of_total(spins, twice)
-    assert len(one) == len(total)
-    turn = recoupling(spins, one, total)
-    np.testing.assert_allclose(turn @ turn.T, np.eye(len(one)), atol=1e-13)  # sums of a few products
+    pattern, total = patterns(spins, twice), patterns_of_total(spins, twice)
+    assert len(pattern) == len(total)
+    turn = recoupling(spins, pattern, total)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(len(pattern)), atol=1e-13)  # sums of a few products
 
 
 def test_a_total_spin_changes_labels_alone():
@@ -83,9 +83,9 @@ def test_exchange_keeps_two_kinds_of_levels_apart():
     kind = (levels.quanta["ka"] + levels.quanta["i_tot"]) % 2
     for block in levels.blocks:
         assert len(set(kind[block.start : block.start + len(block.energies_mhz)].tolist())) == 1
-    found = all_transitions(levels, TOP.dipole_abc_debye)
-    assert len(found.upper) > 1000
-    assert (kind[found.upper] == kind[found.lower]).all()
+    transitions = all_transitions(levels, TOP.dipole_abc_debye)
+    assert len(transitions.upper) > 1000
+    assert (kind[transitions.upper] == kind[transitions.lower]).all()
 
 
 def test_strengths_with_a_total_spin():
@@ -140,8 +140,8 @@ def _triplet() -> tuple[QuantumEffect, ...]:
 def _direct_triplet() -> tuple[np.ndarray, dict[str, np.ndarray], list[tuple[int, int, int]]]:
     """The Hamiltonian, the operators S_p and N_p of space, and the states |N k m⟩ of one spin function."""
     wide = states_up_to(LARGEST + 1)
-    kept = [i for i, state in enumerate(wide) if state[0] <= LARGEST]
-    states = [wide[i] for i in kept]
+    selected = [i for i, state in enumerate(wide) if state[0] <= LARGEST]
+    states = [wide[i] for i in selected]
     same_n = np.array([[a[0] == b[0] for b in states] for a in states], dtype=float)
     phi = space_cosines(LARGEST + 1)
     spin = {p: qutip.jmat(1, p).full() for p in "xyz"}
@@ -156,11 +156,11 @@ def _direct_triplet() -> tuple[np.ndarray, dict[str, np.ndarray], list[tuple[int
     space_n = {}
     for p in "xyz":
         product = sum((phi[p, a] @ wide_momentum[a] + wide_momentum[a] @ phi[p, a]) / 2 for a in "abc")
-        space_n[p] = product[np.ix_(kept, kept)]
+        space_n[p] = product[np.ix_(selected, selected)]
         total = total + GAMMA * on_spins(space_n[p], (2,), {1: spin[p]})
         for q in "xyz":
             cosines = sum(tensor[i, k] * phi[p, "abc"[i]] @ phi[q, "abc"[k]] for i in range(3) for k in range(3))
-            total = total + on_spins(cosines[np.ix_(kept, kept)] * same_n, (2,), {1: spin[p] @ spin[q]})
+            total = total + on_spins(cosines[np.ix_(selected, selected)] * same_n, (2,), {1: spin[p] @ spin[q]})
     operators = {"S": [on_spins(np.eye(len(states)), (2,), {1: spin[p]}) for p in "xyz"]}
     operators["N"] = [on_spins(space_n[p], (2,), {}) for p in "xyz"]
     return total, operators, states
@@ -180,16 +180,19 @@ def test_magnetic_strengths_are_those_of_the_direct_product(moment, operator):
     """Σ |⟨i|V_p|k⟩|² over p and all M of two levels."""
     hamiltonian, operators, _ = _direct_triplet()
     energies, vectors = np.linalg.eigh(hamiltonian)
-    squares = sum(np.abs(vectors.conj().T @ one @ vectors) ** 2 for one in operators[operator])
+    squares = sum(np.abs(vectors.conj().T @ operator @ vectors) ** 2 for operator in operators[operator])
     levels = solve_levels(TOP, LARGEST, effects=(*SEMI_RIGID, *_triplet()))
-    found = all_transitions(levels, {}, moments=[moment])
-    for row in np.argsort(-found.strength_debye2)[:60]:
-        where = [np.abs(energies - levels.energy_mhz[state]) < 1e-6 for state in (found.upper[row], found.lower[row])]
+    transitions = all_transitions(levels, {}, moments=[moment])
+    for row in np.argsort(-transitions.strength_debye2)[:60]:
+        where = [
+            np.abs(energies - levels.energy_mhz[state]) < 1e-6
+            for state in (transitions.upper[row], transitions.lower[row])
+        ]
         expected = squares[np.ix_(*where)].sum()
-        assert found.strength_debye2[row] == pytest.approx(
+        assert transitions.strength_debye2[row] == pytest.approx(
             expected, rel=1e-9, abs=1e-12
         )  # sums of some hundred squares
-    assert (found.strength_debye2 > 1e-3).sum() >= 15
+    assert (transitions.strength_debye2 > 1e-3).sum() >= 15
 
 
 def test_moments_need_levels_with_spins():
@@ -210,11 +213,11 @@ def test_powers_of_a_dipole():
         ("[[J]]", lambda n: n**2),
         ("[J]", lambda n: -n),
     ):
-        found = all_transitions(levels, {(0, 0): (0.11, 0.0, 0.0)}, moments=[Moment(1e-4, (0, 0), along, powers)])
-        order = [np.lexsort((each.lower, each.upper)) for each in (found, plain)]
+        transitions = all_transitions(levels, {(0, 0): (0.11, 0.0, 0.0)}, moments=[Moment(1e-4, (0, 0), along, powers)])
+        order = [np.lexsort((each.lower, each.upper)) for each in (transitions, plain)]
         n, f = (levels.quanta[name][plain.upper[order[1]]] for name in ("n", "f"))
         rises = f > levels.quanta["f"][plain.lower[order[1]]]
         expected = plain.strength_debye2[order[1]] * (1 + 1e-4 / 0.11 * factor(n)) ** 2
         chosen = rises if powers == "[J]" else np.ones(len(n), dtype=bool)  # a commutator's sign goes by F
-        ours = found.strength_debye2[order[0]]
+        ours = transitions.strength_debye2[order[0]]
         np.testing.assert_allclose(ours[chosen], expected[chosen], rtol=1e-10)  # products of a few numbers

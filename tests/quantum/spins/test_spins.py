@@ -100,9 +100,9 @@ def test_levels_and_labels(name):
     for twice_f in range(total % 2, 2 * 4 + 1, 2):
         slow = solve(case, twice_f)
         expected = {q: e for q, e in zip(slow.quanta, slow.energy_mhz, strict=True) if q[0] <= 6}
-        found = _of_f(levels, twice_f)
-        assert set(found) == set(expected)
-        worst = max(abs(found[q] - expected[q]) for q in expected)
+        computed = _of_f(levels, twice_f)
+        assert set(computed) == set(expected)
+        worst = max(abs(computed[q] - expected[q]) for q in expected)
         assert worst < 1e-8  # 1e-14 of the largest element, 1e6 MHz, and its rounding in two orders of summation
 
 
@@ -112,7 +112,7 @@ def test_strengths(name):
     options, effects, lines = CASES[name]
     case = _case(f"{options} 1 0 30 0 1 1 1 0 1 0", [*LINES, *lines])
     levels = solve_levels(ASYMMETRIC, 4, effects=(*SEMI_RIGID, *effects))
-    found = all_transitions(levels, ASYMMETRIC.dipole_abc_debye)
+    transitions = all_transitions(levels, ASYMMETRIC.dipole_abc_debye)
     total = sum(case.states[0].spins2)
     slow = {f: solve(case, f) for f in range(total % 2, 8, 2)}
     by_energy = {}
@@ -121,7 +121,7 @@ def test_strengths(name):
     labels = [_label(levels, row) for row in range(len(levels))]
     s = {(f, g): strengths(case, slow[f], slow[g]) for f in slow for g in slow if abs(f - g) <= 2}
     compared = 0
-    for strength, up, low in zip(found.strength_debye2, found.upper, found.lower, strict=True):
+    for strength, up, low in zip(transitions.strength_debye2, transitions.upper, transitions.lower, strict=True):
         a, b = by_energy.get(labels[up]), by_energy.get(labels[low])
         if a and b:
             assert strength == pytest.approx(
@@ -173,9 +173,9 @@ def test_sum_over_f_is_the_rotors_strength():
     """Hyperfine structure shares out the strength of a rotational line, times 2I+1."""
     bare = solve_levels(ASYMMETRIC, 3)
     split = solve_levels(ASYMMETRIC, 3, effects=(*SEMI_RIGID, NuclearQuadrupole(_named(CHI, "Cl"), (CL,))))
-    one, parts = (all_transitions(levels, (1.2, 0.7, 0.4)) for levels in (bare, split))
+    single, parts = (all_transitions(levels, (1.2, 0.7, 0.4)) for levels in (bare, split))
     for up, low in (((1, 0, 1), (0, 0, 0)), ((2, 1, 2), (1, 0, 1)), ((3, 0, 3), (2, 1, 2))):
-        whole = _between(bare, one, "j", up, low)
+        whole = _between(bare, single, "j", up, low)
         assert _between(split, parts, "n", up, low) == pytest.approx(
             4 * whole, rel=2e-4
         )  # (60 MHz / 5 GHz)² of others' strength
@@ -184,9 +184,9 @@ def test_sum_over_f_is_the_rotors_strength():
 def _between(levels, transitions, name: str, up: tuple[int, int, int], low: tuple[int, int, int]) -> float:
     labels = np.stack([levels.quanta[q] for q in (name, "ka", "kc")], axis=1)
     ends = labels[transitions.upper], labels[transitions.lower]
-    found = (ends[0] == up).all(axis=1) & (ends[1] == low).all(axis=1)
-    found |= (ends[0] == low).all(axis=1) & (ends[1] == up).all(axis=1)
-    return float(transitions.strength_debye2[found].sum())
+    computed = (ends[0] == up).all(axis=1) & (ends[1] == low).all(axis=1)
+    computed |= (ends[0] == low).all(axis=1) & (ends[1] == up).all(axis=1)
+    return float(transitions.strength_debye2[computed].sum())
 
 
 def test_axial_top_is_its_wang_blocks():
@@ -198,8 +198,8 @@ def test_axial_top_is_its_wang_blocks():
     wang = solve_levels(other, 6, effects=(*SEMI_RIGID, chi, rotation))
     assert set(axial.quanta) == {"n", "k", "f"}
     assert axial.states.sum() == wang.states.sum()
-    found = np.sort(np.repeat(axial.energy_mhz, axial.states))
-    np.testing.assert_allclose(found, np.sort(np.repeat(wang.energy_mhz, wang.states)), rtol=1e-13, atol=1e-8)
+    sorted_energies = np.sort(np.repeat(axial.energy_mhz, axial.states))
+    np.testing.assert_allclose(sorted_energies, np.sort(np.repeat(wang.energy_mhz, wang.states)), rtol=1e-13, atol=1e-8)
     ours, theirs = (all_transitions(levels, (3.9, 0.0, 0.0)) for levels in (axial, wang))
     moving = theirs.frequency_mhz > 1e-5  # not those from K to -K of one level
     assert ours.strength_debye2.sum() == pytest.approx(theirs.strength_debye2[moving].sum(), rel=1e-9)
@@ -243,9 +243,9 @@ def test_two_states_with_everything_between_them(spin):
     for twice_f in range(0, 9, 2):
         slow = solve(case, twice_f)
         expected = {q: e for q, e in zip(slow.quanta, slow.energy_mhz, strict=True) if q[0] <= 5}
-        found = _of_f(levels, twice_f)
-        assert set(found) == set(expected)
-        assert max(abs(found[q] - expected[q]) for q in expected) < 1e-8  # 1e-14 of 1e6 MHz
+        computed = _of_f(levels, twice_f)
+        assert set(computed) == set(expected)
+        assert max(abs(computed[q] - expected[q]) for q in expected) < 1e-8  # 1e-14 of 1e6 MHz
     ours = all_transitions(levels, {(0, 0): (1.2, 0.7, 0.4), **STATES.moments})
     slow = [solve(case, f) for f in (2, 4)]
     theirs = strengths(case, slow[1], slow[0])
@@ -336,11 +336,11 @@ def test_the_scalar_between_two_states_mixes_them(value):
     par = read_par(
         f"two\n4 1 1 0 0 1e6 1 1\na 3 2 0 9 0 1 1 1 0 1 0\n199 3000 1\n1099 500 1\n11 1500 1\n10000010 {value} 1\n".encode()
     )
-    asked = read_int(b"two\n0 999 1000.0 0 6 -30 -30 9999.99 300.0\n1 1.0\n12 1.0\n")
-    (group,) = groups_of(par, asked)
+    request = read_int(b"two\n0 999 1000.0 0 6 -30 -30 9999.99 300.0\n1 1.0\n12 1.0\n")
+    (group,) = groups_of(par, request)
     levels = group.levels((0, 10))
     for f in range(6):
-        of_f = levels.energy_mhz[levels.multiplicity == 2 * f + 1]
+        f_energies = levels.energy_mhz[levels.multiplicity == 2 * f + 1]
         every_n = {n for n in range(max(abs(f - 1), 0), f + 2) if abs(n - 1) <= f <= n + 1}
         c = {n: value * (f * (f + 1) - n * (n + 1) - 2) / 2 for n in every_n}
         apart = {n: np.hypot(750.0, c[n]) for n in every_n}
@@ -350,4 +350,4 @@ def test_the_scalar_between_two_states_mixes_them(value):
             for k in range(-n, n + 1)
             for sign in (-1, 1)
         ]
-        assert np.sort(of_f) == pytest.approx(np.sort(expected), abs=1e-8)  # of 1e5 MHz, round-off
+        assert np.sort(f_energies) == pytest.approx(np.sort(expected), abs=1e-8)  # of 1e5 MHz, round-off

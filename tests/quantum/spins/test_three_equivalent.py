@@ -86,7 +86,7 @@ def _effects(twice: int, total: str = "I", axis: int = 0, chi: np.ndarray = CHI)
         values[1].update(_symmetric(f"X{k + 1}", _turned(TURNING[place], k, axis)))
         values[2].update(_traceless("T", pair, _turned(PAIR[place], k, axis)) | {f"J({pair})": SCALAR})
     kinds = (NuclearQuadrupole, SpinRotation, SpinSpin)
-    return tuple(kind(own, spins) for kind, own in zip(kinds, values, strict=True) if own)
+    return tuple(kind(value, spins) for kind, value in zip(kinds, values, strict=True) if value)
 
 
 # every function |N k m⟩ |m1 m2 m3⟩, N ≤ a limit, elements between different N left out
@@ -97,11 +97,11 @@ class Direct:
 
     def __init__(self, twice: int, top_n: int) -> None:
         wide = states_up_to(top_n + 1)
-        kept = [i for i, state in enumerate(wide) if state[0] <= top_n]
-        self.states = [wide[i] for i in kept]
+        selected = [i for i, state in enumerate(wide) if state[0] <= top_n]
+        self.states = [wide[i] for i in selected]
         n = np.array([state[0] for state in self.states])
         self.spins, self.same_n = (twice,) * 3, n[:, None] == n[None, :]
-        phi = {key: each[np.ix_(kept, kept)] for key, each in space_cosines(top_n + 1).items()}
+        phi = {key: each[np.ix_(selected, selected)] for key, each in space_cosines(top_n + 1).items()}
         full, momenta = space_cosines(top_n + 1), {a: rotor_matrix(a, top_n + 1) for a in "abc"}
         spin = {p: qutip.jmat(twice / 2, p).full() for p in "xyz"}
         here = {a: rotor_matrix(a, top_n) for a in "abc"}
@@ -109,22 +109,23 @@ class Direct:
         total = on_spins(rotation, self.spins, {})
         for k in range(3):
             chi, c, pair = (_turned(tensor, k) for tensor in (CHI, TURNING, PAIR))
-            one, other = ACROSS[k]
+            first, other = ACROSS[k]
             for p in "xyz":
                 turning = sum(
                     c[i, j] * (full[p, "abc"[i]] @ momenta["abc"[j]] + momenta["abc"[j]] @ full[p, "abc"[i]]) / 2
                     for i in range(3) for j in range(3) if c[i, j]
                 )  # fmt: skip
-                total = total + self._on(turning[np.ix_(kept, kept)], {k: spin[p]})
-                total = total + SCALAR * self._on(np.eye(len(kept)), {one: spin[p], other: spin[p]})
+                total = total + self._on(turning[np.ix_(selected, selected)], {k: spin[p]})
+                total = total + SCALAR * self._on(np.eye(len(selected)), {first: spin[p], other: spin[p]})
                 for q in "xyz":
                     both = {(i, j): full[p, "abc"[i]] @ full[q, "abc"[j]] for i in range(3) for j in range(3)}
-                    of_pair, of_one = (
-                        sum(t[key] * each for key, each in both.items())[np.ix_(kept, kept)] for t in (pair, chi)
+                    pair_matrix, spin_matrix = (
+                        sum(t[key] * each for key, each in both.items())[np.ix_(selected, selected)]
+                        for t in (pair, chi)
                     )
-                    total = total + self._on(of_pair, {one: spin[p], other: spin[q]})
+                    total = total + self._on(pair_matrix, {first: spin[p], other: spin[q]})
                     if twice > 1:  # over 2I(2I - 1)
-                        total = total + self._on(of_one / (twice * (twice - 1)), {k: spin[p] @ spin[q]})
+                        total = total + self._on(spin_matrix / (twice * (twice - 1)), {k: spin[p] @ spin[q]})
         self.hamiltonian = total
         self.phi, self.here = phi, here
 
@@ -149,9 +150,9 @@ class Direct:
                 break
         half = self.operation(np.pi, "b", (0, 2, 1))
         assert np.abs(half @ self.hamiltonian - self.hamiltonian @ half).max() < 1e-8
-        one = np.eye(len(cyclic))
-        allowed = (one + cyclic + cyclic @ cyclic) / 3
-        return {"A1": allowed @ (one + half) / 2, "A2": allowed @ (one - half) / 2, "E": one - allowed}
+        identity = np.eye(len(cyclic))
+        allowed = (identity + cyclic + cyclic @ cyclic) / 3
+        return {"A1": allowed @ (identity + half) / 2, "A2": allowed @ (identity - half) / 2, "E": identity - allowed}
 
     def energies(self, projector: np.ndarray) -> np.ndarray:
         """Of the functions that a projector leaves."""
@@ -174,16 +175,16 @@ def test_levels_are_those_of_all_products_of_the_allowed_species(twice, top_n):
     odd = (
         quanta["ka"] + quanta["kc"] + (quanta["i_sym"] % 6 == 1)
     ) % 2 == 1  # under half a turn about b, with the exchange
-    found = {}
+    results = {}
     for name, projector in direct.projectors().items():
-        found[name] = direct.energies(projector)
+        results[name] = direct.energies(projector)
         if name != "E":
             chosen = odd == (name == "A2")
             ours = np.sort(np.repeat(levels.energy_mhz[chosen], levels.multiplicity[chosen]))
-            assert len(ours) == len(found[name])
-            np.testing.assert_allclose(ours, found[name], rtol=0, atol=2e-9)  # 1e-14 of the largest + 1e-9
-    assert sum(map(len, found.values())) == len(direct.states) * (twice + 1) ** 3
-    assert len(found["E"]) > 0
+            assert len(ours) == len(results[name])
+            np.testing.assert_allclose(ours, results[name], rtol=0, atol=2e-9)  # 1e-14 of the largest + 1e-9
+    assert sum(map(len, results.values())) == len(direct.states) * (twice + 1) ** 3
+    assert len(results["E"]) > 0
 
 
 @pytest.mark.parametrize(("twice", "count"), [(1, (4, 0, 4)), (2, (10, 1, 16)), (3, (20, 4, 40)), (5, (56, 20, 140))])
@@ -201,9 +202,9 @@ def test_numbers_of_spin_functions(twice, count):
 @pytest.mark.parametrize("f", [0, 2])
 def test_recoupling_of_three_is_orthogonal(spins, f):
     twice = 2 * f + sum(spins) % 2
-    one, total = patterns(spins, twice), patterns_of_three(spins, twice)
-    turn = recoupling_of_three(spins, one, total)
-    np.testing.assert_allclose(turn @ turn.T, np.eye(len(one)), atol=1e-13)  # sums of a few products
+    pattern, total = patterns(spins, twice), patterns_of_three(spins, twice)
+    turn = recoupling_of_three(spins, pattern, total)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(len(pattern)), atol=1e-13)  # sums of a few products
 
 
 @pytest.mark.parametrize(
@@ -245,18 +246,20 @@ def test_names_and_lines():
     k = quanta["ka"] % 3
     assert (quanta["i_sym"] == np.select([k == 0, k == 2], [0, 2], 4)).all()  # spin 1/2: A1 of 3/2, E of 1/2
     assert (quanta["i_tot"] == np.where(k == 0, 3, 1)).all()
-    found = all_transitions(levels, PROLATE.dipole_abc_debye)
+    transitions = all_transitions(levels, PROLATE.dipole_abc_debye)
     odd = (quanta["ka"] + quanta["kc"]) % 2
-    strong = found.strength_debye2 > 1e-20  # round-off is below
-    assert (odd[found.upper] != odd[found.lower])[strong].all()  # along the axis: A1 with A2
+    strong = transitions.strength_debye2 > 1e-20  # round-off is below
+    assert (odd[transitions.upper] != odd[transitions.lower])[strong].all()  # along the axis: A1 with A2
     assert strong.sum() > 100
     plain = solve_levels(PROLATE, 3, effects=SEMI_RIGID)
     rigid = all_transitions(plain, PROLATE.dipole_abc_debye)
     # each N, K of a top without spins has 8 times its strength, of which half belongs to A1 and A2, for K ≠ 0 of both signs
     for n in (1, 2):
         for k in range(n):
-            ours = found.strength_debye2[
-                (quanta["n"][found.upper] == n) & (quanta["n"][found.lower] == n - 1) & (quanta["ka"][found.upper] == k)
+            ours = transitions.strength_debye2[
+                (quanta["n"][transitions.upper] == n)
+                & (quanta["n"][transitions.lower] == n - 1)
+                & (quanta["ka"][transitions.upper] == k)
             ].sum()
             row = (plain.quanta["k"][rigid.upper] == k) & (plain.quanta["j"][rigid.upper] == n)
             weight = 4 if k % 3 == 0 else 2  # spin functions of A1, and of one function of E
@@ -306,9 +309,9 @@ def test_tensors_that_are_axial_alone():
     """χ along the axis of a prolate top, for which K is good: F = 0 has the energies of the limit of small elements off the axis."""
     spins = tuple(Spin(f"2H_{i}", 2, total="I") for i in (1, 2, 3))
     axial = {"chi_aa(2H_1)": 0.2}
-    found = [
+    computed = [
         np.sort(solve_levels(PROLATE, 2, effects=(*SEMI_RIGID, NuclearQuadrupole(axial | further, spins))).energy_mhz)
         for further in ({}, {"chi_bb-cc(2H_1)": 1e-9})
     ]
-    assert found[0] == pytest.approx(found[1], abs=1e-7)  # the small elements, and round-off
-    assert np.unique(found[0].round(4)).size > 9  # levels of N and K are split
+    assert computed[0] == pytest.approx(computed[1], abs=1e-7)  # the small elements, and round-off
+    assert np.unique(computed[0].round(4)).size > 9  # levels of N and K are split
