@@ -184,11 +184,11 @@ def methods(rounds: int) -> dict[str, dict[str, tuple[float, float]]]:
         ("two ¹⁴N and three H, N ≤ 10", five_nuclei(), 10),
     ):
         exact, _ = sorted_energies(top, nmax, "exact")
-        seconds_ = {}
+        timings = {}
         for method in METHODS:
             seconds, (computed, _) = median(partial(sorted_energies, top, nmax, method), rounds)
-            seconds_[method] = (seconds, float(np.abs(computed - exact).max()))
-        out[name] = seconds_
+            timings[method] = (seconds, float(np.abs(computed - exact).max()))
+        out[name] = timings
     return out
 
 

@@ -115,7 +115,7 @@ def main() -> None:
         if arguments.page
         else CASES
         if arguments.only is None
-        else [kind_ for kind_ in arguments.only if kind_ in CASES]
+        else [chosen_kind for chosen_kind in arguments.only if chosen_kind in CASES]
     ):
         results["bounds"][kind] = measured(kind)
         write(results)

@@ -88,10 +88,10 @@ def test_families_determine_three_constants() -> None:
     """Each family's lines have independent derivatives for some top of the sample, and it predicts other lines."""
     bounds = Bounds(np.array([1000.0, 500, 400]), np.array([5000.0, 2000, 1500]))
     table = rigid_table(JMAX)
-    families_ = families(table, bounds, (6000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 50)
-    assert len(families_) == 50
-    assert families_[0].share >= families_[-1].share
-    for entry in families_:
+    family_list = families(table, bounds, (6000.0, 18000.0), (1.0, 4.0), np.random.default_rng(2), 200, 50)
+    assert len(family_list) == 50
+    assert family_list[0].share >= family_list[-1].share
+    for entry in family_list:
         change = table.quanta[table.upper[entry.lines], 0] - table.quanta[table.lower[entry.lines], 0]
         assert (change != 0).any()  # Q branches alone say nothing of A + C
         assert len(entry.companions) >= 4

@@ -88,10 +88,12 @@ def test_lines_of_named_constants_are_those_of_the_files(name):
     mine, theirs = mine[strong(lines, mine)], theirs[strong(expected, theirs)]
     assert len(mine) == len(theirs) > 20
     ours = np.sort(np.rec.fromarrays([lines.frequency_mhz[mine].round(5), lines.strength_debye2[mine]]))
-    files_ = np.sort(np.rec.fromarrays([expected.frequency_mhz[theirs].round(5), expected.strength_debye2[theirs]]))
-    np.testing.assert_allclose(ours["f0"], files_["f0"], rtol=0, atol=2e-5)  # two roundings to 1e-5
+    sorted_lines = np.sort(
+        np.rec.fromarrays([expected.frequency_mhz[theirs].round(5), expected.strength_debye2[theirs]])
+    )
+    np.testing.assert_allclose(ours["f0"], sorted_lines["f0"], rtol=0, atol=2e-5)  # two roundings to 1e-5
     np.testing.assert_allclose(
-        np.sort(ours["f1"]), np.sort(files_["f1"]), rtol=1e-6, atol=0
+        np.sort(ours["f1"]), np.sort(sorted_lines["f1"]), rtol=1e-6, atol=0
     )  # 1e-12 MHz of round-off mixes little
 
 

@@ -197,9 +197,9 @@ def test_a_misassigned_line_is_reported_not_dropped():
     out = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)), FitOptions(reject_above=200.0))
     assert np.flatnonzero(~out.used).tolist() == [17]
     assert any("line 18" in text and "more than 200 errors off" in text for text in out.notes)
-    for lines_ in (bent, out):
+    for changed_lines in (bent, out):
         pulls = [
-            (lines_.constants[name] - value) / lines_.constants.uncertainties[name]
+            (changed_lines.constants[name] - value) / changed_lines.constants.uncertainties[name]
             for name, value in TRUE.values.items()
         ]
         assert np.abs(pulls).max() < 4.0  # eight normal draws; Cauchy's loss costs 5 % in the errors
@@ -283,8 +283,8 @@ def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path
 
 def test_ties_keep_ratios_and_differences():
     start = TRUE.replace(C=TRUE["B"] - 800.0)
-    parameters_ = parameters(start, ["A", "B", "DeltaJ"], ties=["C = B - 800", "deltaJ = 0.2*DeltaJ"])
-    fit = fit_lines(synthetic(TRUE), start, parameters_, FitOptions(poor_rms=1e9))
+    tied_parameters = parameters(start, ["A", "B", "DeltaJ"], ties=["C = B - 800", "deltaJ = 0.2*DeltaJ"])
+    fit = fit_lines(synthetic(TRUE), start, tied_parameters, FitOptions(poor_rms=1e9))
     assert fit.constants["B"] - fit.constants["C"] == pytest.approx(800.0, rel=1e-12)  # round-off
     assert fit.constants["deltaJ"] / fit.constants["DeltaJ"] == pytest.approx(0.2, rel=1e-12)  # the same
     assert fit.constants.uncertainties["C"] == pytest.approx(fit.constants.uncertainties["B"], rel=1e-12)  # the same

@@ -132,11 +132,11 @@ def test_table_of_channels_as_specutils_writes_it(tmp_path: Path) -> None:
     from astropy.nddata import StdDevUncertainty
 
     x = np.linspace(230.0, 230.4, 5)
-    spectrum_ = specutils.Spectrum(
+    written_spectrum = specutils.Spectrum(
         flux=np.arange(5.0) * units.K, spectral_axis=x * units.GHz, uncertainty=StdDevUncertainty(np.full(5, 0.2))
     )
-    spectrum_.write(tmp_path / "t.fits", format="tabular-fits")
-    for spectrum in (read_spectrum(tmp_path / "t.fits"), read_spectrum(spectrum_)):
+    written_spectrum.write(tmp_path / "t.fits", format="tabular-fits")
+    for spectrum in (read_spectrum(tmp_path / "t.fits"), read_spectrum(written_spectrum)):
         assert np.allclose(spectrum.frequency_mhz, x * 1e3)
         assert spectrum.intensity.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert spectrum.noise.tolist() == pytest.approx([0.2] * 5)

@@ -57,7 +57,7 @@ def test_three_dependent_moments_of_a_planar_molecule_are_named():
     """Case 12: I_c = I_a + I_b, so that a third moment of each species is no third observation."""
     water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     rigid = [Top.from_molecule(molecule).constants for molecule in (water, water.with_isotopes("H=2H"))]
-    known = [dict(zip("ABC", constants_.rigid, strict=True)) for constants_ in rigid]
+    known = [dict(zip("ABC", rigid_constants.rigid, strict=True)) for rigid_constants in rigid]
     both = family(water, [("H2O", "", known[0], {}), ("D2O", "H=2H", known[1], {})])
     all_three = fit_structure(both, "r0")
     two = fit_structure(both, "r0", leave_out=("c",))

@@ -87,8 +87,8 @@ def solve(case: Case, f2: int) -> Block:
         shares = np.array([(np.abs(columns[m]) ** 2).sum(axis=0) for m in members]).T
         computed = assign(shares, np.array([len(m) for m in members]))
         for sub, member in enumerate(members):
-            members_ = np.flatnonzero(computed == sub)[:: -1 if case.oblate else 1]
-            for vector, place in zip(members_, sorted(member, key=lambda i: functions[index[i]].k), strict=True):
+            chosen_vectors = np.flatnonzero(computed == sub)[:: -1 if case.oblate else 1]
+            for vector, place in zip(chosen_vectors, sorted(member, key=lambda i: functions[index[i]].k), strict=True):
                 vectors[index, done] = columns[:, vector]
                 energy[done], mixing[done], label[done] = values[vector], shares[vector, sub], index[place]
                 done += 1

@@ -75,7 +75,7 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
         "raman": ("min_relative", "cross_section_cm2_per_sr"),
     }[kind]
     whole = verb_of(kind).answer(replace(result.request, **{name: None, "jmax": 150}), Work())
-    part, true = (getattr(result_.lines, column).sum() for result_ in (result.answer, whole))
+    part, true = (getattr(each_answer.lines, column).sum() for each_answer in (result.answer, whole))
     assert 0 <= 100 * (1 - part / true) <= result.reached.error <= result.reached.asked
 
 

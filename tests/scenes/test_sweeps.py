@@ -95,12 +95,12 @@ def test_every_file_that_enters_is_part_of_the_key(folder, monkeypatch, file, sc
 def test_other_files_are_not_part_of_the_key(folder):
     Path("out.csv").write_text("a result of the last run")
     Path("many.sdf").write_text("one\n$$$$\ntwo\n$$$$\n")
-    scene_ = levels(outputs=LevelsOutputs(csv="out.csv"), sweep={"observables.jmax": [1]})
+    levels_scene = levels(outputs=LevelsOutputs(csv="out.csv"), sweep={"observables.jmax": [1]})
     second = levels(sweep={"molecule": ["many.sdf#2"]})
-    before = _key(scene_), _key(second)
+    before = _key(levels_scene), _key(second)
     Path("out.csv").write_text("another result")
     Path("many.sdf").write_text("uno\n$$$$\ntwo\n$$$$\n")
-    assert (_key(scene_), _key(second)) == before
+    assert (_key(levels_scene), _key(second)) == before
 
 
 def test_values_of_a_point_and_the_version_are_part_of_the_key(folder, monkeypatch):

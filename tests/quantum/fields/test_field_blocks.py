@@ -104,8 +104,8 @@ def test_a_tilted_field_is_a_rotated_one(text, a, b, c):
     field = Rotation.from_euler("zyz", [0.3, 0.7, -1.1]).apply(Z)
     turned = [Contraction([a, b, c], field), Contraction(tensor, np.outer(field, field))]
     for contractions in (straight, turned):
-        energies_ = energies(tilted_space(top, 4, contractions), zip(contractions, (5.0, 3.0), strict=True), 4)
-        assert np.allclose(along, energies_, atol=1e-11)  # round-off of energies of 200 MHz
+        tilted_energies = energies(tilted_space(top, 4, contractions), zip(contractions, (5.0, 3.0), strict=True), 4)
+        assert np.allclose(along, tilted_energies, atol=1e-11)  # round-off of energies of 200 MHz
 
 
 @pytest.mark.parametrize("representation", ["Ir", "Il", "IIIr", "IIIl"])

@@ -48,8 +48,8 @@ def test_two_orders_become_mean_and_difference():
     )
     assert dict(constants.values) == {"C_ab(H)": 2.0, "C_ac_J(H)": 5.0, "C_ab-ba(H)": 1.0}
     assert not constants.uncertainties  # of the mean of two constants, of which one alone has an error
-    energies_ = energies(SpinConstants({"C_ba(H)": 3000.0}, {"H": 1}))
-    assert energies_ == pytest.approx(
+    level_energies = energies(SpinConstants({"C_ba(H)": 3000.0}, {"H": 1}))
+    assert level_energies == pytest.approx(
         energies(SpinConstants({"C_ab(H)": 3000.0}, {"H": 1})), abs=1e-9
     )  # one stands for both
     apart = energies(SpinConstants({"C_ab(H)": 3000.0, "C_ba(H)": 0.0}, {"H": 1}))
