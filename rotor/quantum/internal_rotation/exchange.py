@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import Elements, merged
+from rotor.quantum.basis.elements import ROUND_OFF, Elements, merged
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 
@@ -100,6 +100,10 @@ class ExchangedTops(TorsionRotation):
             here = np.zeros((len(plain.values), reduced.nnz), dtype=plain.values.dtype)
             here[i] = reduced.data
             pieces.append((reduced.row.astype(np.int64), reduced.col.astype(np.int64), here))
+        if len(pieces) == 1:  # its places stand once
+            rows, columns, values = pieces[0]
+            retained = np.abs(values[0]) > ROUND_OFF * np.abs(values).max(initial=0.0)
+            return Elements(plain.count, rows[retained], columns[retained], values[:, retained])
         rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
         return merged(plain.count, rows, columns, values)
 
