@@ -42,10 +42,10 @@ def row_selector(letter: str) -> Callable[[Row], bool]:
 
 
 PANELS: dict[str, Groups] = {
-    "signal-to-noise ratio": between("signal_to_noise", [100, 300, 1000, 3001]),
-    "share of foreign peaks": between("foreign", [0.0, 0.1, 0.2, 0.35]),
+    "Signal-to-noise ratio": between("signal_to_noise", [100, 300, 1000, 3001]),
+    "Share of foreign peaks": between("foreign", [0.0, 0.1, 0.2, 0.35]),
     "κ": between("kappa", [-1.0, -0.9, -0.5, 0.0, 1.0]),
-    "strongest type": [(letter, row_selector(letter)) for letter in "abc"],
+    "Strongest type": [(letter, row_selector(letter)) for letter in "abc"],
 }
 
 
@@ -73,23 +73,23 @@ def success(rows: list[Row]) -> Any:
             axes.set_xlim(-0.5, len(groups) - 0.5)
             axes.axhline(90, color=GREY, lw=0.6, ls=":")
         figure.axes[0].set_ylabel("Strongest species found (%)")
-        figure.axes[0].set_ylim(0, 103)
+        figure.axes[0].set_ylim(60, 101)
         return figure
 
 
 def diagram(rows: list[Row]) -> Any:
-    """Share of right answers against the probability that they state."""
+    """Share of wrong answers against the probability of being wrong that they state, both in per cent on logarithmic axes."""
     with styled():
         figure = new_figure((4.0, 3.4))
         axes = figure.add_subplot()
-        groups = [group for group in reliability(rows) if group["of"]]
-        with_bars(axes, [100 * group["stated"] for group in groups], groups, BLUE)
-        for group in groups:
-            axes.annotate(
-                f" {group['of']}", (100 * group["stated"], 100 * group["share"]), fontsize=7, va="top", ha="left"
-            )
-        axes.plot([0, 100], [0, 100], color=GREY, lw=0.6, ls=":")
-        axes.set(xlabel="Stated probability (%)", ylabel="Right (%)", xlim=(45, 101), ylim=(0, 103))
+        for group in (group for group in reliability(rows) if group["of"]):
+            stated, wrong = 100 * (1 - group["stated"]), 100 * (1 - group["share"])
+            low, high = 100 * (1 - group["high"]), 100 * (1 - group["low"])
+            axes.errorbar(stated, wrong, yerr=[[wrong - low], [high - wrong]], fmt="o", ms=4, capsize=3, color=BLUE)
+            axes.annotate(f"  {group['of']}", (stated, wrong), fontsize=7, va="center")
+        axes.plot([1e-3, 100], [1e-3, 100], color=GREY, lw=0.6, ls=":")
+        axes.set(xscale="log", yscale="log", xlim=(1e-3, 100), ylim=(0.03, 100))
+        axes.set(xlabel="Stated probability of being wrong (%)", ylabel="Wrong answers (%)")
         return figure
 
 
