@@ -109,7 +109,7 @@ def suspect(
         except ValueError:
             continue  # too few lines are left
         if without.converged and best[1] is not None and without.weighted_rms < best[1]:
-            best = (tuple(numbers[i] for i in np.flatnonzero(members & fit.used)), without.weighted_rms)
+            best = (tuple(numbers[i] for i in np.flatnonzero(members & fit.used).tolist()), without.weighted_rms)
     return best if best[0] else ((), None)
 
 
