@@ -72,7 +72,12 @@ def styled() -> Any:
     """A context in which matplotlib has the style of the package, and over it that of the user."""
     import matplotlib as mpl
 
-    return mpl.rc_context({**STYLE, **(_USERS.get() or {})})
+    users = _USERS.get() or {}
+    scale = users.get("font.size", STYLE["font.size"]) / STYLE["font.size"]
+    sizes = {
+        name: scale * size for name, size in STYLE.items() if name.endswith(("labelsize", "titlesize", "fontsize"))
+    }
+    return mpl.rc_context({**STYLE, **sizes, **users})
 
 
 def style_settings(style: str | os.PathLike[str]) -> dict[Any, Any]:
@@ -203,8 +208,9 @@ def save_described(figure: Any, path: str | os.PathLike[str], title: str, descri
         metadata = {"Creator": program, "Title": plain, "Subject": description, "CreationDate": None}
     else:
         metadata = {"Creator": program, "Title": plain, "Description": description, "Date": None}
+    dots = (_USERS.get() or {}).get("savefig.dpi", "figure")
     with styled():
-        figure.savefig(path, dpi=figure.dpi, metadata=metadata)
+        figure.savefig(path, dpi=figure.dpi if dots == "figure" else dots, metadata=metadata)
 
 
 def joined(*facts: Mapping[str, Any] | None) -> str:

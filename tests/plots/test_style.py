@@ -17,6 +17,14 @@ def test_a_file_sets_size_and_letters(call, folder):
     assert (width, height) == (335, 240)
 
 
+def test_all_letters_and_the_resolution_follow(folder):
+    (folder / "small.mplstyle").write_text("font.size: 4.5\nsavefig.dpi: 50\n")
+    figure = rotor.spectrum("OCS", jmax=5).plot("small.png", style="small.mplstyle")
+    axes = figure.axes[0]
+    assert (axes.xaxis.label.get_size(), axes.xaxis.get_ticklabels()[0].get_size()) == (4.5, 4.5)
+    assert imread("small.png").shape[1] == 360  # 7.2 inches
+
+
 def test_every_picture_takes_it(call, folder):
     """A background is seen in pictures with and without options of their axes."""
     for number, command in enumerate((("levels", "water", "--jmax", "2"), ("tumble", "water"), ("spectrum", "OCS"))):
