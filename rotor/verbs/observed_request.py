@@ -30,7 +30,7 @@ FREE = {
 OF_FIT = ("free", "shared", "sample", "calibration", "reject")
 
 
-def of_layer(name: str) -> Any:
+def layer_field(name: str) -> Any:
     """A field of the gas of a source, None where it is not typed: a fit estimates it."""
     field = own_fields(LayerInput)[name]
     return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
@@ -68,12 +68,12 @@ class ObservedRequest:
     )  # fmt: skip
     sample: int = declared(0, Whole(0), "Steps of emcee after the fit (extra sampling)", panel=PANEL)
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
-    column_per_cm2: tuple[float, ...] | None = of_layer("column_per_cm2")
-    excitation_k: tuple[float, ...] | None = of_layer("excitation_k")
-    velocity_km_s: tuple[float, ...] | None = of_layer("velocity_km_s")
-    fwhm_km_s: tuple[float, ...] | None = of_layer("fwhm_km_s")
-    background_k: float | None = of_layer("background_k")
-    redshift: float | None = of_layer("redshift")
+    column_per_cm2: tuple[float, ...] | None = layer_field("column_per_cm2")
+    excitation_k: tuple[float, ...] | None = layer_field("excitation_k")
+    velocity_km_s: tuple[float, ...] | None = layer_field("velocity_km_s")
+    fwhm_km_s: tuple[float, ...] | None = layer_field("fwhm_km_s")
+    background_k: float | None = layer_field("background_k")
+    redshift: float | None = layer_field("redshift")
     range_mhz: tuple[float, float] = part(
         WindowInput, lambda value, _: value.range_mhz or value.band, lambda value, _: WindowInput(value), INFINITE,
         single=True, why="give one of them",

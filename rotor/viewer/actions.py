@@ -423,12 +423,12 @@ def import_lines(
         model = context.predictions.model(record)
     read, remarks = read_assigned_lines(path, model.quanta, model.halves)
     context.notes.extend(remarks)
-    every = lines_from(read, species_number, free_blend(state), state.settings.default_error_mhz)
+    file_lines = lines_from(read, species_number, free_blend(state), state.settings.default_error_mhz)
     known = {(line.upper, line.lower, line.frequency_mhz) for line in state.lines_of(species_number).values()}
-    lines = [line for line in every if (line.upper, line.lower, line.frequency_mhz) not in known]
-    if len(lines) < len(every):  # the same file, named again when the session is resumed
+    lines = [line for line in file_lines if (line.upper, line.lower, line.frequency_mhz) not in known]
+    if len(lines) < len(file_lines):  # the same file, named again when the session is resumed
         context.notes.append(
-            f"{path}: {counted(len(every) - len(lines), 'line is', 'lines are')} in the session already"
+            f"{path}: {counted(len(file_lines) - len(lines), 'line is', 'lines are')} in the session already"
         )
     _refuse_many(state, len(lines))
     first = state.free_number("line")

@@ -101,16 +101,17 @@ def suspect(
     count = len(fit.groups)
     left = 1 - fit.statistics.leverages[:count]
     falls = np.where(left > 1e-9, fit.residuals[:count] ** 2 / np.maximum(left, 1e-9), 0.0)
-    best: tuple[tuple[int, ...], float | None] = ((), BETTER * fit.weighted_rms)
+    apart, least = tuple[int, ...](), BETTER * fit.weighted_rms
     for place in np.argsort(-falls)[:TRIED].tolist():
         members = fit.lines.blend == fit.lines.blend[fit.groups[place]]
         try:
             without = again(replace(fit.lines, excluded=fit.lines.is_excluded | members))
         except ValueError:
             continue  # too few lines are left
-        if without.converged and best[1] is not None and without.weighted_rms < best[1]:
-            best = (tuple(numbers[i] for i in np.flatnonzero(members & fit.used).tolist()), without.weighted_rms)
-    return best if best[0] else ((), None)
+        if without.converged and without.weighted_rms < least:
+            apart = tuple(numbers[i] for i in np.flatnonzero(members & fit.used).tolist())
+            least = without.weighted_rms
+    return (apart, least) if apart else ((), None)
 
 
 def refitted(model: Model, lines: Mapping[int, Line]) -> Species:

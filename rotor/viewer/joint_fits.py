@@ -261,13 +261,13 @@ def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[st
     for members in _blends(state).values():
         mean = sum(share * calculated[n] for n, share in members.items())
         means |= dict.fromkeys(members, mean)
-    out, every = dict[int, dict[str, Any]](), state.lines
+    out, session_lines = dict[int, dict[str, Any]](), state.lines
     for n, mean in means.items():
         there = math.isfinite(mean)
         out[n] = {
             "label": labels[n],
             "calculated_mhz": mean if there else None,
-            "difference_mhz": every[n].frequency_mhz - mean if there else None,
+            "difference_mhz": session_lines[n].frequency_mhz - mean if there else None,
         }
     return out
 
@@ -289,18 +289,20 @@ def _blends(state: State) -> dict[int, dict[int, float]]:
 def lines_alone(number: int, models: Mapping[int, Model], state: State) -> dict[int, Line]:
     """The lines of a species for files of one species: what lines of other species add to a blend is taken out, and a comment says so."""
     lines, shared = state.lines_of(number), shared_blends(state)
-    blends, every = _blends(state), state.lines
+    blends, session_lines = _blends(state), state.lines
     for n, line in list(lines.items()):
         if line.rejected or number not in shared.get(line.blend, ()):
             continue
         members = blends[line.blend]
-        part = sum(share for k, share in members.items() if every[k].species == number)
-        others = {k: share for k, share in members.items() if every[k].species != number}
+        part = sum(share for k, share in members.items() if session_lines[k].species == number)
+        others = {k: share for k, share in members.items() if session_lines[k].species != number}
         if not part > 0:
             lines[n] = msgspec.structs.replace(line, rejected=True)
             continue
-        rest = sum(share * _calculated(models[every[k].species], every[k]) for k, share in others.items())
-        names = sorted({models[every[k].species].record.name for k in others})
+        rest = sum(
+            share * _calculated(models[session_lines[k].species], session_lines[k]) for k, share in others.items()
+        )
+        names = sorted({models[session_lines[k].species].record.name for k in others})
         lines[n] = msgspec.structs.replace(
             line,
             frequency_mhz=(line.frequency_mhz - rest) / part,

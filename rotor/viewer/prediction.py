@@ -57,10 +57,10 @@ _ISOTOPES = re.compile(r"\s*,((?:\s*[A-Za-z0-9]+\s*=\s*\d+[A-Z][a-z]?\s*,?)+)$")
 
 def without_isotopes(source: str) -> tuple[str, str]:
     """A source and the isotopes behind it: "OCS" and "S=34S" of "OCS, S=34S"; no isotopes of a file whose name ends so."""
-    found = _ISOTOPES.search(source)
-    if found is None or _is_file(Path(source)) or not source[: found.start()]:
+    match = _ISOTOPES.search(source)
+    if match is None or _is_file(Path(source)) or not source[: match.start()]:
         return source, ""
-    return source[: found.start()], found[1].strip(" ,")
+    return source[: match.start()], match[1].strip(" ,")
 
 
 def top_of_source(source: str) -> Top:

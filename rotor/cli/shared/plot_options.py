@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 SCALES = {"linear": False, "log": True}
 UNITS = ("MHz", "GHz", "THz", "cm-1")
-PLOT_NAMES = ("plot_unit", "plot_title", "plot_range", "plot_vertical", "plot_scale")
+AXES = ("plot_unit", "plot_title", "plot_range", "plot_vertical", "plot_scale")
+PLOT_NAMES = (*AXES, "style")
 
 
 def _refuse_without_plot(named: Sequence[str], drawn: bool) -> None:
@@ -33,8 +34,8 @@ def _limits(name: str, text: str, unit: str) -> Limits:
 
 def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
     """The view of a verb's picture from what was typed; drawn: whether there is a picture. Settings by name of a spectrum."""
-    texts = {name: text for name, text in typed.items() if name in PLOT_NAMES and text is not None}
-    _refuse_without_plot([name for name in (*texts, "style") if name in typed], drawn)
+    _refuse_without_plot([name for name in PLOT_NAMES if name in typed], drawn)
+    texts = {name: text for name, text in typed.items() if name in AXES}
     unit, range_ = ("MHz", "range_mhz") if verb.spectral else (verb.drawn or "", "horizontal")
     readers: dict[str, tuple[str, Callable[[str], Any]]] = {
         "plot_unit": ("unit", lambda text: require_one_of("--plot-unit", text, UNITS)),

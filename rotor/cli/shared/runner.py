@@ -85,7 +85,7 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 def places_of(verb: Verb) -> set[str]:
     """The options that say where results go, not what is computed: files, pictures, processes."""
     files = {each.name for each in verb.outputs} | {each.option for each in verb.extras if each.files is not None}
-    return files | {"json", "save_scene", "workers", "style", *PLOT_NAMES}
+    return files | {"json", "save_scene", "workers", *PLOT_NAMES}
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:

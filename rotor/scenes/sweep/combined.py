@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
 KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
 MEMORY_MB = 300  # for the sort; more goes to files
-SMALL_ROWS = (
-    5_000  # of a point, up to which its rows wait as one array of numpy: DuckDB takes 20 ms for a file, numpy 0.2
-)
+SMALL_ROWS = 5_000  # of a point, up to which its rows wait as an array: DuckDB takes 20 ms for a file, numpy 0.2
 BATCH_ROWS, BATCH_FILES = 100_000, 2_000  # of small files that are joined at once
 _SMALL, _LARGE = ".npy", ".parquet"
 _FORMAT = (3, 0)  # of numpy's files: names of columns are UTF-8
