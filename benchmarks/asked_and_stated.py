@@ -326,10 +326,10 @@ _REFERENCES: dict[str, Callable[..., Reference]] = {
 
 
 def _work(kind: Any) -> Any:
-    from rotor.requests.fill import Given
+    from rotor.requests.fill import Entries
     from rotor.verbs.verb import Work
 
-    return Work(shown=kind.verb.read_shown(Given()))
+    return Work(shown=kind.verb.read_shown(Entries()))
 
 
 def coarser_of(scene: Any, request: Any, answer: Any) -> tuple[str, Any] | None:

@@ -16,7 +16,7 @@ from typing import Any
 from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
-from rotor.requests.fill import Given
+from rotor.requests.fill import Entries
 from rotor.table import Table, html_of_errors
 from rotor.verbs.verb import Place, Subject, Verb, Work, files_of, report_of, verb_of
 
@@ -77,7 +77,7 @@ class Result:
     request: Any
     answer: Any
     subject: Subject
-    given: Given
+    given: Entries
 
     @property
     def table(self) -> Table:
@@ -165,7 +165,7 @@ def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Re
     if unknown:
         others = f"; it takes {', '.join(fields)}"
         raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
-    given = Given({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
+    given = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
     request, subject = verb.read(given, Place())
     return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(given))), subject, given)
 

@@ -12,7 +12,7 @@ from rotor.alignment.request import AlignRequest, answer_align, cosine_error
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import of_top
 from rotor.quantum.fields.knobs import largest_difference
-from rotor.requests.field import own_fields
+from rotor.requests.field import declared_fields
 from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps, ladder
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Plan, peak_mb, timed
@@ -64,7 +64,7 @@ def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
     A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """
     structure: Any = AlignRequest
-    field = own_fields(structure)["tolerance"]
+    field = declared_fields(structure)["tolerance"]
     choice: Choice = field.knob.choose(field, request, allowed, answer_align)
     for looser in LOOSER:
         tried = replace(request, tolerance=min(looser * allowed, LOOSEST_COSINE), classical_molecules=0)

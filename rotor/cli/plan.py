@@ -52,7 +52,7 @@ def answer(request: PlanRequest, work: Work) -> Planned:
 
 def show(answer: Planned, _: Any) -> None:
     """Print the plan."""
-    from rotor.requests.plan import larger_ones
+    from rotor.requests.plan import larger_items
 
     scene, plan = answer.scene, answer.plan
     print(scene.title or f"a scene of the kind {scene.kind}")
@@ -64,7 +64,7 @@ def show(answer: Planned, _: Any) -> None:
         ("seconds", f"{plan.seconds:.2g} of the processor, without start-up and compilation"),
         ("memory", f"{plan.memory_mb:.2g} MB at the most, in use at one time"),
     ]
-    larger, others = larger_ones(plan.left_out, lambda part: part.size, lambda part: part.name)
+    larger, others = larger_items(plan.left_out, lambda part: part.size, lambda part: part.name)
     texts = [_text(part) for part in larger] + ([others] if others else [])
     show_facts([*facts, *(("left out" if not number else "", text) for number, text in enumerate(texts))])
 

@@ -17,7 +17,7 @@ from rotor.cli.shared.output import Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.reports.screen import Table, evenly, json_with_rows, show_facts, show_table
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
-from rotor.requests.fill import Given
+from rotor.requests.fill import Entries
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.tool import Tool
@@ -82,7 +82,7 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
     from rotor.scenes.scene_file import read_scene
     from rotor.scenes.sweep import is_sweep
 
-    options: Options = verb.read(Given(typed, "option"), Place())[0]
+    options: Options = verb.read(Entries(typed, "option"), Place())[0]
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)

@@ -103,8 +103,8 @@ def statistics_text(fit: Fit) -> list[str]:
         f"free parameters {len(fit.parameters.names)}, degrees of freedom {fit.degrees_of_freedom}",
         f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {scatter_text(fit.reduced_chi, '.5f')}",
         *_with_priors(fit),
-        *([f"rms of lines in MHz {rms:.6f} MHz"] if math.isfinite(rms) else []),
-        *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
+        *([f"rms deviation {rms:.6f} MHz"] if math.isfinite(rms) else []),
+        *([f"rms deviation {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
         f"condition number of the column-scaled Jacobian {f'{condition:.3e}' if math.isfinite(condition) else 'infinite'}",
     ]
     out += [

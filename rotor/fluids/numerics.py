@@ -36,7 +36,7 @@ import numpy as np
 
 from rotor import units
 from rotor.fluids.request import NewBox, answer_fluid, box_of
-from rotor.requests.knob import Choice, Measure, Sweep, Sweeps, ladder, refuse_given
+from rotor.requests.knob import Choice, Measure, Sweep, Sweeps, ladder, refuse_set
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, peak_mb
 
@@ -77,7 +77,7 @@ def _of_rotor(request: FluidRequest) -> FluidRequest:
 def choose_step(scene: Any, request: FluidRequest, asked: float) -> Choice:
     """The longest step that conserves the energy to an accuracy in K; its request has a box that is made."""
     request = _of_rotor(request)
-    refuse_given(request.settings, "step_fs")
+    refuse_set(request.settings, "step_fs")
     # of second order: the step that reaches it, in hundredths of a femtosecond, from one that is short; then shorter until it does
     step = FIRST_STEP_FS * math.sqrt(asked / conserved_bound_k(request, FIRST_STEP_FS))
     step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
@@ -120,7 +120,7 @@ def choose_ewald(scene: Any, request: FluidRequest, asked: float) -> Choice:
             f"accuracy: {asked:g} %: of the forces is that of Ewald's sum, and {own.electrostatics} is another model; give "
             'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
         )
-    refuse_given(own, "ewald_tolerance")
+    refuse_set(own, "ewald_tolerance")
     for tolerance in EWALD_LADDER:
         chosen = replace(request, settings=replace(own, ewald_tolerance=tolerance))
         error = force_error(chosen)

@@ -23,7 +23,7 @@ def show_errors(content: Mapping[str, Any]) -> None:
 
 
 def error_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Name and text of each source of error, and of the total, from the JSON of a budget."""
+    """Rows (name, text) of the five error sources and their total, from the JSON of a budget."""
     budget = ErrorBudget.from_json(content)
     rows = [(name, _text(term, budget.unit, KINDS[name])) for name, term in budget.terms.items()]
     total = budget.total

@@ -14,14 +14,14 @@ SHOWN = 24  # states on screen
 
 
 def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
-    """J max, how exact energies are, and the population at the edge, as a line of the report."""
+    """J max, the error of the energies and the population at the edge of the basis, as a line of the report."""
     accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
     rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
     return "numerical error", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
 
 
 def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[slice], list[str]]) -> Table:
-    """The first states by M and block, a row each, made from the rows of its curve in the map."""
+    """The first states by M and block, one row each; `row_of` formats the rows that a state has in the map."""
     curves = states.curves()
     rows = [row_of(rows_of) for rows_of in curves[:SHOWN]]
     title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"

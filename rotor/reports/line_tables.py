@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dict[str, Any]]:
-    """The strongest lines at a resolution, by frequency."""
+    """The strongest patterns of lines that a resolution merges, ordered by frequency."""
     from rotor.quantum.quanta import labels, of_rotation
     from rotor.spectra.intensity import largest
     from rotor.spectra.patterns import patterns
@@ -30,7 +30,7 @@ def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dic
 
 
 def the_first(count: int, what: str) -> str:
-    """What a table begins with where it shows some rows of many.
+    """Title of a table that shows only the strongest (or lowest, brightest) rows.
 
     >>> the_first(1, "strongest line"), the_first(3, "strongest line")
     ('the strongest line', 'the 3 strongest lines')
@@ -39,7 +39,7 @@ def the_first(count: int, what: str) -> str:
 
 
 def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
-    """Patterns of lines by frequency; names: headings of the quantum numbers of their rotational levels."""
+    """Table of line patterns by frequency; `names` heads the quantum numbers of the rotational levels."""
     forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
     rows = [
         (*(form.format(record[name]) for name, form in forms.items()), record["upper"], record["lower"])
@@ -51,7 +51,7 @@ def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
 
 
 class _Column(NamedTuple):
-    """A column of the table: its name in `Lines.columns`, its heading, and how a number is printed."""
+    """A column of the line table: its name in `Lines.columns`, its heading, its number format."""
 
     name: str
     heading: str
@@ -70,14 +70,14 @@ _COLUMNS = (
 
 
 def _printed(value: float, form: str) -> str:
-    """A number of the table; nothing where it is not known, and a bound for the logarithm of an intensity that underflows."""
+    """A number as text: empty where it is NaN, a bound where the intensity underflows (its logarithm is -inf)."""
     if math.isinf(value):
         return "<-300"
     return "" if math.isnan(value) else form.format(value)
 
 
 def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
-    """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
+    """Table of the selected lines in order of frequency, with their optical depths if a layer of gas is given."""
     from rotor.quantum import quanta
 
     shown = lines.where(rows)

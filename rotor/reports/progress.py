@@ -1,4 +1,4 @@
-"""How far a calculation is, on standard error, where that is a terminal."""
+"""Progress displays on standard error; they appear only on a terminal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from contextlib import contextmanager
 SHOW_AFTER_S = 2.0  # shorter work shows nothing
 
 
-class _Shown:
-    """What else shows how far the work is: bars that are open, and when a line was last written."""
+class _Display:
+    """State shared by the displays: how many bars are open, and when a line was last written (s, monotonic clock)."""
 
     bars = 0
     last_line = -SHOW_AFTER_S
@@ -20,18 +20,18 @@ class _Shown:
 
 @contextmanager
 def elapsed_time(what: str) -> Iterator[None]:
-    """On a terminal, work that takes longer than two seconds shows its time, unless a bar or line of its own says how far it is."""
+    """Show the elapsed time of work that takes longer than two seconds, unless a bar or a progress line is shown already."""
     if not sys.stderr.isatty():
         yield
         return
     start, ended, written = time.monotonic(), threading.Event(), threading.Event()
 
     def show() -> None:
-        """The time every second, in one line."""
+        """Rewrite one line each second."""
         pause = SHOW_AFTER_S
         while not ended.wait(pause):
             pause = min(1.0, SHOW_AFTER_S)
-            if not _Shown.bars and time.monotonic() - _Shown.last_line > SHOW_AFTER_S:
+            if not _Display.bars and time.monotonic() - _Display.last_line > SHOW_AFTER_S:
                 print(f"\r{what}: {time.monotonic() - start:.0f} s ", end="", file=sys.stderr, flush=True)
                 written.set()
 
@@ -43,28 +43,28 @@ def elapsed_time(what: str) -> Iterator[None]:
         ended.set()
         thread.join()
         if written.is_set():
-            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)  # the line is empty again
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)  # clear the line
 
 
 @contextmanager
 def _open_bar() -> Iterator[None]:
-    _Shown.bars += 1
+    _Display.bars += 1
     try:
         yield
     finally:
-        _Shown.bars -= 1
+        _Display.bars -= 1
 
 
 def sum_progress() -> Callable[[int, int], None] | None:
-    """A line on a terminal, rewritten as a sum over levels goes on, for sums that take longer than two seconds; else None."""
+    """Callback that rewrites a line with the J solved so far, for sums longer than two seconds; None without a terminal."""
     if not sys.stderr.isatty():
         return None
     start = time.monotonic()
 
     def show(j: int, last: int) -> None:
-        """How far the levels are solved, after two seconds."""
+        """Write J so far and the expected last J, once two seconds have passed."""
         if time.monotonic() - start > SHOW_AFTER_S:
-            _Shown.last_line = time.monotonic()
+            _Display.last_line = time.monotonic()
             print(f"\rlevels solved to J = {j} of about {last} ", end="", file=sys.stderr, flush=True)
 
     return show
@@ -72,7 +72,7 @@ def sum_progress() -> Callable[[int, int], None] | None:
 
 @contextmanager
 def counting(total: int, what: str) -> Iterator[Callable[[int], object] | None]:
-    """What advances a bar on standard error; None where that is no terminal."""
+    """Function that advances a bar by a count; None where standard error is no terminal."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -87,7 +87,7 @@ def counting(total: int, what: str) -> Iterator[Callable[[int], object] | None]:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], object]]:
-    """On a terminal, a bar on standard error: so many pieces of so many are done, the time until now and the time left."""
+    """Bar with pieces done, elapsed time and time left; call it with (done, total). It does nothing without a terminal."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,

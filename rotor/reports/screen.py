@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Table:
-    """A heading, column names, and rows of text; numbers are aligned to the right, columns named in `left` to the left."""
+    """A title, column names and rows of text. Columns in `left` are aligned to the left, the others to the right."""
 
     title: str
     columns: Sequence[str]
@@ -33,7 +33,7 @@ def show_table(table: Table) -> None:
 
 
 def evenly(count: int, most: int) -> list[int]:
-    """Rows of a long table that are shown, the first and the last among them.
+    """Indices of at most `most` evenly spaced rows of a long table, with the first and the last.
 
     >>> evenly(3, 5), evenly(9, 5)
     ([0, 1, 2], [0, 2, 4, 6, 8])
@@ -72,12 +72,12 @@ def _draw(table: Table) -> None:
     console = Console()
     if console.measure(drawn, options=console.options.update(width=10_000)).maximum <= console.width:
         console.print(drawn)
-    else:  # a terminal too narrow for it: lines break, numbers are not cut
+    else:  # terminal too narrow: break lines rather than cut numbers
         print(table_text(table))
 
 
 def show_facts(facts: Iterable[tuple[str, str]]) -> None:
-    """Print names and what there is to say about them, folded to the width of the terminal."""
+    """Print names and their texts in two columns, folded to the width of the terminal."""
     import textwrap
 
     facts = list(facts)
@@ -87,32 +87,32 @@ def show_facts(facts: Iterable[tuple[str, str]]) -> None:
         print(textwrap.fill(text, width, initial_indent=name.ljust(indent), subsequent_indent=" " * indent))
 
 
-def plain(thing: Any) -> Any:
-    """This content in the types of JSON: arrays as lists, numbers that are not finite as None."""
-    if isinstance(thing, Mapping):
-        return {str(key): plain(value) for key, value in thing.items()}
-    if hasattr(thing, "tolist"):
-        return plain(thing.tolist())
-    if isinstance(thing, list | tuple):
-        return [plain(item) for item in thing]
-    if isinstance(thing, float) and not math.isfinite(thing):
+def plain(content: Any) -> Any:
+    """Convert content to the types of JSON: arrays become lists, non-finite numbers None."""
+    if isinstance(content, Mapping):
+        return {str(key): plain(value) for key, value in content.items()}
+    if hasattr(content, "tolist"):
+        return plain(content.tolist())
+    if isinstance(content, list | tuple):
+        return [plain(item) for item in content]
+    if isinstance(content, float) and not math.isfinite(content):
         return None
-    return thing
+    return content
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """The content as JSON text, each number once and each record of a list on one line."""
+    """JSON text with one line for each key and for each record of a list."""
     items = (f"{json.dumps(str(key))}: {_json_value(value)}" for key, value in content.items())
     return "{\n" + ",\n".join(items) + "\n}\n"
 
 
 def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
-    """The content as JSON text with all rows of a table, one record each, under the key."""
+    """JSON text of the content, with all rows of a table as records under `key`."""
     return json_text({**content, key: rows_of(table)})
 
 
 def rows_of(table: Columns) -> list[dict[str, Any]]:
-    """All rows of a table, one record each by the names of its columns."""
+    """All rows of a table as records by column name."""
     columns = {name: column.tolist() for name, column in table.columns.items()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 

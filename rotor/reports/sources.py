@@ -1,4 +1,4 @@
-"""Where the numbers of a report are from: one short line with citations, or with --sources the whole of it."""
+"""Sources of the numbers in a report: one short line of citations, or full texts with --sources."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ if TYPE_CHECKING:
 
 LONGEST = 72  # characters of one source in the short line
 _CATALOGUE = re.compile(r"c\d{6} of (?:JPL|CDMS)(?: \([^()]*\d{4}[^()]*\))?")
-_DATED = re.compile(r"^.*?\((?:\d{4}|[^()]*\b\d{4}\b[^()]*)\)")  # as far as the first year in parentheses
-_OF_CONSTANTS = re.compile(r"[A-Z]\w{0,3}(?:, [A-Z]\w{0,3})*: ")  # which constants a source has is not the source
-_SPECIES = re.compile(r"(?:ground state[,;:]|[A-Z]\w* \d+\w+;) ")  # nor is the state or the isotopologue
+_DATED = re.compile(r"^.*?\((?:\d{4}|[^()]*\b\d{4}\b[^()]*)\)")  # up to the first year in parentheses
+_CONSTANT_NAMES = re.compile(r"[A-Z]\w{0,3}(?:, [A-Z]\w{0,3})*: ")  # a prefix that lists constants
+_SPECIES = re.compile(r"(?:ground state[,;:]|[A-Z]\w* \d+\w+;) ")  # a prefix that names state or isotopologue
 _TABLES = {"constants": "source", "dipole": "dipole_source", "polarizability": "polarizability_source",
            "spin weights": "weights_source"}  # fmt: skip
 
 
 def short_source(text: str) -> str:
-    """A source as far as its citation, or as its first clause where it cites nothing; what is unverified stays said.
+    """Shorten a source to its citation, or to its first clause if it cites nothing. The mark "unverified" stays.
 
     >>> short_source("fitted here to the 7 lines with J <= 10 of c018003 of JPL (Pickett et al. 1998), weighted by errors")
     'fitted to c018003 of JPL (Pickett et al. 1998)'
@@ -40,12 +40,12 @@ def short_source(text: str) -> str:
     clause = dated[0] if dated else rest.partition(";")[0]
     if len(clause) > LONGEST:
         first = rest.partition(";")[0]
-        clause = first if _OF_CONSTANTS.match(first) else first.partition(":")[0]
+        clause = first if _CONSTANT_NAMES.match(first) else first.partition(":")[0]
     return mark + (clause if len(clause) <= LONGEST else clause[: LONGEST - 1].rstrip() + "…")
 
 
 def source_facts(top: Top, tables: Sequence[str], whole: bool) -> list[tuple[str, str]]:
-    """The sources of tables of a top (constants, dipole, polarizability, spin weights), one line or all of it."""
+    """Sources of the named tables of a top (constants, dipole, polarizability, spin weights), short or `whole`."""
     texts = {table: getattr(top, _TABLES[table]) for table in tables if getattr(top, _TABLES[table])}
     if top.states is not None and top.states.source and "constants" in tables:
         texts["states"] = top.states.source

@@ -1,4 +1,4 @@
-"""How spins of nuclei were treated, as a line of a report."""
+"""Treatment of nuclear spins, as a line of a report."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def hyperfine_lines(used: dict[str, Any] | None) -> list[tuple[str, str]]:
-    """Which method split the levels, and by how much it may differ from the exact one."""
+    """The method that split the levels, and the estimated difference from the exact one."""
     if used is None:
         return []
     if used["method"] == "exact":

@@ -1,4 +1,4 @@
-"""A top as content for JSON and as lines for people, the same for every verb that prints one."""
+"""Content of a top for JSON and lines for its report, common to all verbs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitud
 
 
 def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """The line of an error budget, from its JSON; nothing for none."""
+    """The line of an error budget, from its JSON; empty for None."""
     if errors is None:
         return []
     from rotor.requests.budget import ErrorBudget
@@ -37,9 +37,9 @@ def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
 
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Errors, effects of the model and what it leaves out, largest first, from `rotor.quantum.estimates.limits.limit_facts`."""
+    """Errors, effects in the model and effects left out (largest first), from `rotor.quantum.estimates.limits.limit_facts`."""
     from rotor.quantum.estimates.beyond import Limit
-    from rotor.requests.plan import larger_ones
+    from rotor.requests.plan import larger_items
 
     present = [f"{effect['name']} {effect['size_mhz']:.2g} MHz" for effect in content["effects"] if effect["present"]]
     sizes = (
@@ -48,7 +48,7 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     facts = [*error_facts(content.get("errors")), ("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
-    larger, others = larger_ones(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
+    larger, others = larger_items(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
     verb = content["command"].split()[1:2]
     limits = [with_option(Limit(**limit).sentence, *verb) for limit in larger]
     limits += [others] if others else []
@@ -59,19 +59,19 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def with_option(sentence: str, verb: str = "spectrum") -> str:
-    """A sentence about spins that are left out, with the option that adds them: of this verb if it has one, else of rotor spectrum."""
+    """Complete a sentence on neglected spins with the option that adds them: of this verb, or of rotor spectrum if it has none."""
     from rotor.quantum.estimates.beyond import COMPUTE
 
     return sentence.replace(COMPUTE, f"rotor {verb if verb in WITH_HYPERFINE else 'spectrum'} --hyperfine")
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
-    """Sentences of what is left out, the first with the name of the list."""
+    """Rows for the neglected effects; only the first row carries the heading."""
     return [("left out" if not i else "", sentence) for i, sentence in enumerate(sentences)]
 
 
 def states_facts(top: Top) -> list[tuple[str, str]]:
-    """Names and dipoles of several states."""
+    """Names and dipoles of vibrational states."""
     states = top.states
     if states is None:
         return []
@@ -86,7 +86,7 @@ def states_facts(top: Top) -> list[tuple[str, str]]:
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
     formula = formula_of(top)
-    if formula:  # the library, which takes some ms to load, may write it in another way
+    if formula:  # imported only here: the library takes some ms to load
         from rotor.formats.molecules.library import written_formula
 
         formula = written_formula(top.name, formula)
@@ -96,7 +96,7 @@ def heading(top: Top) -> str:
 
 
 def constants_text(top: Top) -> str:
-    """A, B, C, and how many distortion constants go with them."""
+    """A, B, C in MHz, their estimated error, and the number of distortion constants."""
     constants, errors = top.constants, estimated_errors_mhz(top)
     rigid = [name for name in constants.values if name in "ABC"]
     text = ", ".join(f"{name} {known_digits(constants[name], errors.get(name), 10)}" for name in rigid) + " MHz"
@@ -108,7 +108,7 @@ def constants_text(top: Top) -> str:
 
 
 def known_digits(value: float, error: float | None, digits: int = 12) -> str:
-    """A number with the digits that its error leaves, two of them uncertain; with `digits` digits where no error is estimated.
+    """Number rounded to two uncertain digits of its error; with `digits` digits if no error is estimated.
 
     >>> known_digits(6011.70626348, 72.0), known_digits(6011.70626348, 0.6), known_digits(6011.70626348, None)
     ('6012', '6011.71', '6011.70626348')
@@ -120,7 +120,7 @@ def known_digits(value: float, error: float | None, digits: int = 12) -> str:
 
 
 def form_text(constants: Constants) -> str:
-    """Reduction and representation of an asymmetric top."""
+    """Reduction and representation of an asymmetric top, such as "A-reduction, Ir"."""
     reduction = f"{constants.reduction}-reduction, " if constants.reduction else ""
     return f"{reduction}{constants.representation}"
 
@@ -141,7 +141,7 @@ def dipole_text(top: Top) -> str:
 
 
 def tensor_text(top: Top) -> str:
-    """A polarizability as `aa 1.528, bb 1.468, cc 1.415 Å³`, with the elements off the diagonal that are not 0."""
+    """A polarizability as `aa 1.528, bb 1.468, cc 1.415 Å³`, with the non-zero off-diagonal elements."""
     tensor = top.polarizability_abc_angstrom3
     if tensor is None:
         return "isotropic by symmetry" if top.kind == "spherical" else "not known"
@@ -156,7 +156,7 @@ _COMPONENTS = {
 
 
 def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]:
-    """Spin weights of the levels: those of every state where states have their own, else those of the top."""
+    """Spin weights of the levels, for each vibrational state if the states have weights, else for the top."""
     states = top.states
     if states is None or not states.weights:
         components = f" ({_COMPONENTS[top.kind]})" if mapping and top.kind in _COMPONENTS else ""
@@ -174,6 +174,6 @@ def weights_text(mapping: Mapping[str, int]) -> str:
 
 
 def q_text(record: Mapping[str, Any], classical: bool = True) -> str:
-    """Q and what is known about it; classical: whether the constants of the top give its classical limit."""
+    """Q with its source, and its classical limit if `classical` is true and a limit is given."""
     limit = f"; classical limit {record['classical']:.6g}" if classical and record["classical"] else ""
     return f"{record['q']:.6g}, {record['source']}{limit}"

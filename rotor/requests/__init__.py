@@ -1,1 +1,1 @@
-"""Declarations: what is known of each field of a request, and how texts, scenes and Python values become one."""
+"""Declared fields of requests, and how command lines, scenes and Python calls fill them."""

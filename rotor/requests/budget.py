@@ -1,5 +1,4 @@
-"""How far a result can be trusted: five sources of error, each a number in the unit of the result or a reason why there is none.
-
+"""Error budget of a result: five sources of error, each a number in the unit of the result or a reason why it is not estimated.
 | term | what it is | how it is stated |
 |---|---|---|
 | rounding | double precision | a bound |
@@ -19,16 +18,15 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 NOT_ESTIMATED = "not estimated"
-ROUNDING = 8 * sys.float_info.epsilon  # a few units in the last place: of an eigenvalue, relative to the largest
+ROUNDING = 8 * sys.float_info.epsilon  # of an eigenvalue, relative to the largest: a few units in the last place
 
 
 @dataclass(frozen=True)
 class ErrorTerm:
     """One source of error of a result.
 
-    value: in the unit of the budget; None where it is not estimated. source: from what the value follows, or why there is none.
-    remedy: what would lower it.
-
+    value: in the unit of the budget; None if not estimated. source: what the value follows from, or why it is not estimated.
+    remedy: what would lower the error.
     >>> ErrorTerm(4e-7, "J max 15").text("MHz")
     '4e-07 MHz (J max 15)'
     >>> ErrorTerm(None, "the dipole has no stated uncertainty").text("MHz")
@@ -62,7 +60,7 @@ class ErrorTerm:
 class ErrorBudget:
     """The errors of a result.
 
-    of: the observable ("frequencies"). unit: of the values; empty for a pure number.
+    of: the observable ("frequencies"). unit: unit of the values; empty for pure numbers.
 
     >>> budget = ErrorBudget(
     ...     "frequencies", "MHz", ErrorTerm(1e-9, "eigenvalues"), ErrorTerm(4e-7, "J max 15"),
@@ -88,13 +86,13 @@ class ErrorBudget:
 
     @property
     def numerical(self) -> float | None:
-        """Bound of rounding and truncation together; None where one of them is not estimated."""
+        """Sum of the bounds of rounding and truncation; None if either is not estimated."""
         parts = (self.rounding.value, self.truncation.value)
         return None if None in parts else math.fsum(part for part in parts if part is not None)
 
     @property
     def total(self) -> float | None:
-        """Bounds and sizes added to the standard deviations of data and statistics together; None where a term is not estimated."""
+        """Bounds, plus model size, plus data and statistics added in quadrature; None if any term is not estimated."""
         numerical, model = self.numerical, self.model.value
         spread = (self.data.value, self.statistics.value)
         if numerical is None or model is None or spread[0] is None or spread[1] is None:
@@ -102,7 +100,7 @@ class ErrorBudget:
         return numerical + model + math.hypot(spread[0], spread[1])
 
     def shown(self) -> Iterator[tuple[str, ErrorTerm]]:
-        """Terms for the screen, largest first, those not estimated last; rounding and truncation as one, terms that are 0 left out."""
+        """Non-zero terms for the screen, largest first and unestimated ones last; rounding and truncation are joined."""
         larger = max((self.truncation, self.rounding), key=lambda term: -1.0 if term.value is None else term.value)
         missing = next((term for term in (self.truncation, self.rounding) if term.value is None), None)
         numerical = missing or ErrorTerm(self.numerical, larger.source, larger.remedy)
@@ -117,7 +115,7 @@ class ErrorBudget:
         yield from ((name, term) for name, term in named if term.value is None)
 
     def line(self) -> str:
-        """One line of a report: sizes with the first part of their sources; the table has the whole."""
+        """One line of a report: each size with the first clause of its source; --errors has the full sources."""
         texts = []
         for name, term in self.shown():
             about = "about " if name == "left out" and term.value else ""
@@ -126,7 +124,7 @@ class ErrorBudget:
         return f"errors of {self.of}: " + (", ".join(texts) or "none beyond the last digit")
 
     def shortfall(self, accuracy: float) -> str:
-        """What exceeds an accuracy (in the unit of the budget), largest first, and what would lower it; empty where nothing does.
+        """Terms that exceed an accuracy (in the unit of the budget), largest first, with remedies; empty if none does.
 
         >>> exact = ErrorTerm(0.0, "exact")
         >>> geometry = ErrorTerm(300.0, "error of the geometry", "measured constants")

@@ -1,4 +1,4 @@
-"""Things of several kinds in a list, such as [[pulses]] with shape = "gaussian": each kind a dataclass of declared fields."""
+"""Lists of objects of several kinds, such as [[pulses]] with shape = "gaussian"; each kind is a dataclass of declared fields."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotor.requests.field import REQUIRED, Field, all_fields, undeclared
-from rotor.requests.fill import Given, equal, read_instance, written_fields
+from rotor.requests.fill import Entries, equal, read_instance, written_fields
 from rotor.requests.readers import InsideError, Reader
 
 
 @dataclass(frozen=True, eq=False)
 class Choices(Reader):
-    """A list of things of several kinds: tables of a scene, lines of text on the command line, or the objects themselves.
+    """Reader of a list of objects of several kinds: tables of a scene, lines of text on the command line, or the objects themselves.
 
-    word: the key of a table that names the kind. load: gives the dataclasses by that name.
+    word: the key that names the kind. load: returns the dataclasses by kind.
     """
 
     word: str
@@ -25,25 +25,25 @@ class Choices(Reader):
     many = True
 
     def read(self, raw: Any) -> tuple[Any, ...]:
-        """What tables and lines say, objects as they are; an error of a table names its number and key."""
+        """Objects from tables, text lines or objects; an error in a table gives its number and key."""
         items = raw if isinstance(raw, list | tuple) else (raw,)
         return tuple(self._read(item, number) for number, item in enumerate(items))
 
     def _read(self, item: Any, number: int) -> Any:
         if isinstance(item, str):
-            return self._of_line(item)
+            return self._read_line(item)
         if not isinstance(item, Mapping):
             return item
         try:
             kind, values = self.load()[str(item[self.word])], {k: v for k, v in item.items() if k != self.word}
-            return read_instance(kind, Given(values, "key"))
+            return read_instance(kind, Entries(values, "key"))
         except ValueError as error:
             text = str(error)
             inside = text.partition(":")[0] in item
             raise InsideError(f"[{number}].{text}" if inside else f"[{number}]: {text}") from None
 
-    def _of_line(self, line: str) -> Any:
-        """What a line of text means: `linear drag coefficients=0.1,0.1,0.2`, numbers between commas, rows between semicolons."""
+    def _read_line(self, line: str) -> Any:
+        """Object from a line such as `linear drag coefficients=0.1,0.1,0.2`: commas separate numbers, semicolons rows."""
         name, texts = _words(line)
         kinds = self.load()
         if name not in kinds:
@@ -64,7 +64,7 @@ class Choices(Reader):
         return kinds[name](**values)
 
     def line(self, thing: Any) -> str:
-        """The line of text of a thing; the name of its class for one that no table holds."""
+        """The line of text of an object; the name of its class if a line cannot hold it."""
         try:
             table = self.write([thing])[0]
         except ValueError:
@@ -73,7 +73,7 @@ class Choices(Reader):
         return " ".join([table[self.word], *parts])
 
     def write(self, value: Any) -> list[dict[str, Any]]:
-        """Tables that say the same again; ValueError for a thing that no table holds."""
+        """Tables for a scene; ValueError for an object that a table cannot hold."""
         names: dict[Any, str] = {kind: name for name, kind in self.load().items()}
         if other := next((thing for thing in value if type(thing) not in names), None):
             raise ValueError(f"a scene holds no {type(other).__name__}; there are {', '.join(names.values())}")
@@ -85,7 +85,7 @@ class Choices(Reader):
 
 
 def _line_text(value: Any) -> str:
-    """Numbers between commas, rows between semicolons; a diagonal matrix by its diagonal."""
+    """Text with commas between numbers and semicolons between rows; a diagonal matrix is written as its diagonal."""
     if not isinstance(value, list):
         return f"{value:g}" if isinstance(value, float) else str(value)
     if not all(isinstance(row, list) for row in value):
@@ -98,7 +98,7 @@ def _line_text(value: Any) -> str:
 
 
 def _words(line: str) -> tuple[str, dict[str, str]]:
-    """The name in front of a line, and the text of each parameter."""
+    """The kind at the start of a line, and the text of each parameter."""
     name: list[str] = []
     texts: dict[str, str] = {}
     key = ""
@@ -117,11 +117,16 @@ def _words(line: str) -> tuple[str, dict[str, str]]:
 
 
 def _usage(fields: Mapping[str, Field]) -> str:
-    """All parameters, with what each is."""
+    """All parameters with their help texts."""
     return ", ".join(f"{key} ({field.help})" for key, field in fields.items())
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The known word that is most like another one, or all of them, as a part of a sentence."""
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
-    return f"the nearest is {near[0]!r}" if near else f"there are {', '.join(known)}"
+def nearest(word: str, names: Iterable[str]) -> str:
+    """Part of an error message: the name most similar to a mistyped word, or all names.
+
+    >>> nearest("watr", ["water", "ammonia"])
+    "the nearest is 'water'"
+    """
+    names = list(names)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    return f"the nearest is {near[0]!r}" if near else f"there are {', '.join(names)}"

@@ -1,12 +1,12 @@
-"""What is known of a field of a request, said once where the field stands.
+"""Declaration of a request's field, written once where the field stands.
 
     @dataclass(frozen=True)
     class RamanRequest:
         top: Top
         temperature_k: float = declared(300.0, Quantity("K", above=0), "Temperature", "conditions.temperature")
 
-From it follow the option with its text and panel, the key of a scene, the line of a template, the JSON Schema, `--save-scene`, the check
-of the request, the names in errors, and the reference page. A field that several options make together is a `part`.
+From it follow the command-line option, the key of a scene, the line of a template, the JSON Schema, `--save-scene`, the check of the
+request, the names in errors, and the reference page. A field that is made from several options is a `part`.
 """
 
 from __future__ import annotations
@@ -32,14 +32,20 @@ REQUIRED: Any = MISSING  # the default of a field that must be given
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Field:
-    """What is known of a field.
+    """Declaration of a field.
 
-    reader: how a value is read and written, with its unit and bounds. help: one line, without a full stop. key: table and key of a scene;
-    without a table a key that stands before the first; "" is not in a scene. option: on the command line; None: derived from the key, "":
-    none; one that does not begin with "-" stands without a name. hidden: the option is one that stands for several fields, see
-    `rotor.verbs.verb.Extra`. none: the word for None. common: whether --help shows the option; --help-all shows all. example: of a
-    template, where the default is nothing. typed: the default as a person writes it, where it is not plain. panel: heading in --help.
-    knob: of an approximation, see `rotor.requests.knob`. name, default: filled in.
+    reader: reads, writes and checks a value, with unit and bounds.
+    help: one line, without a full stop.
+    key: table and key in a scene, such as "conditions.temperature"; a key without a table stands before the first table; "" for none.
+    option: name on the command line; None derives it from the key, "" means none; without a leading "-" it is an argument by position.
+    hidden: another option sets this field together with others (`rotor.verbs.verb.Extra`).
+    none: the word that stands for None.
+    common: whether --help lists the option; --help-all lists all.
+    example: value in a template if the default is None.
+    typed: the default as a user would type it, if that differs.
+    panel: heading in --help.
+    knob: how fine an approximation is (`rotor.requests.knob`).
+    name, default: filled in by `declared_fields`.
     """
 
     reader: Reader
@@ -59,7 +65,7 @@ class Field:
 
     @property
     def table(self) -> str:
-        """The table of a scene; empty for a key before the first one."""
+        """The table in a scene; empty for a key before the first table."""
         return self.key.rpartition(".")[0]
 
     @property
@@ -81,16 +87,16 @@ class Field:
 
     @property
     def identity(self) -> str:
-        """By what a value is known, whether typed, in a file or from Python: the key, else the name."""
+        """The name of a value in `Entries`, whatever its origin: the key, or the field's name if it has no key."""
         return self.key or self.name
 
     def called(self, style: str) -> str:
-        """How errors call it: style is "option", "key" or "name"."""
+        """The field's name in errors; style is "option", "key" or "name"."""
         names = {"option": self.flag, "key": self.key, "name": self.name}
         return names[style] or self.flag or self.key or self.name
 
     def read(self, raw: Any, style: str) -> Any:
-        """The value of what was given; a ValueError calls the field by the name that the user knows."""
+        """Read a value; a ValueError names the field in the given style."""
         word = isinstance(raw, str) and raw.strip().lower() == self.none
         if raw is None or word:
             return None
@@ -103,11 +109,11 @@ class Field:
             raise ValueError(f"{self.called(style)}: {error}{none}") from None
 
     def write(self, value: Any) -> Any:
-        """What a scene holds of a value; None where it is left out."""
+        """The value as a scene holds it; None is left out."""
         return self.none if value is None else self.reader.write(value)
 
     def check(self, value: Any) -> None:
-        """ValueError, with the field's name, for a value that the reader's bounds exclude."""
+        """Raise ValueError, with the field's name, if the value is out of bounds."""
         check = getattr(self.reader, "check", None)
         if value is None or check is None:
             return
@@ -121,11 +127,12 @@ class Field:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Part:
-    """A field of a request that is made from several declared values, which stand in a dataclass of their own.
+    """A field of a request that is made from several declared values, which stand in their own dataclass.
 
-    inputs: that dataclass. make: the value of the field from an instance and the subject (a molecule, ...). split: the instance that
-    gives a value back, from the value and the request; None where all is left out. whole: all of the inputs or none of them; single: at
-    most one of them; why: what an error says of that.
+    inputs: that dataclass.
+    make: returns the field's value from an instance of `inputs` and the subject (a molecule, ...).
+    split: the inverse: returns an instance of `inputs` from the value and the request, or None if all inputs are left out.
+    whole: either all inputs must be given or none. single: at most one may be given. why: the rule as an error states it.
     """
 
     inputs: type
@@ -137,7 +144,7 @@ class Part:
 
 
 def declared(default: Any, reader: Reader, help: str, key: str = "", **more: Any) -> Any:
-    """A field of a dataclass with its declaration."""
+    """A dataclass field with its declaration (`Field`)."""
     metadata = {_DECLARED: Field(reader, help, key, default=default, **more)}
     if default is REQUIRED:
         return dataclass_field(metadata=metadata)
@@ -149,7 +156,7 @@ def declared(default: Any, reader: Reader, help: str, key: str = "", **more: Any
 def part(
     inputs: type, make: Callable[[Any, Any], Any], split: Callable[[Any, Any], Any], default: Any = None, **more: Any
 ) -> Any:
-    """A field of a dataclass that several declared values make; default: of the field."""
+    """A dataclass field that is made from several declared values (`Part`); default: of the field."""
     metadata = {_PART: Part(inputs, make, split, **more)}
     return (
         dataclass_field(metadata=metadata)
@@ -159,13 +166,13 @@ def part(
 
 
 def identical(value: Any, _: Any) -> Any:
-    """The `make` and `split` of a part whose inputs are its value."""
+    """Identity, as `make` and `split` of a part whose value is its inputs."""
     return value
 
 
 @cache
-def own_fields(structure: Any) -> dict[str, Field]:
-    """The declared fields of a dataclass by their names, parts left out."""
+def declared_fields(structure: Any) -> dict[str, Field]:
+    """The declared fields of a dataclass by name, without those of its parts."""
     from dataclasses import replace
 
     assert is_dataclass(structure)
@@ -178,23 +185,23 @@ def own_fields(structure: Any) -> dict[str, Field]:
 
 @cache
 def undeclared(structure: Any) -> list[Any]:
-    """The fields of a dataclass that no file holds."""
+    """The fields of a dataclass that are neither declared nor parts; no file holds them."""
     return [item for item in fields(structure) if not item.metadata.keys() & {_DECLARED, _PART}]
 
 
 @cache
 def parts_of(structure: Any) -> dict[str, Part]:
-    """The parts of a dataclass by their names."""
+    """The parts of a dataclass by name."""
     return {item.name: item.metadata[_PART] for item in fields(structure) if _PART in item.metadata}
 
 
 @cache
 def all_fields(structure: Any) -> dict[str, Field]:
-    """Every declared field of a request by its identity, those of its parts among them, in the order in which they stand."""
+    """All declared fields of a request by identity, including those of its parts, in order of definition."""
     by_identity: dict[str, Field] = {}
     for item in fields(structure):
         if _DECLARED in item.metadata:
-            field = own_fields(structure)[item.name]
+            field = declared_fields(structure)[item.name]
             by_identity[field.identity] = field
         elif _PART in item.metadata:
             inner: Any = parts_of(structure)[item.name].inputs
@@ -203,13 +210,13 @@ def all_fields(structure: Any) -> dict[str, Field]:
 
 
 def check_fields(request: Any) -> None:
-    """ValueError, with the name of the field, for a value of a request that the bounds of its declaration exclude."""
+    """Raise ValueError, with the field's name, if a value of a request is out of its declared bounds."""
     structure: Any = type(request)
-    for name, field in own_fields(structure).items():
+    for name, field in declared_fields(structure).items():
         field.check(getattr(request, name))
 
 
 def names_of(structure: Any, style: str) -> Iterator[tuple[str, str]]:
-    """Name of every field of a request, and how errors call it."""
+    """Pairs of a field's name and its name in errors, for all fields of a request."""
     for field in all_fields(structure).values():
         yield field.name, field.called(style)

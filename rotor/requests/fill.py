@@ -1,4 +1,4 @@
-"""From what was typed, or stands in a scene, to a request, and back."""
+"""Fill requests from command lines, scenes and Python values, and write them back to scenes."""
 
 from __future__ import annotations
 
@@ -8,44 +8,44 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from rotor.requests.field import REQUIRED, Field, Part, all_fields, names_of, own_fields, parts_of
+from rotor.requests.field import REQUIRED, Field, Part, all_fields, declared_fields, names_of, parts_of
 
 
 @dataclass(frozen=True)
-class Given:
-    """What a user gave. values: by the identity of the field. style: how errors call fields: "option", "key" or "name"."""
+class Entries:
+    """Values that a user entered. values: by identity of the field. style: how errors name fields: "option", "key" or "name"."""
 
     values: Mapping[str, Any] = field(default_factory=dict)
     style: str = "name"
 
     def of(self, field: Field) -> Any:
-        """The value of a field as given; None for none."""
+        """The value entered for a field; None if it was not entered."""
         return self.values.get(field.identity)
 
     def has(self, field: Field) -> bool:
-        """Whether a field was given."""
+        """Whether a field was entered."""
         return self.values.get(field.identity) is not None
 
     def among(self, structure: Any) -> list[Field]:
-        """The fields of a dataclass that were given."""
+        """The fields of a dataclass that were entered."""
         return [field for field in all_fields(structure).values() if self.has(field)]
 
 
-def read_fields(structure: Any, entries: Given, subject: Any = None) -> dict[str, Any]:
-    """Values of the fields of a dataclass that were given, by name, parts made for a subject; what was not given is left out."""
+def read_fields(structure: Any, entries: Entries, subject: Any = None) -> dict[str, Any]:
+    """Values of the entered fields of a dataclass, by name; parts are made for the subject."""
     values = {
         name: field.read(entries.of(field), entries.style)
-        for name, field in own_fields(structure).items()
+        for name, field in declared_fields(structure).items()
         if entries.has(field)
     }
     for name, part in parts_of(structure).items():
-        made = _make(part, entries, subject)
-        if made is not None:
-            values[name] = made
+        value = _make(part, entries, subject)
+        if value is not None:
+            values[name] = value
     return values
 
 
-def _make(part: Part, entries: Given, subject: Any) -> Any:
+def _make(part: Part, entries: Entries, subject: Any) -> Any:
     present = entries.among(part.inputs)
     inner = read_fields(part.inputs, entries, subject)
     if part.whole and present and len(present) < len(all_fields(part.inputs)):
@@ -59,10 +59,10 @@ def _make(part: Part, entries: Given, subject: Any) -> Any:
         return part.make(part.inputs(**inner), subject)
 
 
-def read_instance(structure: Any, entries: Given, subject: Any = None) -> Any:
-    """An instance of a dataclass whose fields are all declared."""
+def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
+    """Instance of a dataclass all of whose fields are declared."""
     missing = [
-        field for field in own_fields(structure).values() if field.default is REQUIRED and not entries.has(field)
+        field for field in declared_fields(structure).values() if field.default is REQUIRED and not entries.has(field)
     ]
     if missing:
         name = missing[0].called(entries.style)
@@ -74,16 +74,16 @@ def read_instance(structure: Any, entries: Given, subject: Any = None) -> Any:
 
 @contextmanager
 def called(structure: Any, style: str) -> Iterator[None]:
-    """Inside, a ValueError that names fields of a request calls them as the user does."""
+    """Context in which a ValueError names fields of a request in the user's style."""
     with renaming({name: text for name, text in names_of(structure, style) if text}):
         yield
 
 
 @contextmanager
 def renaming(names: Mapping[str, str]) -> Iterator[None]:
-    """Inside, a ValueError calls fields by other names.
+    """Context in which a ValueError replaces field names by other names.
 
-    A name with an underscore is replaced wherever it stands; one that is an ordinary word only at the start.
+    A name with an underscore is replaced anywhere in the text; a plain word only at the start.
     """
     try:
         yield
@@ -95,28 +95,28 @@ def renaming(names: Mapping[str, str]) -> Iterator[None]:
 
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
-    """A text with fields called by other names."""
+    """Replace field names in a text."""
     patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b(?!\.)" for name in names]
     return re.sub("|".join(patterns), lambda match: names[match[0]], text) if patterns else text
 
 
 def written_fields(request: Any) -> dict[str, Any]:
-    """What a scene holds of a request, by the key, values that are the default left out."""
+    """Content of a scene for a request, by key; default values are left out."""
     table: dict[str, Any] = {}
     structure: Any = type(request)
-    for name, declared_field in own_fields(structure).items():
+    for name, declared_field in declared_fields(structure).items():
         value = getattr(request, name)
         if declared_field.key and not equal(value, declared_field.default):
             table[declared_field.key] = declared_field.write(value)
-    for name, each in parts_of(structure).items():
-        inner = each.split(getattr(request, name), request)
+    for name, part in parts_of(structure).items():
+        inner = part.split(getattr(request, name), request)
         if inner is not None:
             table |= written_fields(inner)
     return table
 
 
 def equal(value: Any, default: Any) -> bool:
-    """Whether a value is the default, sequences compared item by item."""
+    """Whether a value equals the default; sequences are compared item by item."""
     if value is default:
         return True
     if hasattr(value, "tolist"):
@@ -132,7 +132,7 @@ def equal(value: Any, default: Any) -> bool:
 
 
 def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables from values by dotted key.
+    """Nested tables from values by dotted key.
 
     >>> nested({"a.b": 1, "c": 2, "a.d": 3})
     {'a': {'b': 1, 'd': 3}, 'c': 2}
@@ -148,7 +148,7 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flattened(tables: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
-    """Values of tables by those dotted keys that they have."""
+    """Values by dotted key, for those keys that the tables have."""
     flat: dict[str, Any] = {}
     for key in keys:
         inner: Any = tables

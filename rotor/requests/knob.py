@@ -1,11 +1,11 @@
-"""A knob: how fine one approximation is. It stands with its field; choosing, sweeping and planning use it.
+"""A knob: how fine one approximation is. It stands with its field; accuracy goals, sweeps and plans use it.
 
     relative_error: float = declared(1e-6, Quantity(above=0), "Of Q, U and C_v", "numerics.relative_error", knob=Knob(
         (1e-1, 1e-2, 1e-3), 1e-13, (Measure("Q", "%", error_of_q),), "sums to {:g}", least=1e-13))
 
-A sweep makes answers with each step and compares them with that of the finest value. An accuracy goes to a field whose value bounds
-the error, or is searched through the values to be tried, the coarsest first. What a verb has beside the knobs of its fields, and its
-plan, stand in one `Numerics` beside its request.
+A sweep computes answers at each step and compares them with the finest value. An accuracy goal either sets a field whose value bounds
+the error, or is reached by trying values, coarsest first. `Numerics`, beside the request, holds what a verb has beyond the knobs of
+its fields, and its plan.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rotor.requests.field import Field, all_fields, own_fields
+from rotor.requests.field import Field, all_fields, declared_fields
 
 NOTHING_CHEAPER = "exact: nothing cheaper"
 LOOSEST = ", nothing cheaper: the loosest there is"
@@ -25,16 +25,16 @@ Answering = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Setting:
-    """One value of a knob. label: the value as text. request: for the sweep's `answer`. own: whether the scene has this value."""
+    """One value of a knob. label: the value as text. request: input of the sweep's `answer`. in_scene: whether the scene has this value."""
 
     label: str
     request: Any
-    own: bool = False
+    in_scene: bool = False
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One error. of: what it is the error of. unit: of the number. error: of an answer beside that of the reference."""
+    """An error measure. of: the observable. unit: of the error. error: from an answer and the reference answer."""
 
     of: str
     unit: str
@@ -45,9 +45,9 @@ class Measure:
 class Sweep:
     """The settings of a knob for one request.
 
-    name: the key of the scene. measures: errors of each answer. settings: coarsest first. reference: what errors are measured
-    against, None where the true value is known. against: the reference in words. answer: of a request; its processor time is what a
-    setting costs. repeats: how many calculations one answer holds; the time of one is given.
+    name: the key of the scene. measures: errors of each answer. settings: coarsest first. reference: the request that errors are
+    measured against; None if the true value is known. against: the reference in words. answer: computes a request; its processor time
+    is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Sweeps:
-    """All sweeps of a scene. remarks: parts of the calculation that have none, or that are not swept, each with the reason."""
+    """All sweeps of a scene. remarks: approximations that have no sweep, each with the reason."""
 
     knobs: tuple[Sweep, ...]
     remarks: tuple[str, ...] = ()
@@ -69,8 +69,8 @@ class Sweeps:
 
 @dataclass(frozen=True)
 class Choice:
-    """request: with the settings that were chosen. how: which, in words. error: found while they were chosen, in the unit of the
-    accuracy; 0 where the answer alone says it."""
+    """Settings chosen for an accuracy. request: with these settings. how: the settings in words. error: estimated during the search,
+    in the unit of the accuracy; 0 if only the answer states it."""
 
     request: Any
     how: str
@@ -86,11 +86,12 @@ def with_field(request: Any, name: str, value: Any) -> Any:
 class Knob:
     """How fine the approximation of a field is.
 
-    steps: values of a sweep, coarsest first. finest: that of the reference. Both may be functions of the request. measures: errors of an
-    answer beside the reference. against: the reference in words, with {:g} for its value, or a function of it. least: the finest value
-    of a field that bounds the error in the unit of the accuracy; None of other fields. tried: of a field that does not, the values of a
-    search for an accuracy, coarsest first. change: the request with a value. prepare: the request of a sweep. used: whether a request
-    has a use for the field.
+    steps: values of a sweep, coarsest first. finest: value of the reference. Both may be functions of the request.
+    measures: errors of an answer beside the reference.
+    against: the reference in words, with {:g} for its value, or a function of the value.
+    least: finest possible value of a field that bounds the error in the unit of the accuracy; None for other fields.
+    tried: for those other fields, values tried for an accuracy, coarsest first.
+    change: returns the request with a value. prepare: returns the request of a sweep. used: whether the field affects a request.
     """
 
     steps: Iterable[Any] | Callable[[Any], Iterable[Any]]
@@ -104,13 +105,13 @@ class Knob:
     tried: tuple[Any, ...] = ()
 
     def sweep(self, field: Field, request: Any, answer: Callable[[Any], Any]) -> Sweep:
-        """The settings of this knob for a request, that of the request among them."""
+        """The settings of this knob for a request, including the request's value."""
         value_of_scene, plain = getattr(request, field.name), self.prepare(request)
         steps = self.steps(request) if callable(self.steps) else self.steps
         finest = self.finest(request) if callable(self.finest) else self.finest
 
         def make(value: Any) -> Any:
-            """The request with a value."""
+            """The request with this value of the field."""
             return plain if value == value_of_scene else self.change(plain, field.name, value)
 
         settings = ladder(steps, value_of_scene, make)
@@ -121,11 +122,11 @@ class Knob:
         return Sweep(field.key or field.name, self.measures, settings, reference, against, answer)
 
     def choose(self, field: Field, request: Any, accuracy: float, answer: Answering) -> Choice:
-        """The request whose field is an accuracy, or the first value that reaches it.
+        """Set the field to the accuracy, or to the first tried value that reaches it.
 
-        Raises ValueError where that is finer than possible, and where the field was given too.
+        Raises ValueError if the accuracy is finer than possible, or if the field was set as well.
         """
-        refuse_given(request, field.name)
+        refuse_set(request, field.name)
         name = field.last.replace("_", " ")
         if self.tried:
             return loosest(self.tried, lambda value: self.change(request, field.name, value), answer, accuracy, name)
@@ -135,17 +136,17 @@ class Knob:
         return Choice(self.change(request, field.name, accuracy), f"{field.last} {accuracy:g}")
 
 
-def refuse_given(request: Any, *names: str) -> None:
-    """ValueError where a field that an accuracy chooses was given."""
+def refuse_set(request: Any, *names: str) -> None:
+    """Raise ValueError if a field that the accuracy chooses was also set."""
     structure: Any = type(request)
-    fields = own_fields(structure)
+    fields = declared_fields(structure)
     for name in names:
         if getattr(request, name) != fields[name].default:
             raise ValueError(f"accuracy and {fields[name].key}: give one of them")
 
 
 def stated(answer: Any) -> float:
-    """The numerical error that an answer states; infinite where it states none."""
+    """The numerical error of an answer; infinite if it is not estimated."""
     error = answer.errors.numerical
     return float("inf") if error is None else float(error)
 
@@ -154,7 +155,7 @@ def loosest(
     values: Iterable[float], change: Callable[[float], Any], answer: Answering, accuracy: float, name: str,
     error: Callable[[Any], float] = stated,
 ) -> Choice:  # fmt: skip
-    """The request with the first of some values whose answer is within an accuracy; the last where none is, which a run refuses."""
+    """The request with the first value whose answer reaches the accuracy; else with the last value, which a run then refuses."""
     values = list(values)
     for value in values:
         request = change(value)
@@ -164,7 +165,7 @@ def loosest(
 
 
 def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:
-    """The fields of a request that have a knob, of those that it has a use for."""
+    """The fields of a request that have a knob and affect the request."""
     structure: Any = type(request)
     for field in all_fields(structure).values():
         if field.knob is not None and field.knob.used(request):
@@ -173,22 +174,22 @@ def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:
 
 def ladder(
     values: Iterable[float],
-    of_scene: float | None,
+    scene_value: float | None,
     make: Callable[[Any], Any],
     text: Callable[[Any], str] = "{:g}".format,
 ) -> tuple[Setting, ...]:
-    """Settings of values that rise or fall from coarse to fine, that of the scene itself among them.
+    """Settings in order from coarse to fine, including the scene's value.
 
     Parameters
     ----------
     values : iterable of float
-        Coarse ones first.
-    of_scene : float or None
+        Coarsest first.
+    scene_value : float or None
         The value of the scene; None where it has none.
     make : callable
-        The request of a value.
+        Returns the request for a value.
     text : callable
-        A value as text.
+        Formats a value.
 
     Returns
     -------
@@ -197,12 +198,13 @@ def ladder(
 
     Examples
     --------
-    >>> [(one.label, one.own) for one in ladder([1e-2, 1e-4], 1e-3, lambda tolerance: None)]
+    >>> [(setting.label, setting.in_scene) for setting in ladder([1e-2, 1e-4], 1e-3, lambda tolerance: None)]
     [('0.01', False), ('0.001', True), ('0.0001', False)]
     """
     values = [
-        of_scene if of_scene is not None and math.isclose(value, of_scene, rel_tol=1e-9) else value for value in values
+        scene_value if scene_value is not None and math.isclose(value, scene_value, rel_tol=1e-9) else value
+        for value in values
     ]
     falling = len(values) > 1 and values[0] > values[-1]
-    ordered = sorted({*values, *(() if of_scene is None else (of_scene,))}, reverse=falling)
-    return tuple(Setting(text(value), make(value), value == of_scene) for value in ordered)
+    ordered = sorted({*values, *(() if scene_value is None else (scene_value,))}, reverse=falling)
+    return tuple(Setting(text(value), make(value), value == scene_value) for value in ordered)

@@ -1,4 +1,4 @@
-"""Choosing, sweeping and planning of a verb: what it has beside the knobs of its fields, in one object beside its request."""
+"""Accuracy goals, sweeps and plan of a verb, beyond the knobs of its fields."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rotor.requests.plan import Plan
 
 
 def numerical_error(answer: Any) -> float:
-    """The numerical error that an answer states; ValueError, with the reason, where it is not estimated."""
+    """The numerical error of an answer; ValueError, with the reason, if it is not estimated."""
     error: float | None = answer.errors.numerical
     if error is None:
         terms = (answer.errors.rounding, answer.errors.truncation)
@@ -22,9 +22,10 @@ def numerical_error(answer: Any) -> float:
 
 @dataclass(frozen=True)
 class Goal:
-    """What an accuracy in one unit is of.
+    """An accuracy goal in one unit.
 
-    of: in words. choose: of (scene, request, accuracy), the settings; None: those of the knob of a field. error: of an answer.
+    of: the observable in words. choose: returns the settings from (scene, request, accuracy); None: the knob of a field chooses.
+    error: the error of an answer.
     """
 
     of: str = ""
@@ -34,12 +35,14 @@ class Goal:
 
 @dataclass(frozen=True)
 class Numerics:
-    """Choosing, sweeping and planning of a verb beside the knobs of its fields.
+    """Accuracy goals, sweeps and plan of a verb.
 
-    goals: by the unit of an accuracy; a number is in "", else in the first one. bare: whether a number may stand without a unit.
-    percent: the unit of a percentage of a scene. sweeps: of a request. plan: of a request; by default that of a run. planned: of (scene,
-    request, accuracy in the first unit), the plan with its choice, where a search would take as long as a run. rounding: of the highest
-    level in MHz.
+    goals: by unit. bare: whether an accuracy may have no unit; it then belongs to the goal "" or, without one, to the first goal.
+    percent: the unit that a percentage means in a scene.
+    sweeps: beyond those of knobs, from a request.
+    plan: from a request; the default is the plan of a run.
+    planned: plan and settings from (scene, request, accuracy in the first unit), where a search would take as long as a run.
+    rounding: error of the highest level from rounding, in MHz.
     """
 
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})

@@ -1,8 +1,8 @@
-"""What a request will do, before it is done: the plan, and its seconds and memory from shorter calls.
+"""Plan of a request: what it will do, and its time and memory, extrapolated from shorter calls.
 
-Seconds come from a short calibration: the same request to a lower J (or fewer molecules, fields, steps), scaled by the work that
-is left. They are processor time without start-up and compilation, within a factor of 3 where they are above 1 s. Memory is the peak
-of what Python and NumPy have in use in the same short runs, and grows with what the answer holds.
+The calibration runs the same request to a lower J (or with fewer molecules, fields, steps) and scales by the remaining work. Seconds are
+processor time without start-up and compilation, within a factor of 3 above 1 s. Memory is the peak of what Python and NumPy allocate in
+the same short runs, and grows with the size of the answer.
 """
 
 from __future__ import annotations
@@ -13,16 +13,19 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
-LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
+LONG_SEARCH = 10.0  # seconds; a shorter search is repeated, since its first run includes imports and compilation
 T = TypeVar("T")
 MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
-SMALL = 0.1  # of the largest: effects below it are counted together
-ENOUGH_SECONDS, LARGER = 0.05, 3  # of a call that is extrapolated; by how much its size grows until it takes so long
+SMALL = 0.1  # of the largest effect: smaller ones are named without a line of their own
+ENOUGH_SECONDS, LARGER = (
+    0.05,
+    3,
+)  # shortest call that is extrapolated, and growth factor of the size until it takes so long
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that a request leaves out. size: in `unit`; None: not estimated. basis: how the size was found, and for what."""
+    """A neglected effect. size: in `unit`; None if not estimated. basis: how the size was estimated, and for which state."""
 
     name: str
     size: float | None
@@ -31,18 +34,20 @@ class LeftOut:
 
 
 def largest_first(parts: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
-    """By size; what is not estimated comes last."""
+    """By size; effects without an estimate come last."""
     return tuple(sorted(parts, key=lambda part: (part.size is None, -(part.size or 0.0))))
 
 
-def larger_ones(items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str]) -> tuple[list[T], str]:
-    """The items of a report on what is left out, and a sentence that names the others: below a tenth of the largest, or beyond the fourth.
+def larger_items(
+    items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str]
+) -> tuple[list[T], str]:
+    """Up to four items of at least a tenth of the largest size (or without a size), and a sentence that names the others.
 
-    >>> larger_ones([5.0, 4.0, 0.1], lambda one: one, str)
+    >>> larger_items([5.0, 4.0, 0.1], lambda size: size, str)
     ([5.0, 4.0], 'and smaller or not estimated: 0.1')
     """
-    least = SMALL * max((known for item in items if (known := size(item)) is not None), default=0.0)
-    larger = [item for item in items if (known := size(item)) is None or known >= least]
+    least = SMALL * max((value for item in items if (value := size(item)) is not None), default=0.0)
+    larger = [item for item in items if (value := size(item)) is None or value >= least]
     shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
     others = [name(item) for item in items if item not in shown]
     return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
@@ -50,10 +55,10 @@ def larger_ones(items: Sequence[T], size: Callable[[T], float | None], name: Cal
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scene will do.
+    """Plan of a scene.
 
-    effects: taken, with their sizes where they have one. good: quantum numbers, or what the motion conserves. parts: name and
-    words: basis, blocks, method and why. counts: by name. seconds, memory_mb: estimated. left_out: largest first.
+    effects: included effects, with sizes if estimated. good: quantum numbers, or conserved quantities of the motion.
+    parts: (name, text) on basis, blocks, method and reason. counts: by name. seconds, memory_mb: estimates. left_out: largest first.
     """
 
     kind: str
@@ -71,7 +76,7 @@ class Plan:
 
 
 def plan_of_whole(kind: str, call: Callable[[], Any], describe: Callable[[Any], Mapping[str, Any]]) -> Plan:
-    """The plan of a call that is made whole. describe: the other fields of the plan, of its answer."""
+    """Plan from a complete run of the call; `describe` returns the other fields of the plan from its answer."""
     answers: list[Any] = []
     seconds = timed(lambda: answers.append(call()))
     return Plan(kind, seconds=seconds, memory_mb=peak_mb(call), **describe(answers[-1]))
@@ -79,10 +84,10 @@ def plan_of_whole(kind: str, call: Callable[[], Any], describe: Callable[[Any], 
 
 @dataclass(frozen=True)
 class Growth:
-    """A call of one size, whose cost follows from two smaller ones: a part that is always there, and one in proportion to the work.
+    """A call whose cost is extrapolated from two smaller ones: a constant part, and a part proportional to the work.
 
-    call: of a size. size: that is asked for. sizes: of the short calls, the smaller first. work: what seconds grow in proportion to, of a
-    size; memory: the same of the memory. A call that is no larger than the second size is measured itself.
+    call: takes a size. size: the requested one. sizes: of the two short calls, smaller first. work: amount that the time is
+    proportional to, from a size; memory: likewise for the memory. A call no larger than the second size is measured directly.
     """
 
     call: Callable[[int], Any]
@@ -93,7 +98,7 @@ class Growth:
 
     @property
     def seconds(self) -> float:
-        """Processor time."""
+        """Processor time (s)."""
         return self.extrapolated(timed, self.work)
 
     @property
@@ -103,14 +108,14 @@ class Growth:
 
     @cached_property
     def enough(self) -> tuple[int, int]:
-        """Sizes of which the second takes long enough to be extrapolated: what is done once for many hides in a shorter call."""
+        """Sizes of the two short calls, grown until the second takes long enough: short calls are dominated by constant parts."""
         first, second = self.sizes
         while second < self.size and timed(partial(self.call, second)) < ENOUGH_SECONDS:
             first, second = LARGER * first, min(LARGER * second, self.size)
         return min(first, self.size), min(second, self.size)
 
     def extrapolated(self, measure: Callable[[Callable[[], Any]], float], work: Callable[[int], float]) -> float:
-        """What the call takes by a measure."""
+        """Cost of the call at `size` by a measure such as `timed`."""
         first, second = self.enough
         most = measure(partial(self.call, second))
         if second == self.size:
@@ -120,7 +125,7 @@ class Growth:
 
 
 def timed(call: Callable[[], Any], long: float = 3.0) -> float:
-    """Processor time of a call, its second one unless the first takes longer than `long` seconds: without imports and compilation."""
+    """Processor time (s) of the second call, without imports and compilation; of the first if that takes longer than `long`."""
     start = time.process_time()
     call()
     first = time.process_time() - start
@@ -132,11 +137,11 @@ def timed(call: Callable[[], Any], long: float = 3.0) -> float:
 
 
 def peak_mb(call: Callable[[], Any]) -> float:
-    """The most memory that a call has in use at one time beyond what was there, of Python and NumPy; made before, so without imports."""
+    """Peak memory (MB) that Python and NumPy allocate during a call, above the level before it; call it once before, for imports."""
     import tracemalloc
 
-    mine = not tracemalloc.is_tracing()
-    if mine:
+    started_here = not tracemalloc.is_tracing()
+    if started_here:
         tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
@@ -144,5 +149,5 @@ def peak_mb(call: Callable[[], Any]) -> float:
         call()
         return (tracemalloc.get_traced_memory()[1] - before) / 1e6
     finally:
-        if mine:
+        if started_here:
             tracemalloc.stop()

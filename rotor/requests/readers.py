@@ -1,6 +1,6 @@
-"""How the value of a field is read from a text or a number, and written back: one class a kind of value.
+"""Readers: how the value of a field is read from text or a number, checked and written back; one class for each kind of value.
 
-A text comes from the command line, a text or a TOML value from a scene, any value from Python. Errors quote what was typed.
+Text comes from the command line, text or TOML values from a scene, any value from Python. Errors quote what was typed.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import Any
 
 from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid, parse_quantity, parse_range
 
-MOST_WHOLE = 10**15  # beyond it a double no longer holds every whole number
+MOST_WHOLE = 10**15  # up to here a double holds every whole number
 MOST_POINTS = 10_000_000  # of a grid on the command line or in a scene
 INFINITE = (0.0, math.inf)
 
 
 class InsideError(ValueError):
-    """An error of a part of a value; its text begins with the place inside the value, such as `[0].peak`."""
+    """Error inside a value; its text begins with the place, such as `[0].peak`."""
 
 
 class Reader:
-    """A kind of value. metavar: of its option. scene_type: what a scene file holds. many: whether its option is repeatable."""
+    """A kind of value. metavar: of its option. scene_type: type in a scene file. many: whether its option may be repeated."""
 
     metavar: str = "TEXT"
     scene_type: Any = str
@@ -31,21 +31,21 @@ class Reader:
     unit: str = ""
 
     def read(self, raw: Any) -> Any:
-        """The value of a text, a TOML value or a Python value; ValueError, without a name, for anything else."""
+        """The value of a text, a TOML value or a Python value; ValueError, without the field's name, for anything else."""
         return raw
 
     def write(self, value: Any) -> Any:
-        """What a scene file holds of a value; `read` gives the same value back."""
+        """The value as a scene file holds it; `read` inverts it."""
         return value
 
     def show(self, value: Any) -> str:
-        """A default in the help of an option."""
+        """The default as the help of an option shows it."""
         return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Text(Reader):
-    """A text, or one of several words. words: those allowed; empty: any."""
+    """A text. words: the allowed words; any text if empty."""
 
     words: Collection[str] = ()
     metavar: str = "TEXT"
@@ -61,7 +61,7 @@ class Text(Reader):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flag(Reader):
-    """True or false. off: whether there is an option --no-... too."""
+    """True or false. off: whether the option --no-... exists too."""
 
     off: bool = False
     scene_type = bool
@@ -98,7 +98,7 @@ class Whole(Reader):
         return int(value)
 
     def check(self, value: int) -> None:
-        """ValueError for what is no whole number, and for one out of bounds."""
+        """ValueError for a value that is not whole or is out of bounds."""
         if isinstance(value, bool) or not hasattr(value, "__index__"):
             raise ValueError(f"{value!r}: expected a whole number, of type int")
         low, high = self.least, self.most
@@ -109,7 +109,7 @@ class Whole(Reader):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Quantity(Reader):
-    """A number with a unit. above, below: bounds that are not allowed themselves; least, most: bounds that are."""
+    """A number with a unit. above, below: exclusive bounds; least, most: inclusive bounds."""
 
     unit: str = ""
     above: float | None = None
@@ -129,12 +129,12 @@ class Quantity(Reader):
 
     @property
     def is_fraction(self) -> bool:
-        """Whether this is a plain number between 0 and 1, which may be given in percent."""
+        """Whether the value is a dimensionless number between 0 and 1, which may be given in percent."""
         low, high = self.least if self.above is None else self.above, self.most if self.below is None else self.below
         return not self.unit and low is not None and high is not None and 0 <= low < high <= 1
 
     def check(self, value: float, typed: Any = None) -> None:
-        """ValueError for a number out of bounds; given: what was typed."""
+        """ValueError for a number out of bounds; typed: the text to quote."""
         text = typed if isinstance(typed, str) else f"{value:g}"
         if not math.isfinite(value):
             raise ValueError(f"{text}: expected a finite number")
@@ -162,16 +162,16 @@ class Quantity(Reader):
         return f"a number up to {self.most if self.below is None else self.below:g}{unit}"
 
     def write(self, value: float) -> Any:
-        """The same double, with its unit."""
+        """The number with its unit; the same double is read back."""
         return f"{float(value)!r} {self.unit}" if self.unit else value
 
     def show(self, value: float) -> str:
-        """With its unit."""
+        """The number with its unit."""
         return f"{value:g} {self.unit}".rstrip()
 
 
 def check_temperature(value: float, text: str) -> None:
-    """ValueError for a temperature at which there is no gas of molecules; 0 is left to the rule of the field."""
+    """ValueError for a temperature outside the range of molecular gases; 0 is left to the bounds of the field."""
     if value > MOST_KELVIN:
         raise ValueError(f"{text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
     if 0 < value < LEAST_KELVIN:
@@ -180,7 +180,7 @@ def check_temperature(value: float, text: str) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Reader):
-    """Numbers in a unit: start:stop:count, a list between commas, or a list. points: the count of a grid that gives none."""
+    """Numbers in a unit, from start:stop:count, a text with commas, or a list. points: the count if the text gives none."""
 
     unit: str = ""
     points: int | None = None
@@ -192,7 +192,7 @@ class Grid(Reader):
     def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
         if isinstance(raw, str):
-            values = self._of_text(raw)
+            values = self._read_text(raw)
         elif isinstance(raw, int | float) and not isinstance(raw, bool):
             values = (float(raw),)
         else:
@@ -208,7 +208,7 @@ class Grid(Reader):
                 raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
         return values
 
-    def _of_text(self, text: str) -> tuple[float, ...]:
+    def _read_text(self, text: str) -> tuple[float, ...]:
         count = text.rpartition(":")[2].strip()
         if text.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
             raise ValueError(f"{text!r}: at most {self.most_points} numbers; ask for fewer")
@@ -219,13 +219,13 @@ class Grid(Reader):
         return [float(number) for number in value]
 
     def show(self, value: Any) -> str:
-        """The first and the last of them."""
+        """Count, first and last number."""
         return f"{len(value)} from {value[0]:g} to {value[-1]:g} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Range(Reader):
-    """Two ends first:last in a unit; all of it for (0, infinity)."""
+    """A range first:last in a unit; (0, infinity) is the full range."""
 
     unit: str = "MHz"
     metavar: str = "A:B"
@@ -244,13 +244,13 @@ class Range(Reader):
         return f"{value[0]!r}:{value[1]!r} {self.unit}"
 
     def show(self, value: tuple[float, float]) -> str:
-        """Both ends; nothing of all."""
+        """Both ends; empty for the full range."""
         return "" if value == INFINITE else self.write(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Numbers(Reader):
-    """Numbers between commas, in a unit, or a list of numbers; counts: how many there may be, empty: any number of them."""
+    """Numbers in a unit, from a text with commas or a list. counts: allowed lengths; any length if empty."""
 
     unit: str = ""
     counts: Collection[int] = ()
@@ -300,12 +300,12 @@ class Names(Reader):
         return ", ".join(value)
 
 
-_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # those in brackets are part of a name
+_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # commas inside brackets belong to a name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NameList(Reader):
-    """Names: a text with commas, or a list; each once. words: those allowed; empty: any. A comma in brackets is part of a name."""
+    """Distinct names, from a text with commas or a list. words: the allowed names; any if empty. Commas in brackets belong to a name."""
 
     words: Collection[str] = ()
     metavar: str = "LIST"
@@ -334,7 +334,7 @@ class NameList(Reader):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pairs(Reader):
-    """Numbers by name: `ee=1,eo=3`, or a table. number: the type of the values. what: the names are of."""
+    """Numbers by name, from `ee=1,eo=3` or a table. number: type of the values. what: what the names stand for."""
 
     number: type = int
     what: str = "class"
@@ -368,13 +368,13 @@ class Pairs(Reader):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Array(Reader):
-    """A vector or a matrix, whose shape the thing that it belongs to checks: numbers between commas, rows between semicolons."""
+    """A vector or matrix: commas separate numbers, semicolons rows. Its owner checks the shape."""
 
     scene_type: Any = list[float]
     metavar: str = "LIST"
 
     def read(self, raw: Any) -> Any:
-        """Numbers of a text; lists and arrays as they are."""
+        """Numbers from a text; lists and arrays are passed on."""
         if not isinstance(raw, str):
             return raw
         try:
@@ -390,7 +390,7 @@ class Array(Reader):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Custom(Reader):
-    """A value that functions read and write."""
+    """A value that is read and written by two functions."""
 
     reading: Callable[[Any], Any]
     writing: Callable[[Any], Any] = lambda value: value
@@ -398,11 +398,11 @@ class Custom(Reader):
     scene_type: Any = str
 
     def read(self, raw: Any) -> Any:
-        """By the function."""
+        """The value that `reading` returns."""
         return self.reading(raw)
 
     def write(self, value: Any) -> Any:
-        """By the function."""
+        """The value that `writing` returns."""
         return self.writing(value)
 
 
@@ -423,7 +423,7 @@ def whole_range(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Each(Quantity):
-    """Numbers with a unit, one for all or one for each of several things, between commas; a scene holds one for all."""
+    """Numbers with a unit, separated by commas: one for all things or one for each. A scene holds one for all."""
 
     def read(self, raw: Any) -> Any:
         """The numbers in `unit`."""
@@ -438,9 +438,9 @@ class Each(Quantity):
             super().check(number, typed)
 
     def write(self, value: Any) -> Any:
-        """The first of them with its unit."""
+        """The first number with its unit."""
         return super().write(value[0])
 
     def show(self, value: Any) -> str:
-        """The first of them with its unit."""
+        """The first number with its unit."""
         return super().show(value[0])

@@ -194,7 +194,9 @@ def sweep(
     times, more = in_rounds(calls, [seconds for _, _, seconds in shown], limit_seconds - spent)
     spent += more
     rows = [
-        Row(knob.name, setting.label, setting.own, m.of, m.error(answer, reference), m.unit, seconds / knob.repeats)
+        Row(
+            knob.name, setting.label, setting.in_scene, m.of, m.error(answer, reference), m.unit, seconds / knob.repeats
+        )
         for m in knob.measures
         for (setting, answer, _), seconds in zip(shown, times, strict=True)
     ]

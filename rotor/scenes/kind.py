@@ -61,7 +61,7 @@ class Kind:
         shown = self.verb.read_shown(given_of(scene, self.verb))
         with self.naming():
             provenance = {"scene": scene_text(scene)} if self.grows & outputs.keys() else {}  # of files that grow
-            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance=provenance, of_scene=True))
+            answer = self.verb.answer(request, Work(executor, shown, outputs, provenance=provenance, from_scene=True))
         if reason := self.verb.failure(answer):
             raise NoResultError(f"{reason}; 'rotor {self.verb.name}' shows it nevertheless")
         for name, reason in self.verb.withheld(answer, list(outputs)).items():

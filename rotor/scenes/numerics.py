@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rotor.requests.fill import Given
+from rotor.requests.fill import Entries
 from rotor.requests.knob import Sweeps, knobs_of_fields
 from rotor.requests.numerics import Numerics
 from rotor.verbs.verb import Work, verb_of
@@ -20,7 +20,7 @@ def numerics_of(kind: str) -> Numerics:
 def answering(kind: str) -> Callable[[Any], Any]:
     """What answers a request of a kind, with no options of printing."""
     verb = verb_of(kind)
-    work = Work(shown=verb.read_shown(Given()))
+    work = Work(shown=verb.read_shown(Entries()))
     return lambda request: verb.answer(request, work)
 
 

@@ -8,22 +8,22 @@ from typing import Any
 
 import msgspec
 
-from rotor.requests.fill import Given, flattened, nested
+from rotor.requests.fill import Entries, flattened, nested
 from rotor.scenes.scene import KINDS
 from rotor.scenes.scene_file import scene_of
 from rotor.verbs.scene_tables import keyed
 from rotor.verbs.verb import Verb
 
 
-def given_of(scene: Any, verb: Verb) -> Given:
+def given_of(scene: Any, verb: Verb) -> Entries:
     """What a scene gives, by key; what has its default is not among it."""
     content: dict[str, Any] = msgspec.to_builtins(scene)
     tables = verb.subject.tables(content)
-    return Given(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
+    return Entries(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
 
 
 def saved_scene(
-    verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], entries: Given
+    verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], entries: Entries
 ) -> Any:
     """The scene of a request that was answered. outputs: files by name. given: settings of files among it."""
     flat = {

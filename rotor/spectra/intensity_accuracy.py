@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rotor.requests.budget import ROUNDING
-from rotor.requests.field import own_fields
+from rotor.requests.field import declared_fields
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 
 SPARE = 1.25
@@ -44,7 +44,7 @@ class Cut:
         A higher cut than that of the request would be cheaper and leave out lines that are requested. A cut that is given by hand stays.
         """
         structure: Any = type(request)
-        field, cut = own_fields(structure)[self.name], getattr(request, self.name)
+        field, cut = declared_fields(structure)[self.name], getattr(request, self.name)
         if cut is None:
             return Choice(request, NOTHING_CHEAPER)
         for decades in range(MOST_DECADES + 1 if cut == field.default else 1):

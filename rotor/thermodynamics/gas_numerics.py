@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder, refuse_given, with_field
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder, refuse_set, with_field
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
 
@@ -69,7 +69,7 @@ def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
     """The request with as many molecules as an accuracy in K of the temperature, % of the heat capacity, or of C1 and C2 needs."""
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
-    refuse_given(request, "molecules")
+    refuse_set(request, "molecules")
     z = quantile(request.confidence)
     count = max(math.ceil((z * _spread(request, allowed, unit) / allowed) ** 2), 2)
     if count > MOST_MOLECULES:

@@ -12,7 +12,7 @@ from rotor.reports import top_facts
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
-from rotor.requests.fill import Given, read_fields
+from rotor.requests.fill import Entries, read_fields
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
@@ -38,7 +38,7 @@ Examples:
   rotor align OCS --thz "500 kV/cm, 1 ps, 0.3 THz" --observable costheta"""
 
 
-def prepare(top: Top, reading: Reading, entries: Given) -> Top:
+def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with what the pulses act on."""
     pulses = FIELDS["pulses"].read(entries.values.get("pulses"), entries.style) or ()
     acts_on = {pulse.acts_on for pulse in pulses}
@@ -119,7 +119,7 @@ def _rows(path: str) -> tuple[list[str], list[list[float]]]:
     return names, rows
 
 
-def build(verb: Verb, entries: Given, subject: Subject) -> AlignRequest:
+def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     """The request of a top and its pulses."""
     values = read_fields(AlignRequest, entries, subject)
     if not values.get("pulses"):

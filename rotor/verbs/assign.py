@@ -13,7 +13,7 @@ from rotor.fitting.publication import value_text
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
-from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.requests.readers import Custom, Range, Text
 from rotor.verbs.subjects import beside
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
@@ -67,7 +67,7 @@ class SpectrumFile(SubjectKind):
 
     fields = {one.identity: one for one in all_fields(SpectrumInput).values()}  # noqa: RUF012
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The peaks and the geometry that were given."""
         from rotor.formats import read
         from rotor.formats.peak_files import peaks_of_columns, read_peaks

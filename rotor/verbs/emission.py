@@ -15,7 +15,7 @@ from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, with_option
 from rotor.requests.field import OUTPUT, Field, all_fields, declared
-from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.requests.readers import Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
@@ -77,7 +77,7 @@ class SeveralMolecules(SubjectKind):
     fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _OF_ONE}}  # noqa: RUF012
     tables_read = ("molecules",)
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The molecules that were given."""
         tables = self._tables(entries)
         molecules: list[Top | CatalogueLines] = []
@@ -101,7 +101,7 @@ class SeveralMolecules(SubjectKind):
         text = " ".join(str(molecule_input.source or molecule_input.constants) for molecule_input in inputs)
         return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(own_values))
 
-    def _tables(self, entries: Given) -> list[tuple[MoleculeInput, EmitterInput]]:
+    def _tables(self, entries: Entries) -> list[tuple[MoleculeInput, EmitterInput]]:
         """The inputs of each molecule."""
         if entries.style == "key":
             tables = entries.values.get("molecules", ())
@@ -119,7 +119,7 @@ class SeveralMolecules(SubjectKind):
         values = {name: value for name, value in entries.values.items() if name.startswith("molecule.")}
         return [
             (
-                read_molecule(Given({**values, "molecule.source": source}, entries.style)),
+                read_molecule(Entries({**values, "molecule.source": source}, entries.style)),
                 EmitterInput(partition=several.partition if is_catalogue(source) else None),
             )
             for source in several.names
@@ -174,9 +174,9 @@ def _of_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
     names = {field.key for field in all_fields(EmitterInput).values()}
     values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
     emitter: EmitterInput = read_instance(
-        EmitterInput, Given({name: table[name] for name in names & table.keys()}, "key")
+        EmitterInput, Entries({name: table[name] for name in names & table.keys()}, "key")
     )
-    return read_molecule(Given(values, "key")), emitter
+    return read_molecule(Entries(values, "key")), emitter
 
 
 def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:

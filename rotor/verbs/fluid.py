@@ -18,7 +18,7 @@ from rotor.fluids.settings import Settings
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
-from rotor.requests.fill import Given, read_fields, read_instance, written_fields
+from rotor.requests.fill import Entries, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
 from rotor.verbs.subjects import beside
@@ -84,7 +84,7 @@ class Box(SubjectKind):
 
     fields = all_fields(BoxInput)
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, given: Entries, place: Place, verb: Verb) -> Subject:
         """The box, and where it is from."""
         asked: BoxInput = read_instance(BoxInput, given)
         settings = Settings(**read_fields(Settings, given))
@@ -100,7 +100,7 @@ class Box(SubjectKind):
         values = {"box": _read(asked.source), "box_source": asked.source, **_of_file(asked, given)}
         return Subject(values, (), asked.source, place.note)
 
-    def _refuse_unused(self, asked: BoxInput, settings: Settings, given: Given) -> None:
+    def _refuse_unused(self, asked: BoxInput, settings: Settings, given: Entries) -> None:
         """ValueError for what was typed and changes nothing: of another ensemble, of other charges, of a box that is made."""
         known = all_fields(Settings) | self.fields
         uses = {
@@ -142,7 +142,7 @@ class Box(SubjectKind):
         return files | written_fields(BoxInput(equilibration=request.box_equilibration_ps))
 
 
-def _of_file(asked: BoxInput, given: Given) -> dict[str, Any]:
+def _of_file(asked: BoxInput, given: Entries) -> dict[str, Any]:
     """The equilibration of a box that is read: none, unless it is requested."""
     field = all_fields(BoxInput)["conditions.equilibration"]
     return {"box_equilibration_ps": asked.equilibration} if given.has(field) else {}
@@ -203,9 +203,9 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
     """
     growing = {name: [str(path) for path in work.files.get(name, ())] for name in ("csv", "trajectories", "checkpoint")}
     csv, checkpoint = (next(iter(growing[name]), None) for name in ("csv", "checkpoint"))
-    shown, of_scene = work.shown, work.of_scene
+    shown, from_scene = work.shown, work.from_scene
     outputs = Outputs(csv, tuple(growing["trajectories"]), shown.frames_every, checkpoint, shown.checkpoint_every)
-    resume = shown.resume or (of_scene and checkpoint is not None and Path(checkpoint).is_file())
+    resume = shown.resume or (from_scene and checkpoint is not None and Path(checkpoint).is_file())
     head = {**work.provenance, **_settings(request)}
 
     def on_start() -> None:
@@ -216,7 +216,7 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
 
     try:
         with frames_for(outputs, "plot" in work.files) as (files, frames):
-            quiet: Mapping[str, Any] = {"progress": lambda *_: None} if of_scene else {}
+            quiet: Mapping[str, Any] = {"progress": lambda *_: None} if from_scene else {}
             made = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:
                 _add_errors(csv, made)

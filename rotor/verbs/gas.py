@@ -15,7 +15,7 @@ from rotor.reports import top_facts
 from rotor.reports.progress import counting
 from rotor.reports.screen import Table, evenly, show_facts, show_table
 from rotor.reports.sources import source_facts
-from rotor.requests.fill import Given
+from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import STATES
 from rotor.verbs.subjects import OneMolecule
@@ -32,7 +32,7 @@ Examples:
   rotor gas OCS --times 0:5:201 --csv ocs.csv --plot ocs.png"""
 
 
-def adapt(request: GasRequest, outputs: Mapping[str, Any], entries: Given) -> GasRequest:
+def adapt(request: GasRequest, outputs: Mapping[str, Any], entries: Entries) -> GasRequest:
     """Times until the correlation functions have settled, where files ask for them and none are given."""
     if request.times_ps is None and outputs.keys() & {"csv", "parquet", "json", "plot"}:
         return replace(request, times_ps=settling_times_ps(request.top, request.temperature_k))

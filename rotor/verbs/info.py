@@ -10,7 +10,7 @@ from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
-from rotor.requests.fill import Given, read_fields
+from rotor.requests.fill import Entries, read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.top import Top
@@ -25,7 +25,7 @@ Examples:
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
 
 
-def build(verb: Verb, entries: Given, subject: Subject) -> InfoRequest:
+def build(verb: Verb, entries: Entries, subject: Subject) -> InfoRequest:
     """The request, with the text of a SMILES."""
     return InfoRequest(**subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
-from rotor.requests.fill import Given
+from rotor.requests.fill import Entries
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
 from rotor.verbs.verb import Note, Report
 
@@ -60,7 +60,7 @@ def is_int_file(source: Any) -> bool:
     return isinstance(source, str) and source.lower().endswith(".int")
 
 
-def predicted(source: str, entries: Given, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
+def predicted(source: str, entries: Entries, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
     """The prediction of an .int file; its notes are remarks. Inputs that the files answer themselves are refused.
 
     called: the name of an input, by its identity. basis: as_spcat and full_basis.

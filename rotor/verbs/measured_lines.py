@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
-from rotor.requests.fill import Given, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
@@ -148,7 +148,7 @@ class MeasuredLines(SubjectKind):
         """The tables, a name alone being the source."""
         return with_molecule_table(content)
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the top to start from."""
         lines: LinesInput = read_instance(LinesInput, entries)
         called = {name: field.called(entries.style) for name, field in LINES.items()}
@@ -191,7 +191,7 @@ def _path(name: Any, called: str, place: Place) -> Any:
     return str(path)
 
 
-def _refuse_start(entries: Given, verb: Verb) -> None:
+def _refuse_start(entries: Entries, verb: Verb) -> None:
     """ValueError for constants and parameters beside a .par file."""
     others = [
         field for field in verb.fields.values() if field.table in ("molecule", "parameters") and entries.has(field)
@@ -201,7 +201,7 @@ def _refuse_start(entries: Given, verb: Verb) -> None:
         raise ValueError(f"{names}: a .par file says itself what is free and where the fit starts")
 
 
-def _start_of(entries: Given) -> MoleculeInput:
+def _start_of(entries: Entries) -> MoleculeInput:
     """The molecule to start from."""
     molecule = read_molecule(entries) if any(entries.has(field) for field in FIELDS.values()) else MoleculeInput()
     if (molecule.source is None) == (molecule.constants is None):
@@ -217,7 +217,7 @@ def _start_of(entries: Given) -> MoleculeInput:
     return molecule
 
 
-def build(verb: Verb, entries: Given, subject: Subject) -> FitRequest:
+def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
     """The fit of the lines."""
     from rotor.formats.fit_request import fit_of_lines, fit_of_spfit, with_more_lines
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
-from rotor.requests.fill import Given, read_instance, renamed
+from rotor.requests.fill import Entries, read_instance, renamed
 from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def is_file(name: str) -> bool:
         return False
 
 
-def read_molecule(entries: Given) -> MoleculeInput:
+def read_molecule(entries: Entries) -> MoleculeInput:
     """The inputs that were given."""
     inputs: MoleculeInput = read_instance(MoleculeInput, entries)
     return inputs
@@ -244,7 +244,7 @@ def has_unit(text: str) -> bool:
     return bool(re.search(r"[\d).]\s*(?:[kMGT]?Hz|cm(?:-1|\^-1|⁻¹)|1/cm|K)(?!\w)", text))
 
 
-def range_without_unit(entries: Given) -> str:
+def range_without_unit(entries: Entries) -> str:
     """The end of a sentence on why there are no lines: what a range that was typed without a unit was read as."""
     text = entries.values.get("conditions.range")
     if entries.style != "option" or text is None or has_unit(text):

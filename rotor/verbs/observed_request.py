@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.field import all_fields, check_fields, declared, identical, own_fields, part
+from rotor.requests.field import all_fields, check_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
 from rotor.verbs.observed_file import PANEL, SeveralInput, SpectrumFile, padded, species_of
@@ -32,7 +32,7 @@ OF_FIT = ("free", "shared", "sample", "calibration", "reject")
 
 def layer_field(name: str) -> Any:
     """A field of the gas of a source, None where it is not typed: a fit estimates it."""
-    field = own_fields(LayerInput)[name]
+    field = declared_fields(LayerInput)[name]
     return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
 
 
@@ -90,7 +90,7 @@ class ObservedRequest:
             raise ValueError(
                 "--over, --fit: both name a spectrum; expected one of them (a fit is laid over its spectrum)"
             )
-        declared_here, file = own_fields(ObservedRequest), all_fields(SpectrumFile).values()
+        declared_here, file = declared_fields(ObservedRequest), all_fields(SpectrumFile).values()
         named = [declared_here[name].flag for name in OF_FIT if getattr(self, name) != declared_here[name].default]
         if named and self.fit is None:
             raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
@@ -107,7 +107,7 @@ def sight_of(spectrum: ObservedSpectrum, request: ObservedRequest) -> Sight:
     """Beam, background and redshift."""
     background = request.background_k
     if background is None:
-        background = own_fields(LayerInput)["background_k"].default
+        background = declared_fields(LayerInput)["background_k"].default
     return request.spectrum.sight(spectrum, background, request.redshift or 0.0)
 
 
@@ -133,7 +133,7 @@ def components_of(
     count, size = len(species), request.spectrum.size_arcsec
     typed = {name: _each(name, request, count) for name in FREE.values() if name != "size_arcsec"}
     if request.fit is None:
-        defaults = {name: own_fields(LayerInput)[name].default * count for name in typed}
+        defaults = {name: declared_fields(LayerInput)[name].default * count for name in typed}
         values = {name: each or defaults[name] for name, each in typed.items()}
         rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
         return [Component(each, **row, size_arcsec=size) for each, row in zip(species, rows, strict=True)]
@@ -148,7 +148,7 @@ def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] 
     """One number for each species, or one for all."""
     values: tuple[float, ...] | None = getattr(request, name)
     if values is not None and len(values) not in (1, count):
-        flag, text = own_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
+        flag, text = declared_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
         raise ValueError(f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each")
     return values * count if values is not None and len(values) == 1 else values
 

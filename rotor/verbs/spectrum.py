@@ -14,7 +14,7 @@ from rotor.reports.screen import show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
-from rotor.requests.fill import Given, read_fields, read_instance
+from rotor.requests.fill import Entries, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
@@ -79,7 +79,7 @@ class SpectrumShown(Shown):
 class MoleculeOrFile(OneMolecule):
     """A molecule with its dipole, or an .int file, which makes the request itself."""
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The top of the molecule, or the prediction of the file."""
         shown, source = read_instance(SpectrumShown, entries), entries.values.get("molecule.source")
         basis = {name: getattr(shown, name) for name in _FILE_ALONE}
@@ -106,7 +106,7 @@ class MoleculeOrFile(OneMolecule):
         return super().saved(request, subject, folder)
 
 
-def build(verb: Verb, entries: Given, subject: Subject) -> SpectrumRequest:
+def build(verb: Verb, entries: Entries, subject: Subject) -> SpectrumRequest:
     """The request: of the inputs, or of the files of SPCAT with a shape of the lines."""
     values = read_fields(SpectrumRequest, entries, subject)
     if subject.molecules:
@@ -116,7 +116,7 @@ def build(verb: Verb, entries: Given, subject: Subject) -> SpectrumRequest:
     return int_files.request_of(subject.values["prediction"], subject.values["source"], shape, **basis)
 
 
-def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Given) -> SpectrumRequest:
+def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Entries) -> SpectrumRequest:
     """HITRAN's temperature where its records are asked for and none is given."""
     if "hitran" in outputs and entries.values.get("conditions.temperature") is None:
         return replace(request, temperature_k=HITRAN_K)
@@ -219,7 +219,7 @@ def show(answer: SpectrumAnswer, report: Report) -> None:
     show_facts([*sources, *top_facts.model_facts(record)])
 
 
-def _why_none(answer: SpectrumAnswer, entries: Given) -> str:
+def _why_none(answer: SpectrumAnswer, entries: Entries) -> str:
     reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
     return reason + range_without_unit(entries)
 

@@ -13,8 +13,8 @@ from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, table_of_states
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
-from rotor.requests.field import own_fields
-from rotor.requests.fill import Given
+from rotor.requests.field import declared_fields
+from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
@@ -53,7 +53,7 @@ class StarkShown(FieldSample, Shown):
     """What lines, spectra and mixtures are of."""
 
 
-def prepare(top: Top, reading: Reading, entries: Given) -> Top:
+def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with its dipole and, where light acts, its polarizability."""
     top = with_some_dipole(top, reading)
     return with_known_polarizability(top, reading) if entries.values.get("conditions.intensity") else top
@@ -63,7 +63,7 @@ def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) 
     """ValueError for a picture of a single field, and for what nothing that is written depends on."""
     if "plot" in outputs and len(request.fields_kv_per_cm) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
-    for name, field in own_fields(FieldSample).items():
+    for name, field in declared_fields(FieldSample).items():
         files = OUTPUTS_OF_SAMPLE[name]
         if getattr(shown, name) != field.default and not files & set(outputs):
             names = " or ".join(f"--{file}" for file in sorted(files))

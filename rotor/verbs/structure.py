@@ -15,7 +15,7 @@ from rotor.formats.structure_request import StructureAnswer, StructureRequest, a
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
-from rotor.requests.fill import Given, read_instance, written_fields
+from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
@@ -65,7 +65,7 @@ class Isotopologues(SubjectKind):
 
     fields = all_fields(FamilyInput)
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The family that the file has."""
         inputs: FamilyInput = read_instance(FamilyInput, entries)
         if inputs.source is None:

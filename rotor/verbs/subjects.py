@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rotor.requests.field import Field
-from rotor.requests.fill import Given, written_fields
+from rotor.requests.fill import Entries, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.verb import Note, Place, Subject, SubjectKind
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FILES = ("source", "hessian")  # inputs of a molecule that may name a file
 
 
-def unprepared(top: Top, reading: Reading, entries: Given) -> Top:
+def unprepared(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top as it was read."""
     return top
 
@@ -30,7 +30,7 @@ class OneMolecule(SubjectKind):
     """A molecule. without: inputs that the verb has no option for. prepare: what the verb needs of the top."""
 
     without: tuple[str, ...] = ()
-    prepare: Callable[[Top, Reading, Given], Top] = unprepared
+    prepare: Callable[[Top, Reading, Entries], Top] = unprepared
 
     fields = {one.identity: one for one in FIELDS.values()}  # noqa: RUF012
 
@@ -39,7 +39,7 @@ class OneMolecule(SubjectKind):
         """The inputs of a molecule that the verb has options for."""
         return {field.identity: field for name, field in FIELDS.items() if name not in self.without}
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The top of the molecule that was given."""
         molecule = read_molecule(entries)
         reading = Reading(molecule, entries.style, place.folder, place.note)
@@ -69,7 +69,7 @@ def top_of_word(
 ) -> Top:
     """The top of a source on the command line; note: takes remarks."""
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
-    reading = Reading(read_molecule(Given(values, "option")), "option", ".", note)
+    reading = Reading(read_molecule(Entries(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
 
 

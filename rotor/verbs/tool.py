@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rotor.reports.screen import json_text
-from rotor.requests.fill import Given, read_instance
+from rotor.requests.fill import Entries, read_instance
 from rotor.verbs.verb import NOTHING, Output, Place, Subject, SubjectKind, Verb
 
 
@@ -40,7 +40,7 @@ class Tool(Verb):
         """Whether there is anything for programs."""
         return self.text is not None
 
-    def read(self, entries: Given, place: Place) -> tuple[Any, Subject]:
+    def read(self, entries: Entries, place: Place) -> tuple[Any, Subject]:
         """The request; its own field is the subject."""
         request = read_instance(self.request, entries)
         source = getattr(request, self.of, "")

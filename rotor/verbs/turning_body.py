@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.requests.field import all_fields
-from rotor.requests.fill import Given, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
@@ -61,7 +61,7 @@ class TurningBody(OneMolecule):
         """The key `molecule`, which a body replaces."""
         return [optional_molecule("a name, a file, SMILES:..., or a table")]
 
-    def read(self, entries: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The top or the body that was given."""
         molecule = read_molecule(entries)
         body = read_body(entries)
@@ -98,7 +98,7 @@ class TurningBody(OneMolecule):
         return content | written_fields(motion)
 
 
-def read_body(entries: Given) -> Body | None:
+def read_body(entries: Entries) -> Body | None:
     """The body that was given by moments or name, or by a source that is the name of one; None for a molecule."""
     inputs = read_instance(BodyInput, entries)
     called = {
@@ -144,7 +144,7 @@ def read_body(entries: Given) -> Body | None:
     return _body_of_moments(entries, inputs) if named is None else _ordinary_body(named)
 
 
-def _momentum(entries: Given, inputs: BodyInput) -> Any:
+def _momentum(entries: Entries, inputs: BodyInput) -> Any:
     """The angular momentum as it was given, of a body or of a molecule."""
     return inputs.angular_momentum if inputs.angular_momentum is not None else entries.of(MOTION["angular_momentum"])
 
@@ -156,7 +156,7 @@ def _named_source(source: Any) -> NamedBody | None:
     return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
 
 
-def _body_of_moments(entries: Given, inputs: BodyInput) -> Body:
+def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
     from rotor.classical.tumble import COHERENT, SI
 
     assert inputs.moments is not None
@@ -181,7 +181,7 @@ def _ordinary_body(body: NamedBody) -> Body:
     return Body(body.name, three(moments), SI, body.axes, body, (momentum, source))
 
 
-def build(verb: Verb, entries: Given, subject: Subject) -> TumbleRequest | DrivenRequest:
+def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | DrivenRequest:
     """The request of a molecule or a body: free, or under effects."""
     motion = read_instance(MotionInput, entries)
     start = read_instance(BodyInput, entries)
@@ -200,7 +200,7 @@ def build(verb: Verb, entries: Given, subject: Subject) -> TumbleRequest | Drive
         )
 
 
-def _refuse_without_effect(entries: Given) -> None:
+def _refuse_without_effect(entries: Entries) -> None:
     """ValueError for inputs of a stepped motion that were given to a free one; scenes may have settings that are not used."""
     for field in (
         BODY["attitude"],
@@ -213,14 +213,14 @@ def _refuse_without_effect(entries: Given) -> None:
             )
 
 
-def _times(entries: Given, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
+def _times(entries: Entries, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
     """The times in the unit of the body."""
     return (
         None if motion.times is None else replace(MOTION["times"], reader=Grid(unit)).read(motion.times, entries.style)
     )
 
 
-def _motion_of_body(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
     import numpy as np
 
     from rotor.classical.tumble import TumbleRequest
@@ -244,7 +244,7 @@ def _motion_of_body(entries: Given, subject: Subject, start: BodyInput, motion: 
     return request
 
 
-def _motion_of_top(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
     import numpy as np
 
     from rotor.thermodynamics.thermal_tumble import thermal_tumble
@@ -264,7 +264,7 @@ def _motion_of_top(entries: Given, subject: Subject, start: BodyInput, motion: M
 
 
 def _chosen(
-    entries: Given, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
+    entries: Entries, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
 ) -> tuple[Three, str] | None:
     """The angular momentum that was given, itself or by an angular velocity, and how; None where neither was."""
     if start.angular_velocity is not None:
@@ -295,7 +295,7 @@ def _momentum_of(value: Any, moments: Any, unit: str, factors: Any) -> Three:
     return three(momentum)
 
 
-def _driven(entries: Given, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
+def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
     from rotor.classical.driven import DrivenRequest
 
     effects, times = MOTION["effects"].called(entries.style), MOTION["times"].called(entries.style)
@@ -319,7 +319,7 @@ def _driven(entries: Given, subject: Subject, start: BodyInput, motion: MotionIn
 
 
 def _spin_or_momentum(
-    entries: Given, body: Body, start: BodyInput, motion: MotionInput
+    entries: Entries, body: Body, start: BodyInput, motion: MotionInput
 ) -> tuple[Three | None, Three | None]:
     """ω or L at the first time; a named body turns as it does without effects."""
     if start.angular_velocity is not None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.reports.screen import json_text, json_with_rows, plain
 from rotor.requests.field import Field, all_fields, declared
-from rotor.requests.fill import Given, read_fields, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
@@ -62,7 +62,7 @@ class Subject:
 class Work:
     """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
     remarks. progress: whether a terminal shows it. provenance: of files that grow. view: of the picture. at_end: takes what is done at the
-    end of a command. of_scene: whether a scene asks.
+    end of a command. from_scene: whether a scene is run.
     """
 
     executor: Executor | None = None
@@ -73,7 +73,7 @@ class Work:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     at_end: Callable[[Callable[[], object]], object] = lambda end: None
-    of_scene: bool = False
+    from_scene: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +85,7 @@ class Report:
 
     content: Mapping[str, Any]
     shown: Any
-    given: Given = field(default_factory=Given)
+    given: Entries = field(default_factory=Entries)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     sources: bool = False
@@ -174,7 +174,7 @@ class SubjectKind:
         """Those of them that are options of the command line."""
         return self.fields
 
-    def read(self, given: Given, place: Place, verb: Verb) -> Subject:
+    def read(self, given: Entries, place: Place, verb: Verb) -> Subject:
         """What was given, read and checked."""
         return Subject(note=place.note)
 
@@ -243,8 +243,8 @@ class Verb:
     short: Callable[[Any], bool] = lambda request: False
     withheld: Callable[[Any, Sequence[str]], Mapping[str, str]] = lambda answer, names: {}
     failure: Callable[[Any], str] = lambda answer: ""
-    build: Callable[[Verb, Given, Subject], Any] | None = None
-    adapt: Callable[[Any, Mapping[str, Any], Given], Any] | None = None
+    build: Callable[[Verb, Entries, Subject], Any] | None = None
+    adapt: Callable[[Any, Mapping[str, Any], Entries], Any] | None = None
     check: Callable[[Any, Mapping[str, Any], Any], None] | None = None
     read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     records: Callable[[Any], Table | None] | None = None
@@ -313,12 +313,12 @@ class Verb:
             raise ValueError(f"--save-scene: {other.instead} are no part of a scene; expected without them")
         return other
 
-    def read(self, given: Given, place: Place) -> tuple[Any, Subject]:
+    def read(self, given: Entries, place: Place) -> tuple[Any, Subject]:
         """The request that was asked for, and of what.
 
         Raises ValueError, with the input as the user calls it, for what cannot be.
         """
-        early = Given(
+        early = Entries(
             {name: value for name, value in given.values.items() if name not in self.subject.fields}, given.style
         )
         check_early(self.request, early)
@@ -330,7 +330,7 @@ class Verb:
             values = read_fields(self.request, given, subject)
             return self.request(**subject.values, **values), subject
 
-    def read_shown(self, given: Given) -> Any:
+    def read_shown(self, given: Entries) -> Any:
         """The options of the verb itself."""
         return read_instance(self.shown, given)
 
@@ -357,7 +357,7 @@ class Verb:
 
 
 def report_of(
-    verb: Verb, answer: Any, head: Mapping[str, Any], given: Given, view: Any = None, executor: Executor | None = None
+    verb: Verb, answer: Any, head: Mapping[str, Any], given: Entries, view: Any = None, executor: Executor | None = None
 ) -> Report:
     """What the report, the JSON and the files are made from. head: command or scene, and input."""
     shown = verb.read_shown(given)
@@ -374,7 +374,7 @@ def tables(what: str, stem: str) -> tuple[Output, Output]:
     )
 
 
-def check_early(structure: type, given: Given) -> None:
+def check_early(structure: type, given: Entries) -> None:
     """ValueError for a text that no subject could make right: before anything is read."""
     for one in all_fields(structure).values():
         if given.has(one):

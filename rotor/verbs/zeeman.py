@@ -13,7 +13,7 @@ from rotor.reports.field_maps import accuracy_fact, table_of_states
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.field import CONDITIONS, all_fields, declared
-from rotor.requests.fill import Given, read_instance
+from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
 from rotor.verbs.molecule import FIELDS, STATES, Reading
@@ -78,7 +78,7 @@ def _numbers(tensor: Tensor | None) -> list[float] | None:
     return [aa, bb, cc, *(mixed if any(mixed) else [])]
 
 
-def with_tensors(top: Top, reading: Reading, entries: Given) -> Top:
+def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with the tensors that are given, else those of its file."""
     from rotor.tops.magnetic import MagneticTensors, tensor_for
 

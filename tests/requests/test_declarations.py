@@ -19,7 +19,7 @@ from places import ORACLES, PROJECT
 import rotor
 from rotor.formats import registry
 from rotor.requests.field import all_fields
-from rotor.requests.fill import Given, read_fields, written_fields
+from rotor.requests.fill import Entries, read_fields, written_fields
 from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range, Text, Whole
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene_file import parse_scene, scene_text
@@ -178,7 +178,7 @@ def test_defaults_of_a_request_and_of_its_scene_agree(kind):
     content = {"molecule.source": "OCS"} | ({"magnetic.g": (-0.03,)} if "magnetic.g" in verb.fields else {})
     if "observables.bond" in verb.fields:  # a linear molecule has none about which it turns
         content |= {"molecule.source": "C2H6", "observables.bond": "1-2"}
-    values = read_fields(verb.request, Given({}, "key"), verb.read(Given(content), _place())[1])
+    values = read_fields(verb.request, Entries({}, "key"), verb.read(Entries(content), _place())[1])
     defaults = {field.name: field.default for field in fields(verb.request)}
     assert all(value == defaults[name] for name, value in values.items())
 

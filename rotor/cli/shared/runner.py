@@ -14,7 +14,7 @@ from rotor.cli.shared import process
 from rotor.cli.shared.output import Files, answering, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
 from rotor.reports.progress import elapsed_time
-from rotor.requests.fill import Given, renaming
+from rotor.requests.fill import Entries, renaming
 from rotor.verbs.molecule import is_file
 from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, report_of
 
@@ -29,7 +29,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     verb = verb.by_what(typed.keys())
     there = {name: typed[name] for name in typed.keys() & places_of(verb)}
     inputs = {name: value for name, value in typed.items() if name not in there}
-    entries, there = Given(with_extras(verb, inputs), "option"), with_files(verb, there)
+    entries, there = Entries(with_extras(verb, inputs), "option"), with_files(verb, there)
     shown = verb.read_shown(entries)
     with as_typed(verb, there):
         files, growing = files_of_options(verb, there), files_of_options(verb, there, grows=True)
@@ -211,7 +211,7 @@ def working(verb: Verb, workers: Any) -> Any:
     return executor
 
 
-def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Given, typed: Mapping[str, Any]) -> Any:
+def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Entries, typed: Mapping[str, Any]) -> Any:
     """What writes the scene that gives the same tables again; a note names files that a scene does not write."""
     outputs = {output.name: typed[output.name] for output in verb.outputs if output.scene and output.name in typed}
     if left := [output.flag for output in verb.outputs if not output.scene and output.name in typed]:
