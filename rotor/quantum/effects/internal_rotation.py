@@ -3,8 +3,8 @@
     H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ½V6 (1 - cos 6α) + further terms and distortion
 
 in the rho-axis frame, with A beside F (p - ρPa)². Constants: F, rho, V3, V6, Dab ... (`rotor.quantum.internal_rotation.terms` has the
-table with its sources), the rotational constants and distortion being those of the top. The torsion is solved for each K, its lowest
-n_v functions are the basis of the rotation (`rotor.quantum.internal_rotation.contracted`). Levels are named by species, v_t, J, Ka, Kc.
+table with its sources); rotational constants and distortion are those of the top. The torsion is solved for each K, and its lowest
+n_v functions are the basis of the rotation (`rotor.quantum.internal_rotation.contracted`). Levels are labelled by species, v_t, J, Ka, Kc.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROTATION = ("rigid rotor", "centrifugal distortion")  # effects whose constants 
 
 @dataclass(frozen=True, eq=False)
 class InternalRotation(QuantumEffect):
-    """A threefold group that turns against the rest of the molecule."""
+    """Internal rotation of one threefold group, or of two."""
 
     name: ClassVar[str] = "internal rotation"
     conserved: ClassVar[frozenset[str]] = frozenset({"j"})
@@ -35,15 +35,15 @@ class InternalRotation(QuantumEffect):
     constants: InternalRotationConstants
 
     def parameters(self, top: Top) -> dict[str, float]:
-        """The constants of the internal rotor in MHz, rho without a unit."""
+        """Constants of the internal rotor in MHz; rho has no unit."""
         return dict(self.constants.values)
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """The same effect with other values of some of its constants."""
+        """This effect with new values of some constants."""
         return type(self)(replace(self.constants, values={**self.constants.values, **values}))
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """The largest difference of the torsional ground states of A and E for |K| ≤ J, from that at K = 0."""
+        """The largest E-A splitting of the torsional ground state for |K| ≤ J, relative to that of K = 0."""
         from rotor.quantum.internal_rotation.levels import species_splitting
 
         return species_splitting(top, self.constants, j)
@@ -57,7 +57,7 @@ class InternalRotation(QuantumEffect):
         vectors: bool,
         below_mhz: float = math.inf,
     ) -> Levels:
-        """Levels of both species with v_t up to the highest of the constants; without vectors those of all n_v torsional functions.
+        """Levels of all species with v_t ≤ vt_max; without vectors, energies of all n_v torsional functions.
 
         Raises ValueError for effects that have no elements between torsional functions.
         """

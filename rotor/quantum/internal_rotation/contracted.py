@@ -1,4 +1,4 @@
-"""Torsional functions for each K as the basis of the rotation: the two steps of a molecule with one internal rotor.
+"""Torsional functions for each K as a basis of the rotation: two-step diagonalisation for one internal rotor.
 
 In the rho-axis frame the kinetic coupling of a top with the rotation acts along z alone, so that the torsion
 
@@ -9,7 +9,7 @@ diagonalisation). Its lowest n_v functions |K t⟩ are retained, and a term R �
 
     ⟨J K' t'|R o|J K t⟩ = ⟨J K'|R|J K⟩ Σ_m'm ⟨K' t'|m'⟩⟨m'|o|m⟩⟨m|K t⟩.
 
-Truncation is the only approximation: energies are upper bounds, and n_v is a setting of the accuracy.
+Truncation to n_v functions is the only approximation; energies are upper bounds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NEARLY_FREE = (
 
 
 class Product(NamedTuple):
-    """An operator of the rotation times one of the torsion, which acts on the labels k of exp i(3k + σ)α; None is the unit operator."""
+    """An operator of the rotation times an operator of the torsion (None: unit), which acts on the labels k of exp i(3k + σ)α."""
 
     rotation: Operator
     torsion: Operator | None = None
@@ -42,7 +42,7 @@ Terms = Mapping[str, Sequence[Product]]  # each name multiplies a sum of product
 
 @dataclass(frozen=True, eq=False)
 class Torsion:
-    """The torsional part that is solved first: F and V in MHz, ρ, the fold of the top."""
+    """Torsional Hamiltonian that is solved first: F and V in MHz, ρ, and the fold of the top."""
 
     f_mhz: float
     rho: float
@@ -51,7 +51,7 @@ class Torsion:
 
     @property
     def is_near_free(self) -> bool:
-        """Whether the reduced barrier s = 4 V3/9F is so low that levels of E go with signed K."""
+        """Whether the reduced barrier s = 4 V3/9F is so low that E levels are named by signed K."""
         return 4 * abs(self.potential.cosines.get(self.fold, 0.0)) < 9 * NEARLY_FREE * self.f_mhz
 
 
@@ -59,8 +59,9 @@ class Torsion:
 class ContractedTorsion:
     """The lowest torsional functions of one species for each K.
 
-    sigma: the species. k_max: the largest |K|. k_waves: labels k of the free functions. energies (K, n_v) and vectors (K, k, n_v), K
-    from -k_max; of σ = 0 with ⟨-k|-K t⟩ = ⟨k|K t⟩. parity (n_v,): of the functions of K = 0 and σ = 0 under this reversal, else 0.
+    sigma: the species. k_max: the largest |K|. k_waves: labels k of the free functions. energies (K, n_v) in MHz and vectors (K, k, n_v)
+    start at K = -k_max; for σ = 0 their phases obey ⟨-k|-K t⟩ = ⟨k|K t⟩. parity (n_v,): for σ = 0 the sign of each function of K = 0
+    under this reversal; 0 for other species.
     """
 
     sigma: int
@@ -101,15 +102,15 @@ def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, wav
     Parameters
     ----------
     torsion : Torsion
-        What is solved first.
+        F, ρ and the potential.
     sigma : int
         Species: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed).
     k_max : int
         The largest |K|.
     count : int
-        n_v.
+        n_v, the number of functions for each K.
     waves : int, optional
-        k from -waves to waves in exp i(3k + σ)α.
+        Free functions exp i(3k + σ)α with k from -waves to waves.
 
     Returns
     -------
@@ -133,7 +134,7 @@ def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, wav
 
 
 def _states_of_parity(energies: Floats, vectors: Floats) -> tuple[Floats, Floats, Ints]:
-    """Energies, vectors (k, t) and parities under k → -k of the same Hamiltonian, each half solved by itself: some may coincide."""
+    """Energies, vectors (k, t) and parities under k → -k; each parity is solved apart, as levels of both may coincide."""
     size = len(vectors)
     half = size // 2
     matrix = (vectors * energies) @ vectors.T

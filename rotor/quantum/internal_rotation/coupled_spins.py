@@ -1,11 +1,11 @@
-"""States of one species with nuclear spins: torsion-rotation levels as the basis, one nucleus after another coupled to them.
+"""Levels of one species with nuclear spins, which are coupled one after another to torsion-rotation levels.
 
-The levels with v_t ≤ vt_max are the basis; tensors between them are those of the rotation times the overlaps of the torsional functions,
-exact for every K, and each nucleus is coupled by `rotor.quantum.contraction`. Left out are elements with states of v_t > vt_max, which move
-levels by χ²/ΔE: below 1e-4 MHz for χ of 20 MHz and torsional states 100 cm⁻¹ apart.
+The torsion-rotation levels with v_t ≤ vt_max are the basis. Tensors between them are tensors of the rotation times overlaps of torsional
+functions, exact for every K; `rotor.quantum.contraction` couples each nucleus. Elements with states of v_t > vt_max are neglected. They
+move levels by χ²/ΔE: below 1e-4 MHz for χ of 20 MHz and torsional states 100 cm⁻¹ apart.
 
-Derivatives are expectation values of the state |ψ⟩ written out: for a constant of a nucleus over the product functions in which it is
-coupled, for a coefficient of the torsion-rotation over the functions |J K⟩|K t⟩,
+Derivatives are expectation values. For a constant of a nucleus the state |ψ⟩ is expanded in the product functions in which that nucleus
+is coupled; for a coefficient of the torsion-rotation, in the functions |J K⟩|K t⟩:
 
     ∂E/∂c = Σ_path ⟨Ψ_path|O_c|Ψ_path⟩,    Ψ_path = Σ_N U_N ψ_N,path,    path = the intermediate sums F1, F2 ....
 """
@@ -35,7 +35,7 @@ Path = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class CoupledNucleus:
-    """A nucleus coupled to what is solved already: the product functions, their eigenfunctions, and the names of these by sector."""
+    """One step of the coupling: product functions of the earlier states with a nucleus, eigenfunctions, and their names by sector."""
 
     product: CoupledSpace
     space: Space
@@ -46,7 +46,7 @@ class CoupledNucleus:
 class CoupledLevels:
     """All states of one species with spins.
 
-    angle: of ρ from the axis a of the tensors. rotation: the torsion-rotation levels as a space, nuclei: one step for each spin.
+    angle: angle (radians) of ρ from the axis a of the tensors. rotation: torsion-rotation levels as a space. steps: one for each nucleus.
     """
 
     levels: SpeciesLevels
@@ -57,28 +57,28 @@ class CoupledLevels:
 
     @property
     def space(self) -> Space:
-        """The states."""
+        """The states with all spins."""
         return self.steps[-1].space
 
     @property
     def sectors(self) -> tuple[Mapping[str, Ints], ...]:
-        """Names of the states of each sector: vt, n, ka, kc, the sums with spins, doubled, and the row of the torsion-rotation level."""
+        """Labels of the states by sector: vt, n, ka, kc, sums with spins (doubled), and the row of the torsion-rotation level."""
         return self.steps[-1].quanta
 
     @cached_property
     def quanta(self) -> dict[str, Ints]:
-        """The same of all states."""
+        """Labels of all states, sector after sector."""
         return {name: np.concatenate([quanta[name] for quanta in self.sectors]) for name in self.sectors[0]}
 
     @cached_property
     def energies(self) -> Floats:
-        """MHz."""
+        """Energies of all states, MHz."""
         return np.concatenate([sector.energies for sector in self.space.sectors])
 
     def slopes(self, rows: Ints, further: Elements | None = None) -> tuple[Floats, Floats]:
-        """Derivatives of states at these rows: (rows, terms) of the torsion-rotation and (rows, constants) of the nuclei.
+        """Derivatives of states: (rows, terms) by torsion-rotation coefficients and (rows, constants) by constants of nuclei.
 
-        further: operators of the torsion-rotation that follow its terms.
+        further: operators of the torsion-rotation whose columns follow those of the terms.
         """
         starts = self.space.starts()
         sector_of = np.searchsorted(starts, rows, side="right") - 1
@@ -93,7 +93,7 @@ class CoupledLevels:
         return rotation, spins
 
     def _written_out(self, sector: int, states: Ints) -> tuple[list[NDArray[Any]], Floats]:
-        """States of a sector over the torsion-rotation functions, one array (functions, states) for each path; and slopes of spins."""
+        """States expanded in torsion-rotation functions, an array (functions, states) for each path; and slopes by nuclear constants."""
         slopes = np.zeros((len(states), len(self.nuclei.constants)))
         last = self.space.sectors[sector]
         pieces: dict[Path, dict[int, NDArray[Any]]] = {(): {sector: np.eye(len(last))[:, states]}}
@@ -111,7 +111,7 @@ class CoupledLevels:
         return [self._over_functions(vectors) for vectors in pieces.values()], slopes
 
     def _spin_slopes(self, number: int, products: Mapping[int, NDArray[Any]]) -> Floats:
-        """Slopes (states, constants) by the constants of one nucleus of vectors over its product functions."""
+        """Slopes (states, constants) by the constants of one nucleus, from vectors over its product functions."""
         count = next(iter(products.values())).shape[1]
         slopes = np.zeros((count, len(self.nuclei.constants)))
         for column, constant in enumerate(self.nuclei.constants):
@@ -147,7 +147,7 @@ def _expectations(elements: Elements, vectors: NDArray[Any]) -> Floats:
 
 
 def _over_products(step: CoupledNucleus, solved: int, vectors: NDArray[Any]) -> dict[int, NDArray[Any]]:
-    """Vectors over the states of a solved sector as vectors over the product functions, by sector of these."""
+    """Vectors over the states of a solved sector expanded in the product functions, by their sector."""
     labels = step.space.sectors[solved].labels
     whole = labels["vectors"] @ vectors
     sizes = np.cumsum([0, *(len(step.product.sectors[product]) for product in labels["sectors"])])
@@ -168,11 +168,11 @@ def coupled_levels(
     nuclei : Nuclei
         Spins and their constants.
     angle : float
-        Of ρ from the axis a of the tensors, radians.
+        Angle of ρ from the axis a of the tensors, radians.
     has_plane : bool
         Whether the molecule has the plane ab as a mirror.
     twice_f : array of int, optional
-        Twice the total angular momenta that are needed, without moments between them; by default all, with the moments of dipoles.
+        Values of 2F to compute, without dipole moments between them. By default all values, with dipole moments.
 
     Returns
     -------
@@ -195,11 +195,11 @@ def coupled_levels(
 
 
 def _rotation_space(levels: SpeciesLevels, nuclei: Nuclei, angle: float, has_plane: bool, moments: bool) -> Space:
-    """The named torsion-rotation levels with the tensors of every constant and unit vectors for the dipole."""
+    """The named torsion-rotation levels with the tensors of each constant and unit vectors for the dipole."""
     functions, linear = levels.functions, levels.solved.linear
     tensors = {constant.name: (constant.rank, constant.elements(functions, angle)) for constant in nuclei.constants}
     for axis, unit in zip("abc", np.eye(3), strict=True):
-        if moments and (axis != "c" or not has_plane):  # of a molecule with the plane ab there is no dipole along c
+        if moments and (axis != "c" or not has_plane):  # a mirror plane ab excludes a dipole along c
             parts = real_components(spherical_components(unit, 1, REPRESENTATION))
             tensors[f"mu {axis}"] = 1, functions.elements([[Product(body_tensor(parts))]], 1)
     block, rank = linear.block[levels.rows], linear.rank[levels.rows]
@@ -208,7 +208,7 @@ def _rotation_space(levels: SpeciesLevels, nuclei: Nuclei, angle: float, has_pla
 
 
 def _rotation_quanta(levels: SpeciesLevels, space: Space) -> list[dict[str, Ints]]:
-    """Names of the states of each sector, and their rows among the solved functions."""
+    """Labels of the states of each sector, and their rows among the solved functions."""
     place = np.full(len(levels.solved.linear.block), -1)
     place[levels.rows] = np.arange(len(levels.rows))
     quanta = levels.quanta
@@ -223,10 +223,12 @@ def _rotation_quanta(levels: SpeciesLevels, space: Space) -> list[dict[str, Ints
 def _with_nucleus(
     space: Space, quanta: Sequence[Mapping[str, Ints]], nuclei: Nuclei, number: int, totals: Sequence[int]
 ) -> CoupledNucleus:
-    """One more nucleus coupled and solved, to totals that are doubled."""
+    """Couple and solve one more nucleus; `totals` are the doubled sums of angular momenta."""
     nucleus_of = {constant.name: constant.nucleus for constant in nuclei.constants}
     scalars = {
-        constant.name: (constant.name, constant.of_spin) for constant in nuclei.constants if constant.nucleus == number
+        constant.name: (constant.name, constant.spin_tensor)
+        for constant in nuclei.constants
+        if constant.nucleus == number
     }
     carried = {
         key: (key, None, tensor.rank)
@@ -243,7 +245,7 @@ def _with_nucleus(
 def _names_of(
     sector: Sector, products: Sequence[Sector], quanta: Sequence[Mapping[str, Ints]], name: str
 ) -> dict[str, Ints]:
-    """Names of the states of a solved sector after the product functions that they mostly are."""
+    """Label the states of a solved sector by their dominant product functions."""
     named = sector.labels["functions"]
     origin = [(products[product].labels["factors"][0], rank) for product, rank in named.tolist()]
     columns = {key: np.array([quanta[i][key][rank] for i, rank in origin]) for key in quanta[0]}

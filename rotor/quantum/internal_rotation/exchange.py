@@ -8,9 +8,10 @@ where the functions of the second top at K are those of the first at ±K. With �
 level of (σ1, σ2) coincides with that of (σ2, σ1). Feasible permutations of the six nuclei are the two cyclic ones, P and their products:
 C3 ≀ C2 of 18 elements, G36 with the inversion, which takes no part in weights.
 
-Weights, by counting: of n states of a nucleus, a top has d_0 = (n³ + 2n)/3 spin functions of σ = 0 and d_1 = (n³ - n)/3 of each of ±1. A
-function of the molecule changes by (-1)^(n-1) for each exchanged pair. With N = Π m², M = Π m of further pairs with m = 2I + 1 states
-each, the exchange has the trace d_σ M over the d_σ² N spin functions of (σ, σ), so that (d_σ² N ± d_σ M)/2 of them have P = ±1.
+Weights by counting: with n = 2I + 1 states of a nucleus, a top has d_0 = (n³ + 2n)/3 spin functions of σ = 0 and d_1 = (n³ - n)/3 each of
+σ = 1 and -1. A function of the molecule changes by (-1)^(n-1) for each exchanged pair. Further pairs with m = 2I + 1 states each give
+N = Π m² and M = Π m. The trace of the exchange over the d_σ² N spin functions of (σ, σ) is d_σ M, so that (d_σ² N ± d_σ M)/2 of them have
+P = ±1.
 
 | (σ1, σ2) | components | spin functions, of two CH3 |
 |---|---|---|
@@ -40,9 +41,9 @@ TURNS = {"a": (1.0, -1.0, -1.0), "b": (-1.0, 1.0, -1.0), "c": (-1.0, -1.0, 1.0)}
 
 @dataclass(frozen=True, eq=False)
 class ExchangedTops(TorsionRotation):
-    """Functions of two tops with σ1 = σ2 that have a sign x under the exchange by C2 about `axis`; t: products by their number.
+    """Functions of two tops with σ1 = σ2 that have a sign x under the exchange by C2 about `axis`.
 
-    partner (n_v,): of the product (t1, t2) the number of (t2, t1). Sums of a pair stand at the lower number, differences at the other.
+    partner (n_v,): number of the product (t2, t1) for each product (t1, t2). Sums of a pair have the lower number, differences the higher.
     """
 
     axis: str
@@ -66,7 +67,7 @@ class ExchangedTops(TorsionRotation):
         plain: dict[str, Any] = dict(self.plain_labels)
         count, t = len(plain["t"]), plain["t"]
         other = self._row(plain["J"], plain["K"], self.partner[t], plain["s"])
-        first = np.where(t <= self.partner[t], 1.0, -1.0)  # of the function itself in its combination
+        first = np.where(t <= self.partner[t], 1.0, -1.0)  # sign of each function in its combination with the partner
         matrix = _pairs(np.arange(count), other, first)
         sign = first.astype(np.int64)
         if self.has_parity and not self.folded:
@@ -78,17 +79,17 @@ class ExchangedTops(TorsionRotation):
             plain["s"], plain["K"] = np.where(k >= 0, 1, -1), np.abs(k)
         s, j, k = np.where(plain["K"] > 0, plain["s"], 1), plain["J"], plain["K"]
         phase = {"a": k, "b": j + k, "c": j}[self.axis] % 2
-        of_rotation = np.where(phase, -1, 1) * (1 if self.axis == "a" else s)
-        plain["x"] = sign * of_rotation
+        rotation_sign = np.where(phase, -1, 1) * (1 if self.axis == "a" else s)
+        plain["x"] = sign * rotation_sign
         order = np.lexsort((plain["t"], plain["K"], plain["J"], -plain["s"]))
         return csr_array(matrix[:, order]), {name: column[order] for name, column in plain.items()}
 
     def _row(self, j: Ints, k: Ints, t: Ints, s: Ints) -> Ints:
-        """Rows of plain functions."""
+        """Rows of plain functions with these labels."""
         return np.asarray(self._rows[(s < 0).astype(int), self.rotation.rows({"J": j, "K": k}), t])
 
     def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
-        """Elements between functions with a sign: those of plain ones, transformed."""
+        """Elements between functions with a sign x, transformed from those between plain functions."""
         from scipy.sparse import csr_array
 
         plain = super().elements(terms, rank, time_odd)
@@ -100,22 +101,22 @@ class ExchangedTops(TorsionRotation):
             here = np.zeros((len(plain.values), reduced.nnz), dtype=plain.values.dtype)
             here[i] = reduced.data
             pieces.append((reduced.row.astype(np.int64), reduced.col.astype(np.int64), here))
-        if len(pieces) == 1:  # its places stand once
+        if len(pieces) == 1:  # no pattern to merge
             rows, columns, values = pieces[0]
             retained = np.abs(values[0]) > ROUND_OFF * np.abs(values).max(initial=0.0)
             return Elements(plain.count, rows[retained], columns[retained], values[:, retained])
         rows, columns, values = (np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True))
         return merged(plain.count, rows, columns, values)
 
-    def of_whole(self, elements: Elements) -> Elements:
-        """Elements of the whole Hamiltonian without those between functions of different x, which are round-off of zero."""
+    def symmetry_allowed(self, elements: Elements) -> Elements:
+        """Elements of the full Hamiltonian without the round-off between functions of different x."""
         x = self.labels["x"]
         here = x[elements.rows] == x[elements.columns]
         return Elements(elements.count, elements.rows[here], elements.columns[here], elements.values[:, here])
 
 
 def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None) -> Any:
-    """Columns (|row⟩ + |other⟩ f)/√2 of first = 1 and (|other⟩ - |row⟩ f)/√2 of first = -1, |row⟩ where it is its partner."""
+    """Columns (|row⟩ + |other⟩ f)/√2 for first = 1, (|other⟩ - |row⟩ f)/√2 for first = -1, and |row⟩ where both are the same."""
     from scipy.sparse import csr_array
 
     weights = np.ones(len(rows)) if factor is None else factor
@@ -128,18 +129,18 @@ def _pairs(rows: Ints, others: Ints, first: Floats, factor: Floats | None = None
 
 @dataclass(frozen=True)
 class SpinCounts:
-    """Spin functions of two equivalent tops. states: 2I + 1 of a nucleus that turns. pairs: those of further exchanged pairs."""
+    """Spin functions of two equivalent tops. states: 2I + 1 of a nucleus of a top. pairs: 2I + 1 of further exchanged pairs."""
 
     states: int = 2
     pairs: tuple[int, ...] = ()
 
-    def of_species(self, sigma: tuple[int, int], x: Ints) -> Ints:
-        """Spin functions (levels,) of all components together of levels with a sign x under the exchange.
+    def functions_of_species(self, sigma: tuple[int, int], x: Ints) -> Ints:
+        """Spin functions (levels,) of levels with a sign x under the exchange, summed over their components.
 
         >>> counts = SpinCounts(2)
-        >>> [counts.of_species(sigma, np.array([1, -1])).tolist() for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))]
+        >>> [counts.functions_of_species(sigma, np.array([1, -1])).tolist() for sigma in ((0, 0), (1, 1), (1, -1), (0, 1))]
         [[6, 10], [2, 6], [4, 4], [16, 16]]
-        >>> SpinCounts(2, (2,)).of_species((0, 0), np.array([1, -1])).tolist()  # propane: the hydrogens of CH2 are exchanged too
+        >>> SpinCounts(2, (2,)).functions_of_species((0, 0), np.array([1, -1])).tolist()  # propane: the hydrogens of CH2 are exchanged too
         [36, 28]
         """
         n, all_pairs, trace = self.states, math.prod(m * m for m in self.pairs), math.prod(self.pairs)
@@ -148,14 +149,16 @@ class SpinCounts:
         if sigma[0] != sigma[1]:
             return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))
         fermions = 3 * (n % 2 == 0) + sum(m % 2 == 0 for m in self.pairs)
-        y = x * (-1 if fermions % 2 else 1)  # of the spin function that goes along
+        y = x * (
+            -1 if fermions % 2 else 1
+        )  # sign of the spin function, so that the product is symmetric or antisymmetric as the nuclei demand
         return np.asarray((first**2 * all_pairs + y * first * trace) // (2 if not any(sigma) else 1))
 
 
 def exchange_axis(first: Floats, second: Floats, tolerance: float) -> str:
     """The axis a, b or c about which C2 takes the direction of one top to that of the other, "" for none.
 
-    A top along a principal axis is excluded: other axes then do it too.
+    A top along a principal axis is excluded, since the choice of the axis is then not unique.
 
     >>> exchange_axis(np.array([0.8, 0.6, 0.0]), np.array([-0.8, 0.6, 0.0]), 1e-9)
     'b'

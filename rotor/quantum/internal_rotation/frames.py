@@ -1,4 +1,4 @@
-"""Constants of an internal rotor between frames: geometry, principal axes (PAM, XIAM) and the rho-axis frame (RAM).
+"""Conversion of constants of an internal rotor between geometry, principal axes (PAM, XIAM) and the rho-axis frame (RAM).
 
 A top with the moment I_α about its axis, which has the cosines λ_g to the principal axes, in a molecule with the moments I_g
 (C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as reviews that were read cite it; H. Hartwig and H. Dreizler, Z. Naturforsch.
@@ -39,10 +39,7 @@ class RhoAxis:
 
     @property
     def axes(self) -> Floats:
-        """Rows a, b, c of the rho-axis frame (z, x, y) along the principal axes: the first along ρ, the third as near c as can be.
-
-        Of ρ in the plane ab the third is c itself.
-        """
+        """Rows a, b, c of the rho-axis frame (z, x, y) along the principal axes: a along ρ, c as near the principal axis c as possible."""
         first = self.rho_abc / self.rho
         third = np.array([0.0, 0.0, 1.0])
         third = third - (third @ first) * first

@@ -1,4 +1,4 @@
-"""Constants of an internal rotor from a geometry: its moments, and the barrier of a similar molecule."""
+"""Constants of an internal rotor from a geometry and the barrier of a similar molecule."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ IN_PLANE = 1e-3  # share of the top's axis along c up to which a molecule counts
 
 
 def with_internal_rotation(top: Top, calculator: Any = None) -> Top:
-    """The top with its methyl group turning: F0 and the angle of its axis from the geometry, V3 from the table of similar molecules.
+    """Add the internal rotation of the methyl group: F0 and the angle of its axis from the geometry, V3 from a similar molecule.
 
     Parameters
     ----------
     top : Top
-        With a geometry; its constants, dipole and distortion stay those of the principal axes.
+        Top with a geometry. Its constants, dipole and distortion remain in principal axes.
     calculator : optional
-        V3 and V6 of a relaxed scan with it instead: an ASE calculator, its name, or "mmff" for MMFF94.
+        ASE calculator, its name, or "mmff" for MMFF94. V3 and V6 then come from a relaxed scan instead of the table.
 
     Returns
     -------
     Top
-        With constants in the frame PAM, and notes that say where the barrier is from and how safe it is.
+        Top with constants of the internal rotor in the frame PAM, and notes on source and uncertainty of the barrier.
 
     Raises
     ------
     ValueError
-        Without a geometry, for none or several groups, a barrier that is not known, and an axis out of the plane ab.
+        If there is no geometry, not exactly one methyl group, no known barrier, or an axis out of the plane ab.
 
     Notes
     -----
-    F0 follows from the geometry within about 2 %, V3 within what the note says; splittings go about as exp(-1.3 √(V3/F)).
+    F0 from a geometry is good to about 2 %; the note states the uncertainty of V3. Splittings scale about as exp(-1.3 √(V3/F)).
     """
     group = _group_of(top, with_barrier=calculator is None)
     cosines = np.array(group.rotor.rho) * np.array(top.moments_u_angstrom2)  # λ_g I_α
@@ -73,19 +73,19 @@ def with_internal_rotation(top: Top, calculator: Any = None) -> Top:
 
 
 def _scanned(top: Top, group: MethylGroup, calculator: Any) -> tuple[dict[str, float], str]:
-    """V3 and V6 in MHz of a relaxed scan about the bond of the group, counted from the minimum of the threefold term, and what made it."""
+    """V3 and V6 (MHz) of a relaxed scan about the bond of the group, α = 0 at the minimum of the threefold term; and its source."""
     assert top.molecule is not None
     carbon = next(i for i in bonded_atoms(top.molecule)[group.hydrogens[0]].tolist())
     bearer = next(i for i in bonded_atoms(top.molecule)[carbon].tolist() if i not in group.hydrogens)
     scan = relaxed_scan(bond_rotation(top.molecule, f"{bearer + 1}-{carbon + 1}"), calculator, points=36)
     terms = np.array([np.mean(scan.energies_cm * np.exp(-1j * n * scan.angles)) for n in (3, 6)]) * 2 * units.MHZ_PER_CM
-    start = np.angle(-terms[0]) / -3  # of the minimum: the term is |t| cos 3(α - α0) with a negative sign
+    start = np.angle(-terms[0]) / -3  # angle of the minimum: the threefold term is -|t| cos 3(α - start)
     turned = terms * np.exp(1j * np.array([3, 6]) * start)
     return {"V3": float(-2 * turned[0].real), "V6": float(-2 * turned[1].real)}, scan.source
 
 
 def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
-    """The one group that turns; ValueError for none, several, or one whose barrier is needed and not known."""
+    """The only methyl group; ValueError for none, several, or an unknown barrier that is needed."""
     name = top.name or "this top"
     if top.molecule is None:
         raise ValueError(
@@ -93,7 +93,7 @@ def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
         )
     bonds = bonded_atoms(top.molecule)
     groups = methyl_groups(top.molecule, bonds)
-    if not groups and (carbon := _of_unlike_hydrogens(top.molecule, bonds)):
+    if not groups and (carbon := _carbon_of_unlike_hydrogens(top.molecule, bonds)):
         raise ValueError(
             f"internal rotation of {name}: the hydrogens of carbon {carbon} are not all alike (CH2D, CHD2); their potential is threefold, "
             "their moments of inertia are not, so that there are no species A and E: such a group is not computed"
@@ -107,7 +107,7 @@ def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
     return groups[0]
 
 
-def _of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
+def _carbon_of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
     """The number, from 1, of a carbon with three hydrogens of different isotopes; 0 for none."""
     for carbon, near in enumerate(bonds):
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]

@@ -1,11 +1,11 @@
-"""Functions |J K⟩|K t⟩ of the rotation and the torsion, and a writer of elements between them.
+"""Torsion-rotation functions |J K⟩|K t⟩ and matrix elements between them.
 
 The species σ = 0 goes to itself under time reversal; its functions are
 
     |J K t s) = i^J (|J K⟩|K t⟩ + s (-1)^K |J -K⟩|-K t⟩)/√2  (and i more for s = -1),   K > 0,       i^J |J 0⟩|0 t⟩,  s = parity of t,
 
-between which operators that are real in |J K⟩|K t⟩ (a plane of symmetry contains the rho axis) connect s with s' = s (-1)^(J+J'+k), k
-being the rank: elements of odd rank stand for i times themselves, as in `rotor.quantum.tensors`. Other species have |J K⟩|K t⟩.
+Operators of rank k that are real in |J K⟩|K t⟩ (a plane of symmetry contains the rho axis) connect s with s' = s (-1)^(J+J'+k). Elements
+of odd rank are stored without their factor i, as in `rotor.quantum.tensors`. Other species use |J K⟩|K t⟩.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rotor.quantum.operators.algebra import Operator
 class TorsionRotation:
     """The functions of one species with J from `jmin` to `jmax`.
 
-    folded: whether functions of K and -K are combined: of σ = 0 where the Hamiltonian is real.
+    folded: whether functions of K and -K are combined, which needs σ = 0 and a real Hamiltonian.
     """
 
     torsion: ContractedTorsion
@@ -39,7 +39,7 @@ class TorsionRotation:
 
     @cached_property
     def rotation(self) -> Basis:
-        """|J K⟩."""
+        """The functions |J K⟩."""
         return Basis(rotation_labels(self.jmax, self.jmin))
 
     @property
@@ -75,7 +75,7 @@ class TorsionRotation:
 
     @cached_property
     def _rows(self) -> Ints:
-        """Row of the function (sign, |J K⟩, t), -1 where there is none."""
+        """Row of the function (sign, |J K⟩, t); -1 where it does not exist."""
         labels = self.plain_labels
         rows = np.full((2, len(self.rotation), self.torsion.count), -1)
         place = self.rotation.rows({"J": labels["J"], "K": labels["K"]})
@@ -83,15 +83,15 @@ class TorsionRotation:
         return rows
 
     def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
-        """Elements of sums of products on their common pattern, reduced ones of tensors of a rank.
+        """Reduced elements of sums of products, all tensors of one rank, on their common pattern.
 
-        time_odd: whether time reversal changes the sign of the tensor, as that of Σ ½{Φ_i, N_j} of rank 1; it then has the phases of the
+        time_odd: whether time reversal changes the sign of the tensor, as for Σ ½{Φ_i, N_j} of rank 1; its phases are then those of the
         next rank.
         """
         plain = self.rotation.elements([factor.rotation for term in terms for factor in term])
         if self.folded:
             if np.iscomplexobj(plain.values):
-                raise ValueError("functions of K and -K are combined for real operators alone")
+                raise ValueError("functions of K and -K are combined for real operators only")
             return self._gathered(len(terms), *self._folded(terms, plain, (rank + time_odd) % 2))
         tables = _Tables(self.torsion)
         change = self._k(plain.rows) - self._k(plain.columns)
@@ -99,8 +99,8 @@ class TorsionRotation:
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
 
-    def of_whole(self, elements: Elements) -> Elements:
-        """Elements of the whole Hamiltonian without those that its symmetry excludes."""
+    def symmetry_allowed(self, elements: Elements) -> Elements:
+        """Elements of the full Hamiltonian without those that symmetry excludes."""
         return elements
 
     def _k(self, rows: Ints) -> Ints:
@@ -129,8 +129,8 @@ class TorsionRotation:
     ) -> tuple[Ints, Ints, NDArray[Any]]:
         """Rows and columns (entries, t), and values, between combined functions.
 
-        ⟨J'|K'| t' s'|O|J K t s) = w' w Σ_±K' (s' (-1)^K')^[K' < 0] ⟨K' t'|O|K t⟩ over both signs of K', with K ≥ 0, w = √2 of K > 0 and
-        w' = 1/√2 of K' > 0, times i^(J - J') and the factors i of s and s'.
+        ⟨J'|K'| t' s'|O|J K t s) = w' w Σ_±K' (s' (-1)^K')^[K' < 0] ⟨K' t'|O|K t⟩ over both signs of K', with K ≥ 0, w = √2 for K > 0 and
+        w' = 1/√2 for K' > 0 (1 otherwise), times i^(J - J') and the factors i of s and s'.
         """
         chosen = np.flatnonzero(self._k(plain.columns) >= 0)
         rows, columns = plain.rows[chosen], plain.columns[chosen]
@@ -149,7 +149,7 @@ class TorsionRotation:
             reflected = np.where(k_row < 0, row_sign * np.where(k_row % 2, -1, 1), 1)
             turns = (
                 phase + (column_sign < 0) - (row_sign < 0) - parity
-            ) % 4  # powers of i; of odd rank one is left out
+            ) % 4  # powers of i; odd ranks are stored without one factor i
             factor = weight * reflected * np.where(turns == 0, 1.0, -1.0)
             if (turns % 2).any():
                 raise AssertionError("an element between combined functions is not of one phase")
@@ -169,7 +169,7 @@ class TorsionRotation:
         )
 
     def _gathered(self, count: int, rows: Ints, columns: Ints, values: NDArray[Any]) -> Elements:
-        """Elements of values (terms, entries, t', t) between functions by entry and t, without those that are zero or do not exist."""
+        """Elements between functions by entry and t from values (terms, entries, t', t), without zeros and absent functions."""
         flat = values.reshape(count, -1)
         r = np.broadcast_to(rows[:, :, None], values.shape[1:]).ravel()
         c = np.broadcast_to(columns[:, None, :], values.shape[1:]).ravel()
@@ -183,17 +183,17 @@ class _Tables:
 
     def __init__(self, torsion: ContractedTorsion) -> None:
         self._torsion = torsion
-        self._known: dict[tuple[Operator | None, int], Floats] = {}
+        self._cache: dict[tuple[Operator | None, int], Floats] = {}
 
     def of(self, operator: Operator | None, step: int) -> Floats:
         """⟨K + step, t'|o|K t⟩ as (K, t', t)."""
         key = operator, step
-        if key not in self._known:
+        if key not in self._cache:
             unit = operator is None and step == 0
             size = self._torsion.count
-            self._known[key] = (
+            self._cache[key] = (
                 np.broadcast_to(np.eye(size), (len(self._torsion.energies), size, size))
                 if unit
                 else self._torsion.tables(operator, step)
             )
-        return self._known[key]
+        return self._cache[key]

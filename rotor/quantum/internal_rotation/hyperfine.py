@@ -1,4 +1,4 @@
-"""The table of levels with nuclear spins beside internal rotation, and the moments between its blocks."""
+"""Levels of a molecule with an internal rotor and nuclear spins, and dipole moments between their blocks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class HyperfineBlock(MomentBlock):
-    """States of one F and one connected block of a species: some states of a sector, rising in energy."""
+    """States of one F in one connected block of a species, in order of energy."""
 
     model: TurningTops
     species: CoupledLevels
@@ -61,7 +61,7 @@ class HyperfineBlock(MomentBlock):
         return self.species.levels.functions.folded
 
     def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[np.generic]:
-        """Reduced elements (n_up, n_low) of one component."""
+        """Reduced elements (n_up, n_low) of a tensor."""
         assert isinstance(low, HyperfineBlock)
         pieces = [
             value * block[np.ix_(self.states, low.states)]
@@ -72,12 +72,10 @@ class HyperfineBlock(MomentBlock):
         return np.asarray(sum(pieces)) if pieces else np.zeros((len(self.states), len(low.states)))
 
     def _vector(self, tensors: Tensors) -> dict[str, float]:
-        """Components of a vector along the axes of ρ by their names."""
+        """Components of a vector along the axes of the rho-axis frame, by letter."""
         body = tensors[0, 0]
         if body.rank != 1:
-            raise ValueError(
-                "spins beside internal rotation: elements of dipoles are computed, of tensors of rank 2 none"
-            )
+            raise ValueError("spins beside internal rotation: only dipole moments are computed, no tensors of rank 2")
         vector = turned_by(cartesian_of(body.components, REPRESENTATION), self.model.angle)
         if self.model.has_plane and abs(vector[2]) > 0:
             raise ValueError("a dipole along c beside internal rotation: the molecule has the plane ab as a mirror")
@@ -86,10 +84,10 @@ class HyperfineBlock(MomentBlock):
     def slopes(self, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the states, by the constants of the top, of the internal rotor and of the nuclei."""
         rotation, spins = self.species.slopes(self.species.space.starts()[self.sector] + self.states)
-        known = [*self.model.values, *self.species.nuclei.values]
+        constants = [*self.model.values, *self.species.nuclei.values]
         slopes = np.hstack([rotation @ self.model.jacobian, spins])
         none = np.zeros(len(slopes))
-        return np.column_stack([slopes[:, known.index(name)] if name in known else none for name in names])
+        return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
 
 
 def hyperfine_levels(
@@ -102,16 +100,16 @@ def hyperfine_levels(
     top : Top
         Rotational constants and distortion in the frame of the internal rotor.
     constants : InternalRotationConstants
-        Those of the internal rotor.
+        Constants of the internal rotor.
     effects : tuple of QuantumEffect
-        The rotation, internal rotation, and effects of nuclear spins.
+        Rotation, internal rotation, and effects of nuclear spins.
     nmin, nmax : int
         Range of N.
 
     Returns
     -------
     Levels
-        By species, vt, n, ka, kc, f1, ... f; half-integers are doubled.
+        Levels labelled by species, vt, n, ka, kc, f1, ... f; half-integers are doubled.
 
     Raises
     ------
@@ -161,7 +159,7 @@ def species_with_spins(
     nmin: int,
     nmax: int,
 ) -> CoupledLevels:
-    """All states of one species whose labels have N in a range, and further ones with N beyond it."""
+    """Levels of one species whose labels have N in a range; neighbouring N are solved too, since spins mix them in."""
     total = nuclei.twice_total
     blocks = species_blocks(model, species, max(0, nmin - total), nmax + total, constants.functions)
     levels = blocks.solve_once(model.coefficients, constants.vt_max, constants.names == "energy")
@@ -169,20 +167,20 @@ def species_with_spins(
 
 
 def _count(blocks: Sequence[HyperfineBlock]) -> int:
-    """How many levels blocks have."""
+    """Number of levels in these blocks."""
     return blocks[-1].start + len(blocks[-1].states) if blocks else 0
 
 
 def _blocks_of(
     model: TurningTops, species: CoupledLevels, components: int, nmin: int, nmax: int, start: int
 ) -> list[tuple[HyperfineBlock, dict[str, Ints]]]:
-    """The blocks of a species with N in a range, each with the names of its levels."""
-    made = []
+    """Blocks of a species with N in a range, each with the labels of its levels."""
+    blocks = []
     for sector, quanta in enumerate(species.sectors):
         here = np.flatnonzero((quanta["n"] >= nmin) & (quanta["n"] <= nmax))
         if len(here):
             energies = species.space.sectors[sector].energies[here]
             block = HyperfineBlock(model, species, sector, here, energies, start, components)
-            made.append((block, {key: column[here] for key, column in quanta.items()}))
+            blocks.append((block, {key: column[here] for key, column in quanta.items()}))
             start += len(here)
-    return made
+    return blocks

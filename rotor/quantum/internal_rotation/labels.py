@@ -1,15 +1,14 @@
-"""Names of torsion-rotation levels: v_t, and K or Ka and Kc, one to one.
+"""Labels of torsion-rotation levels: v_t, and K or Ka and Kc, one to one.
 
-Of the states of one block, v_t = 0 are those with the largest share of the torsional functions t = 0, as many as the block has of these
-functions; then v_t = 1 of the rest, and so on. Inside one v_t the state of rank n by energy is named after the function of rank n by
-zeroth-order energy, ⟨J K t|H|J K t⟩ without what couples K and -K. Where these energies rise with K this is the rule of a rigid top, K
-counted by energy; where they do not (methanol) names follow the curves of the torsion instead of largest coefficients, which change at
-every avoided crossing. E levels of a top that turns nearly freely have the signed K that they mostly are, one to one: their curves cross
-without interaction.
+A block with n_0 functions of t = 0 has n_0 states of v_t = 0: those with the largest weight of these functions. v_t = 1 follows from the
+rest in the same way, and so on. Inside one v_t the state of rank n by energy takes K of the function of rank n by zeroth-order energy,
+⟨J K t|H|J K t⟩ without the coupling of K and -K. Where these energies rise with K this is the rule of a rigid top, K counted by energy.
+Where they do not (methanol), labels follow the torsional curves; largest coefficients would change at each avoided crossing. E levels of a
+nearly free top take the signed K of largest weight, one to one, because their curves cross without interaction.
 
-Levels of σ = 0 have Kc from their parity: C2 about the axis across the plane of symmetry is (-1)^Kc = s p (-1)^J, p being the parity of the
-torsional function at K = 0. E levels have signed K; of the pair ±K the lower one is called Kc = J - K + 1, the upper one Kc = J - K, as
-at a high barrier, where they are the levels of a rigid top.
+Kc of levels with σ = 0 follows from parity: C2 about the axis across the plane of symmetry is (-1)^Kc = s p (-1)^J; p is the parity of the
+torsional function at K = 0. E levels have signed K; the lower level of a pair ±K is called Kc = J - K + 1, the upper Kc = J - K, as at a
+high barrier, where they are the levels of a rigid top.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ from rotor.quantum.one_to_one import one_to_one
 
 
 def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
-    """v_t (states,) of the states of one block, rising in energy, from vectors (functions, states) and t (functions,).
+    """v_t (states,) of the states of one block from vectors (functions, states), in order of energy, and t (functions,).
 
-    The block may have been solved for its lowest states alone.
+    A block may be solved for its lowest states only.
     """
     members = (np.arange(int(t.max()) + 1)[:, None] == t).astype(float)
     shares = members @ np.abs(vectors) ** 2
@@ -39,7 +38,7 @@ def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
 
 
 def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
-    """The function (in its block) that names each state: equal ranks by energy inside v_t = t."""
+    """The function (number in its block) that labels each state: equal ranks by energy inside v_t = t."""
     names = np.full(len(numbers), -1)
     for v in np.unique(numbers).tolist():
         states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
@@ -49,7 +48,7 @@ def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
 
 
 def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> Ints:
-    """The same by largest overlap, one to one inside v_t = t."""
+    """The function (number in its block) that labels each state: largest overlap, one to one inside v_t = t."""
     names = np.full(len(numbers), -1)
     for v in np.unique(numbers).tolist():
         states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
@@ -61,7 +60,7 @@ def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> In
 
 
 def counted_k(j: Ints, v: Ints, energies: Floats) -> Ints:
-    """K of levels of σ = 0 as BELGI counts it: 0, 1, 1, 2, 2, ... by energy inside each v_t of each J."""
+    """K of levels with σ = 0 as BELGI counts it: 0, 1, 1, 2, 2, ... by energy inside each v_t of each J."""
     order = np.lexsort([energies, v, j])
     first = np.concatenate([[True], (np.diff(j[order]) != 0) | (np.diff(v[order]) != 0)])
     starts = np.flatnonzero(first)
@@ -72,7 +71,7 @@ def counted_k(j: Ints, v: Ints, energies: Floats) -> Ints:
 
 
 def counted_ka_kc(j: Ints, v: Ints, energies: Floats) -> tuple[Ints, Ints]:
-    """Ka and Kc by energy inside each v_t of each J: J(0,J), J(1,J), J(1,J-1), ... as in a rigid prolate top, of either species."""
+    """Ka and Kc by energy inside each v_t of each J, as in a rigid prolate top: J(0,J), J(1,J), J(1,J-1), ... for either species."""
     ka = counted_k(j, v, energies)
     order = np.lexsort([energies, v, j])
     second = np.zeros(len(j), dtype=bool)
@@ -83,7 +82,7 @@ def counted_ka_kc(j: Ints, v: Ints, energies: Floats) -> tuple[Ints, Ints]:
 
 
 def kc_of_parity(j: Ints, k: Ints, parity: Ints) -> Ints:
-    """Kc of levels of σ = 0 from K ≥ 0 and the parity s p: J - K or J - K + 1, whichever has (-1)^Kc = s p (-1)^J.
+    """Kc of levels with σ = 0 from K ≥ 0 and the parity s p: J - K or J - K + 1, whichever has (-1)^Kc = s p (-1)^J.
 
     >>> kc_of_parity(np.array([2, 2, 2]), np.array([0, 1, 1]), np.array([1, 1, -1])).tolist()
     [2, 2, 1]
@@ -94,7 +93,7 @@ def kc_of_parity(j: Ints, k: Ints, parity: Ints) -> Ints:
 
 
 def kc_of_pairs(keys: Mapping[str, Ints], k: Ints, energies: Floats) -> Ints:
-    """Kc of levels with signed K: of two levels ±K with equal keys (J, v_t) the lower one has J - |K| + 1."""
+    """Kc of levels with signed K: the lower of two levels ±K with equal keys (J, v_t) has J - |K| + 1."""
     j = keys["J"]
     size = np.abs(k)
     kc = np.where(k == 0, j, j - size)
@@ -102,7 +101,7 @@ def kc_of_pairs(keys: Mapping[str, Ints], k: Ints, energies: Floats) -> Ints:
     same = np.ones(len(order) - 1, dtype=bool)
     for column in (*keys.values(), size):
         same &= column[order][1:] == column[order][:-1]
-    first = np.flatnonzero(same)  # of each pair the lower one
+    first = np.flatnonzero(same)  # the lower level of each pair
     lower = order[first]
     kc[lower] = j[lower] - size[lower] + 1
     return kc

@@ -1,4 +1,4 @@
-"""The table of levels of a molecule with an internal rotor, and the moments between its blocks."""
+"""Levels of a molecule with an internal rotor, and moments between their blocks."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 TurningTops = RamModel | TwoTops
-FEW = 1 << 14  # elements of a matrix that is faster without being sparse
+FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
 class Entries(NamedTuple):
-    """Elements of an operator between two blocks: places in both, and values."""
+    """Elements of an operator between two blocks: row and column in each block, and values."""
 
     rows: Ints
     columns: Ints
@@ -41,24 +41,24 @@ class Entries(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SpeciesMoments:
-    """Reduced elements of molecule-fixed tensors between the blocks of one species, made when first used."""
+    """Reduced elements of molecule-fixed tensors between the blocks of one species, computed at first use."""
 
     levels: SpeciesLevels
     model: TurningTops
-    _known: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
+    _cache: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
 
     def between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
-        """Elements by pairs of blocks of the tensor of the molecule in its torsional states: overlaps of the torsion times the rotation."""
+        """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
         components = tuple(tensors[0, 0].components)
-        if components not in self._known:
-            self._known[components] = self._elements(components, tensors[0, 0].rank)
-        return self._known[components]
+        if components not in self._cache:
+            self._cache[components] = self._elements(components, tensors[0, 0].rank)
+        return self._cache[components]
 
     def slopes(self, rows: Ints, names: Sequence[str]) -> Floats:
-        """∂E/∂c (rows, names) of levels at rows of the solved blocks."""
-        known = list(self.model.values)
+        """∂E/∂c (rows, names) of levels, `rows` being their places among the solved states."""
+        constants = list(self.model.values)
         slopes = self.levels.slopes(rows) @ self.model.jacobian
-        return np.asarray(slopes[:, [known.index(name) for name in names]])
+        return np.asarray(slopes[:, [constants.index(name) for name in names]])
 
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
         linear = self.levels.solved.linear
@@ -77,7 +77,7 @@ class SpeciesMoments:
 
 
 def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
-    """T_q along the axes of ρ, which lie at an angle (radians) from those of the tensor, a towards b; real where they can be."""
+    """Spherical components along the axes of ρ, at an angle (radians, from a towards b) to the tensor's axes; real if possible."""
     if angle:
         body = turned_by(cartesian_of(components, REPRESENTATION), angle)
         components = spherical_components(body, body.ndim, REPRESENTATION)
@@ -94,7 +94,7 @@ def turned_by(body: Floats, angle: float) -> Floats:
 class TorsionBlock(MomentBlock):
     """States of one J and one connected block of a species: energies (n,) in MHz, rising, and vectors (functions, n).
 
-    components: 2 of E, whose states σ = ±1 coincide.
+    components: 2 for E, whose states σ = ±1 coincide.
     """
 
     j: int
@@ -125,7 +125,7 @@ class TorsionBlock(MomentBlock):
         return self.moments.levels.functions.folded
 
     def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of one component."""
+        """Reduced elements (n_up, n_low) of a tensor."""
         assert isinstance(low, TorsionBlock)
         entries = self.moments.between(tensors)[self.number, low.number]
         shape = len(self.vectors), len(low.vectors)
@@ -153,21 +153,21 @@ def torsion_rotation_levels(
     top : Top
         Rotational constants and distortion in the rho-axis frame.
     constants : InternalRotationConstants
-        Those of the internal rotor.
+        Constants of the internal rotor.
     effects : tuple of QuantumEffect
-        What the Hamiltonian consists of; the levels remember it.
+        Effects of the Hamiltonian, which the table records.
     jmin, jmax : int
         Range of J.
 
     Returns
     -------
     Levels
-        By species, vt, j, ka, kc; energies in MHz above the foot of the torsional potential.
+        Levels labelled by species, vt, j, ka, kc; energies in MHz above the minimum of the torsional potential.
 
     Raises
     ------
     ValueError
-        For a top that is not asymmetric in the representation Iʳ.
+        Unless the top is asymmetric and in the representation Iʳ.
     """
     refuse_axes(top)
     model = turning_tops(top, constants)
@@ -180,7 +180,7 @@ def torsion_rotation_levels(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         components = degeneracies.components(name)
-        made = _blocks(species, model, start, components)
+        species_levels = _blocks(species, model, start, components)
         columns = {
             "species": np.full(len(species.rows), name),
             "components": np.full(len(species.rows), components),
@@ -190,7 +190,7 @@ def torsion_rotation_levels(
         for key, column in columns.items():
             quanta.setdefault(key, []).append(column)
         start += len(species.rows)
-        blocks += made
+        blocks += species_levels
     joined = {name: np.concatenate(columns) for name, columns in quanta.items()}
     energies = np.concatenate([block.energies_mhz for block in blocks])
     return _table(top, effects, jmax, joined, energies, tuple(blocks))
@@ -204,18 +204,17 @@ def energies_alone(
     jmax: int,
     below_mhz: float = math.inf,
 ) -> Levels:
-    """The energies of all n_v torsional functions, for sums over states: J is right, v_t, Ka and Kc are those of a function.
+    """Energies from all n_v torsional functions, for sums over states. J is exact; v_t, Ka and Kc are those of a basis function.
 
-    Functions that lie above `below_mhz` with all that they couple to are left out.
+    Functions that lie above `below_mhz` together with all that they couple to are left out.
     """  # fmt: skip
     refuse_axes(top)
     model, pieces, energies = turning_tops(top, constants), [], []
     degeneracies = Degeneracies.of(model, constants)
     for name in model.species:
         blocks = species_blocks(model, name, jmin, jmax, constants.functions)
-        highest = float(
-            blocks.functions.torsion.energies[jmax].max()
-        )  # of K = 0: low levels lean on all torsional functions
+        # low levels need all torsional functions, so the highest one of K = 0 is the least limit
+        highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
         solved = linear.block >= 0
         energies.append(linear.energies([1.0])[solved])
@@ -241,7 +240,7 @@ def _table(
     top: Top, effects: tuple[QuantumEffect, ...], jmax: int, columns: dict[str, NDArray[Any]], energies: Floats,
     blocks: tuple[TorsionBlock, ...],
 ) -> Levels:  # fmt: skip
-    """Levels of columns: quantum numbers, components and weights."""
+    """Levels from columns of quantum numbers, components and weights."""
     components, weight = columns.pop("components"), columns.pop("weight")
     return Levels(
         kind=top.kind,
@@ -258,7 +257,7 @@ def _table(
 
 
 def refuse_axes(top: Top) -> None:
-    """ValueError for a top whose constants are not those of an asymmetric one with a along z."""
+    """Raise ValueError unless the top is asymmetric in the representation Iʳ."""
     if top.kind != "asymmetric" or top.constants.representation != REPRESENTATION:
         raise ValueError(
             f"internal rotation of a top of kind {top.kind} in {top.constants.representation}: expected A, B, C of the rho-axis frame in "
@@ -267,7 +266,7 @@ def refuse_axes(top: Top) -> None:
 
 
 def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
-    """The constants of the top and of what turns in it together."""
+    """Model of the constants of the top and of its internal rotors."""
     model = turning_model(top.constants.values, constants.values, constants)
     dipole = zip("abc", top.dipole_abc_debye or (), strict=False)
     if (
@@ -285,7 +284,7 @@ def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
 def turning_model(
     rotation: Mapping[str, float], values: Mapping[str, float], constants: InternalRotationConstants
 ) -> TurningTops:
-    """The same of values of the rotation and of the internal rotors, in the frame of these constants."""
+    """Model of constants of the rotation and of the internal rotors, in the frame that `constants` states."""
     if constants.tops == 2:
         return two_tops(rotation, values)
     return (
@@ -298,7 +297,7 @@ def turning_model(
 def species_blocks(
     model: TurningTops, name: str, jmin: int, jmax: int, count: int, needed: Ints | None = None
 ) -> SpeciesBlocks:
-    """The blocks of a species by name, of the J that are needed."""
+    """Blocks of a species, for J from jmin to jmax or for those in `needed`."""
     if isinstance(model, TwoTops):
         return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
     return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
@@ -306,9 +305,9 @@ def species_blocks(
 
 @dataclass(frozen=True)
 class Degeneracies:
-    """How many states levels of a species stand for, and their spin functions without the common divisor.
+    """Degeneracy of levels of a species, and their spin weights without the common divisor.
 
-    equivalent: whether two tops are exchanged by a rotation of the whole; other tops have products of weights.
+    equivalent: whether a rotation of the molecule exchanges the two tops. Weights of inequivalent tops are products.
     """
 
     constants: InternalRotationConstants
@@ -316,7 +315,7 @@ class Degeneracies:
 
     @classmethod
     def of(cls, model: TurningTops, constants: InternalRotationConstants) -> Degeneracies:
-        """Those of a model."""
+        """Degeneracies of a model."""
         equivalent = isinstance(model, TwoTops) and bool(model.axis)
         if constants.exchanged and not equivalent:
             raise ValueError(
@@ -326,20 +325,22 @@ class Degeneracies:
         return cls(constants, equivalent)
 
     def components(self, species: str) -> int:
-        """States that coincide in a level: (σ1, σ2) and (-σ1, -σ2) of all species but A and AA; of equivalent tops AE and EA."""
+        """States that coincide: (σ1, σ2) and (-σ1, -σ2), except for A and AA; for equivalent tops also AE and EA."""
         return 1 if set(species) == {"A"} else 4 if self.equivalent and species == "AE" else 2
 
     def weights(self, species: str, functions: TorsionRotation, rows: Ints) -> Ints:
-        """Spin weights (levels,) of all components together, of levels in the blocks of functions at these rows.
+        """Spin weights (levels,), summed over components, of the levels at `rows` of the functions.
 
-        Those of inequivalent tops are products; of EE and EE*, each with two of the four components, half of it.
+        Weights of inequivalent tops are products; EE and EE* share the four components, so each has half of the product.
         """
         if self.equivalent:
             counts = SpinCounts(self.constants.spin_states, self.constants.exchanged)
             signs = np.array([1, -1])
-            divisor = np.gcd.reduce(np.concatenate([counts.of_species(sigma, signs) for sigma in SPECIES.values()]))
+            divisor = np.gcd.reduce(
+                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in SPECIES.values()])
+            )
             x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
-            return np.asarray(counts.of_species(SPECIES[species], x[rows]) // divisor)
+            return np.asarray(counts.functions_of_species(SPECIES[species], x[rows]) // divisor)
         a, e = self.constants.weights
         weights = (
             {"A": a, "E": e}
@@ -350,8 +351,8 @@ class Degeneracies:
 
 
 def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[TorsionBlock]:
-    """The blocks of one species with the states that are levels, in the order of its rows."""
-    moments, made = SpeciesMoments(species, model), []
+    """Blocks of one species with the states that are levels, in the order of its rows."""
+    moments, blocks = SpeciesMoments(species, model), []
     linear = species.solved.linear
     chosen = linear.block[species.rows]
     for number in species.blocks:
@@ -360,15 +361,15 @@ def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: 
         if len(rows):
             retained = vectors[:, linear.rank[rows]]
             j = int(linear.labels["J"][members[0]])
-            made.append(
+            blocks.append(
                 TorsionBlock(j, number, species.solved.energies[rows], retained, start, moments, components, rows)
             )
             start += len(rows)
-    return made
+    return blocks
 
 
 def species_splitting(top: Top, constants: InternalRotationConstants, j: int) -> float:
-    """The largest |E_s(K) - E_A(K) - E_s(0) + E_A(0)| of the torsional ground state of any species s for |K| ≤ J, MHz."""
+    """The largest |E_s(K) - E_A(K) - E_s(0) + E_A(0)| over |K| ≤ J and species s of the torsional ground state, MHz."""
     model = turning_tops(top, constants)
     if isinstance(model, TwoTops):
         ground = [model.ground_energies(species, j) for species in model.species.values()]

@@ -1,4 +1,4 @@
-"""Constants of a molecule with one internal rotor, and its blocks: what is linear in the Hamiltonian, and how F and ρ enter it."""
+"""Constants of a molecule with one internal rotor: coefficients of the Hamiltonian, among them F, -2Fρ and Fρ², and its blocks."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
 
 COMPLEX = ("Dbc", "Dac")  # terms of a molecule without a plane of symmetry through the rho axis
-ANGLE_STEP = 1e-3  # radian, of a function of sines and cosines of up to six times the angle: 1e-5 of its slope
-DEFAULT_COUNT = 9  # n_v: 1 Hz for v_t = 0 at J = 25 of methanols and methyl formate
+ANGLE_STEP = 1e-3  # radian; terms go with sines and cosines of up to six times the angle, so slopes are good to 1e-5
+DEFAULT_COUNT = 9  # n_v; error 1 Hz for v_t = 0 at J = 25 of methanols and methyl formate
 
 
 @dataclass(frozen=True)
 class RamModel:
     """Constants in the rho-axis frame: MHz by name, rho without a unit. See `terms` for the names.
 
-    values: A, B, C, F, rho and any others. fold: of the top. angle: of ρ from the axis a of A, B, C and distortion towards b, radians; 0
-    where these are the axes of the rho-axis frame.
+    values: A, B, C, F, rho and any others. fold: fold of the top. angle: angle (radians, towards b) of ρ from the axis a of A, B, C and
+    distortion; 0 if these belong to the rho-axis frame.
     """
 
     values: Mapping[str, float]
@@ -53,17 +53,17 @@ class RamModel:
 
     @property
     def torsion(self) -> Torsion:
-        """The part that is solved first for each K."""
+        """The torsional part, which is solved first for each K."""
         barriers = {int(name[1:]): value for name, value in self.values.items() if name in BARRIERS}
         return Torsion(self.values["F"], self.values["rho"], TorsionalPotential(barriers), self.fold)
 
     @property
     def linear_names(self) -> tuple[str, ...]:
-        """The constants that are coefficients of the Hamiltonian themselves."""
+        """The constants that are themselves coefficients of the Hamiltonian."""
         return tuple(name for name in self.values if name not in ("F", "rho"))
 
     def terms(self, sigma: int) -> Terms:
-        """Sums of products by coefficient: the linear constants, then F, -2Fρ and Fρ²."""
+        """Operators by coefficient: the linear constants, then F, -2Fρ and Fρ²."""
         return {name: products_of(name, sigma, Axes(self.angle)) for name in self.linear_names} | torsional_products(
             sigma
         )
@@ -122,15 +122,15 @@ class RamModel:
         Parameters
         ----------
         sigma : int
-            0 for A, 1 for E.
+            Species: 0 for A, 1 for E.
         jmax, jmin : int
             Range of J.
         count : int, optional
             n_v, torsional functions retained for each K.
         waves : int, optional
-            k from -waves to waves of the free functions.
+            Free functions with k from -waves to waves.
         needed : array of int, optional
-            The J that are needed; by default all.
+            Values of J to solve; by default all.
 
         Returns
         -------
@@ -143,7 +143,7 @@ class RamModel:
 
 
 def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:
-    """The model of A, B, C, distortion, F0, delta, V3 ... in principal axes (PAM).
+    """The model from A, B, C, distortion, F0, delta, V3 ... in principal axes (PAM).
 
     >>> model = model_of_principal_axes({"A": 9e3, "B": 5e3, "C": 4e3, "F0": 157e3, "delta": 0.5, "V3": 1e7})
     >>> round(model.values["F"], 3), round(model.values["rho"], 8), round(model.angle, 8)

@@ -50,8 +50,8 @@ class NuclearConstant:
     body: Floats
 
     @property
-    def of_spin(self) -> str:
-        """The tensor of the spin: I, or Q = [I × I]² / 2I(2I-1)."""
+    def spin_tensor(self) -> str:
+        """Name of the spin's tensor: I, or Q = [I × I]² / 2I(2I-1)."""
         return "Q" if self.rank == 2 else "I"
 
     @property
@@ -60,7 +60,7 @@ class NuclearConstant:
         return bool(self.body[:2, 2].any() or self.body[2, :2].any())
 
     def elements(self, functions: TorsionRotation, angle: float) -> Elements:
-        """Reduced elements of the tensor of the rotation, ρ lying at an angle (radians) from a towards b."""
+        """Reduced elements of the tensor; ρ lies at an angle (radians) from a towards b."""
         matrix = turned_by(self.body, angle)
         if self.rank == 2:
             parts = real_components(spherical_components(matrix, 2, REPRESENTATION))
@@ -93,11 +93,11 @@ class Nuclei:
         return sum(spin.twice for spin in self.spins)
 
     def with_values(self, values: Mapping[str, float]) -> Nuclei:
-        """The same constants with other values."""
+        """These nuclei with other values of their constants."""
         return replace(self, values={name: values[name] for name in self.values})
 
     def with_slope_by_angle(self) -> Nuclei:
-        """And ∂/∂angle of the sum of the tensors of each nucleus and rank, as further constants of value 0."""
+        """These nuclei with a further constant of value 0 for each tensor: its derivative by the angle of ρ."""
         sums: dict[tuple[int, int], Floats] = {}
         for constant in self.constants:
             key, body = (constant.nucleus, constant.rank), self.values[constant.name] * constant.body
@@ -110,7 +110,7 @@ class Nuclei:
         )
 
     def in_plane(self) -> Nuclei:
-        """Those that a mirror ab leaves as they are; ValueError for others with a value."""
+        """These nuclei without constants that a mirror ab excludes; ValueError if such a constant has a value."""
         mirrored = tuple(constant for constant in self.constants if not constant.leaves_plane)
         for constant in self.constants:
             if constant.leaves_plane and self.values[constant.name]:
@@ -124,7 +124,7 @@ class Nuclei:
 
     @classmethod
     def of(cls, top: Top, effects: Sequence[QuantumEffect]) -> Nuclei:
-        """Those of the effects of nuclear spins.
+        """Nuclei and constants that the effects of nuclear spins declare.
 
         Raises ValueError for electron spins, total spins of like nuclei, and constants with powers of N.
         """
@@ -143,7 +143,7 @@ class Nuclei:
 
 
 def _constant(term: SpinTerm, spins: Sequence[str]) -> NuclearConstant:
-    """A term of one nucleus as a constant; ValueError for any other."""
+    """Constant of a term of one nucleus; ValueError for any other term."""
     powers = term.n2 or term.nz2 or term.ns
     if not isinstance(term.rotor, Cosines | CosinesWithN) or powers or len(set(term.spins)) != 1:
         raise ValueError(
@@ -168,5 +168,5 @@ def _spin_rotation(matrix: Floats) -> Operator:
 
 
 def real_components(components: NDArray[Any]) -> NDArray[Any]:
-    """Components as real numbers where they are."""
+    """Components as a real array if none has an imaginary part."""
     return components if np.abs(components.imag).max() else components.real

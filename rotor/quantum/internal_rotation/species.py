@@ -1,4 +1,4 @@
-"""Levels of one species of a molecule with an internal rotor: solved blocks with names."""
+"""Labelled levels of one species of a molecule with an internal rotor."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from rotor.quantum.operators.algebra import Operator
 class SpeciesBlocks:
     """H_b(c) = Σ c_i O_i,b of one species over torsion-rotation functions.
 
-    needed: functions whose blocks are made; None for all. Elements of each term are made when first used: a fit solves them at
-    many values, while `solve_once` makes those of their sum alone.
+    needed: functions whose blocks are made; None for all. Elements of each term are computed at first use, for fits that solve at many
+    values; `solve_once` computes only those of the sum.
     """
 
     functions: TorsionRotation
@@ -48,17 +48,17 @@ class SpeciesBlocks:
         return blocks_of_elements(tuple(self.terms), self.functions.labels, self.elements, self.needed)
 
     def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
-        """Levels with v_t up to `vt_max`; with `by_energy` Ka and Kc are counted by energy inside v_t."""
+        """Levels with v_t up to `vt_max`; `by_energy` counts Ka and Kc by energy inside v_t."""
         return self._solved(self.linear, coefficients, vt_max, by_energy)
 
     def solve_once(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
-        """The same, faster where the blocks are not needed at other values."""
+        """Levels as from `solve`, faster where no other values follow."""
         return self._solved(self.summed(coefficients), [1.0], vt_max, by_energy)
 
     def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> LinearBlocks:
-        """The blocks of one term, H at these coefficients, among functions whose Gershgorin discs reach below `below_mhz`."""
+        """Blocks of the single term H at these coefficients, over functions whose Gershgorin discs reach below `below_mhz`."""
         merged = _merged(self.terms, np.asarray(coefficients, dtype=float))
-        elements = self.functions.of_whole(self.functions.elements([merged]))
+        elements = self.functions.symmetry_allowed(self.functions.elements([merged]))
         needed = self.needed
         if below_mhz < math.inf:
             value = np.where(elements.rows == elements.columns, elements.values[0].real, -np.abs(elements.values[0]))
@@ -74,34 +74,31 @@ class SpeciesBlocks:
 
 
 def _merged(terms: Terms, coefficients: Floats) -> list[Product]:
-    """Σ c_i O_i as products, one for each operator of the torsion."""
+    """Σ c_i O_i with one product for each operator of the torsion."""
     rotations: dict[Operator | None, Operator] = {}
     for products, coefficient in zip(terms.values(), coefficients.tolist(), strict=True):
         for product in products if coefficient else ():
-            known = rotations.get(product.torsion, Operator())
-            rotations[product.torsion] = known + coefficient * product.rotation
+            partial_sum = rotations.get(product.torsion, Operator())
+            rotations[product.torsion] = partial_sum + coefficient * product.rotation
     return [Product(rotation, torsion) for torsion, rotation in rotations.items()]
 
 
 def _zeroth_order(linear: LinearBlocks, coefficients: Floats) -> Floats:
-    """⟨J K t|H|J K t⟩ of the functions: of combined ones the mean of s = ±1, without what couples K and -K."""
+    """⟨J K t|H|J K t⟩ of the functions; s = ±1 share their mean, which leaves out the coupling of K and -K."""
     diagonal = np.zeros(len(linear.block))
     here = np.flatnonzero(linear.rows == linear.columns)
     diagonal[linear.rows[here]] = (coefficients @ linear.values[:, here]).real
     labels = linear.labels
     minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
     plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
-    if len(minus) == len(plus) > 0:  # in one order of J, K, t
+    if len(minus) == len(plus) > 0:  # both lists have the same order of J, K, t
         diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
     return diagonal
 
 
 @dataclass(frozen=True, eq=False)
 class SpeciesLevels:
-    """Named levels of one species with v_t ≤ vt_max.
-
-    rows: where each level stands in the arrays of `solved`: the function of its block with its rank. By block, rising in energy.
-    """
+    """Labelled levels of one species with v_t ≤ vt_max, by block in order of energy; `rows` are their places in the arrays of `solved`."""
 
     source: SpeciesBlocks
     solved: SolvedBlocks
@@ -116,7 +113,7 @@ class SpeciesLevels:
 
     @cached_property
     def _named(self) -> tuple[Ints, Ints, Ints]:
-        """Rows, v_t, and the function that names each level."""
+        """Rows, v_t, and the function that labels each level."""
         t = self.functions.labels["t"]
         rows, numbers, names = [], [], []
         for block in self.blocks:
@@ -145,12 +142,12 @@ class SpeciesLevels:
 
     @property
     def energies(self) -> Floats:
-        """MHz, from the foot of the torsional potential."""
+        """Energies in MHz above the minimum of the torsional potential."""
         return np.asarray(self.solved.energies[self.rows])
 
     @cached_property
     def quanta(self) -> dict[str, Ints]:
-        """J, v_t, K (signed, of σ = 0 not below 0), Ka and Kc."""
+        """J, v_t, K (signed; not negative for σ = 0), Ka and Kc."""
         _, v, name = self._named
         labels = self.functions.labels
         j, k = labels["J"][name], labels["K"][name]
@@ -163,10 +160,10 @@ class SpeciesLevels:
         return {"j": j, "vt": v, "k": k, "ka": np.abs(k), "kc": kc}
 
     def _parity(self, name: Ints, v: Ints) -> Ints:
-        """(-1)^(J + Kc) of the levels that functions name."""
+        """(-1)^(J + Kc) of the levels that these functions label."""
         s = self.functions.labels["s"][name]
         return np.asarray(s * self.functions.torsion.parity[v] if self.functions.folded else s)
 
     def slopes(self, rows: Ints | None = None) -> Floats:
-        """∂E/∂c (levels, terms) of the levels at these rows of `solved`; by default of all."""
+        """∂E/∂c (levels, terms) of the levels at `rows` of `solved`; by default of all levels."""
         return self.solved.slopes_of(self.source.elements, self.rows if rows is None else rows)

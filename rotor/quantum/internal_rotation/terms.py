@@ -1,4 +1,4 @@
-"""Terms of a molecule with one internal rotor in the rho-axis frame, by name.
+"""Operators of a molecule with one internal rotor in the rho-axis frame, by the names of their constants.
 
     H = A Pz² + B Px² + C Py² + D_ab {Pz, Px} + D_bc {Px, Py} + D_ac {Pz, Py} + F (p - ρPz)² + ½V3 (1 - cos 3α) + ½V6 (1 - cos 6α) + ...
 
@@ -73,9 +73,9 @@ PRINCIPAL = Axes()
 
 
 def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product, ...]:
-    """The sum of products that a constant multiplies, for the species σ; axes: those that A, B, C and the letters of the name belong to.
+    """The operator that a constant multiplies, for the species σ, as a sum of products; ValueError for an unknown name.
 
-    Raises ValueError for an unknown name.
+    axes: the axes of A, B, C and of the letters in the name.
 
     >>> len(products_of("V3bc", 0)), len(products_of("FJ", 1))
     (1, 1)
@@ -90,9 +90,9 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
         return (Product(UNIT, 0.5 * (UNIT - cosine(int(name[1:]) // 3))),)
     match = SPELLED.fullmatch(name)
     if not name or match is None:
-        known = ", ".join(("A", "B", "C", "F", "rho", *BARRIERS, *NAMED, *distortion))
+        accepted = ", ".join(("A", "B", "C", "F", "rho", *BARRIERS, *NAMED, *distortion))
         raise ValueError(
-            f"{name!r} is no term of internal rotation: known are {known}, and operators such as J2p2 or Jz1p1cos3"
+            f"{name!r} is no term of internal rotation: known are {accepted}, and operators such as J2p2 or Jz1p1cos3"
         )
     if axes.angle:
         raise ValueError(f"{name}: terms that are spelled as operators belong to the rho-axis frame")
@@ -101,6 +101,7 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
 
 @lru_cache(maxsize=8)
 def _named(sigma: int, axes: Axes) -> Mapping[str, Product]:
+    """Operators of the table of this module."""
     a, b, c = axes.a, axes.b, axes.c
     plane = b @ b - c @ c
     p, p2 = p_alpha(sigma), p_alpha(sigma, 2)
@@ -135,7 +136,7 @@ def _named(sigma: int, axes: Axes) -> Mapping[str, Product]:
 
 
 def torsional_products(sigma: int) -> dict[str, tuple[Product, ...]]:
-    """What multiplies F, -2Fρ and Fρ² in F (p - ρPz)²."""
+    """Operators that F, -2Fρ and Fρ² multiply in F (p - ρPz)²."""
     return {
         "F": (Product(UNIT, p_alpha(sigma, 2)),),
         "F rho": (Product(-2.0 * j_z(), p_alpha(sigma)),),
@@ -152,6 +153,7 @@ def _spelled(match: re.Match[str], sigma: int) -> Product:
 
 
 def _rotation(match: re.Match[str]) -> Operator:
+    """The rotational factor of a spelled name."""
     p, z, n = (int(match[key] or 0) for key in ("j", "z", "n"))
     if match["z"] == "":
         z = 1
@@ -167,6 +169,7 @@ def _rotation(match: re.Match[str]) -> Operator:
 
 
 def _torsion(match: re.Match[str], sigma: int) -> Operator | None:
+    """The torsional factor of a spelled name; None for the unit operator."""
     factors: Sequence[Operator] = []
     if match["p"] is not None:
         factors = [p_alpha(sigma, int(match["p"] or 1))]

@@ -1,4 +1,4 @@
-"""What the truncation to n_v torsional functions costs."""
+"""Error of the truncation to n_v torsional functions."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.two_tops import EACH, TwoTops
 
-STEP = 4  # further functions that levels are compared with
-MARGIN = 1.5  # on the fall from n_v to n_v + 4 functions: the series falls at least fivefold in four functions
-ROUNDING = 64 * float(np.finfo(float).eps)  # of the largest energy in a block
+STEP = 4  # functions added for the comparison
+MARGIN = 1.5  # factor on the change from n_v to n_v + 4 functions: the error falls at least fivefold in four functions
+ROUNDING = 64 * float(np.finfo(float).eps)  # round-off relative to the largest energy in a block
 
 
 def truncation_mhz(model: RamModel | TwoTops, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
-    """A bound of how far levels with v_t ≤ vt_max lie above those of all torsional functions, MHz, at J = jmax, where it is largest.
+    """Bound (MHz) of the truncation error of levels with v_t ≤ vt_max at J = jmax, where it is largest.
 
-    Energies are upper bounds that fall with n_v. The fall from n_v to n_v + 4 functions (of two tops to 2 n_v products), half as much
-    again, and round-off.
+    Energies are upper bounds and fall with n_v. The bound is 1.5 times their change from n_v to n_v + 4 functions (2 n_v products for two
+    tops), plus round-off.
 
     >>> model = RamModel({"A": 9e3, "B": 4e3, "C": 3e3, "Dab": 0.0, "F": 2e5, "rho": 0.1, "V3": 1e7})
     >>> truncation_mhz(model, 3, 0, 9) < 1e-5
     True
     """
     largest, scale = 0.0, 0.0
-    two = isinstance(model, TwoTops)
-    more = min(2 * count, EACH**2) if two else min(count + STEP, 2 * waves + 1)
+    has_two_tops = isinstance(model, TwoTops)
+    enlarged = min(2 * count, EACH**2) if has_two_tops else min(count + STEP, 2 * waves + 1)
     for species in model.species.values():
         energies = []
-        for functions in (count, more):
-            solve: Any = model.blocks  # of σ, or of (σ1, σ2)
+        for functions in (count, enlarged):
+            solve: Any = model.blocks  # takes σ, or (σ1, σ2)
             blocks = solve(species, jmax, jmin=jmax, count=functions, waves=waves)
             levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])

@@ -1,11 +1,11 @@
-"""Two internal rotors in one frame: products of their torsional functions for each K as the basis of the rotation.
+"""Two internal rotors in principal axes: products of their torsional functions for each K as a basis of the rotation.
 
     H = A Pa² + B Pb² + C Pc² + Σ_i [F_i π_i² + ½ V3_i (1 - cos 3α_i)] + F12 (π1 π2 + π2 π1) + ½ V12 (1 - cos 3α1)(1 - cos 3α2)
         + ½ V12s sin 3α1 sin 3α2,                                               π_i = p_i - ρ_i·P
 
 in principal axes, z along a (H. Hartwig and H. Dreizler, Z. Naturforsch. 51a (1996) 923, for one frame of several tops). For each K the
-torsion of top i with ρ_iz K is solved, and the products of lowest energy are retained; what ρ has across z acts between them,
-p_i with its matrix over these functions. Species are pairs (σ1, σ2); (-σ1, -σ2) has the same energies.
+torsion of top i with ρ_iz K is solved, and the products of lowest energy are retained. The components of ρ across z act between them.
+Species are pairs (σ1, σ2); (-σ1, -σ2) has the same energies.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS
 
 AXES = (j_z(), j_x(), j_y())  # P along a, b, c
-EACH = 9  # functions of each top that products are made of
+EACH = 9  # functions of each top from which products are formed
 ALIKE = 1e-4  # largest difference of the directions (radian) and constants (relative) of equivalent tops: five digits of a file
-IN_PLANE = 1e-12  # of a component of ρ across the plane ab that is round-off
+IN_PLANE = 1e-12  # a smaller component of ρ across the plane ab is round-off
 Pair = tuple[Operator | None, Operator | None]  # operators of both torsions
 SPECIES = MappingProxyType({"AA": (0, 0), "AE": (0, 1), "EA": (1, 0), "EE": (1, 1), "EE*": (1, -1)})
 
@@ -50,13 +50,13 @@ class InternalTop:
 
     @property
     def torsion(self) -> Torsion:
-        """The part that is solved first for each K."""
+        """The torsional part, which is solved first for each K."""
         return Torsion(self.f_mhz, self.rho_abc[0], TorsionalPotential({3: self.v3_mhz, 6: self.v6_mhz}))
 
 
 @dataclass(frozen=True, eq=False)
 class ProductTorsion:
-    """Products of contracted functions of two tops; retained: (t1, t2) of those that are taken."""
+    """Products of contracted functions of two tops; retained: their pairs (t1, t2)."""
 
     first: ContractedTorsion
     second: ContractedTorsion
@@ -89,22 +89,22 @@ class ProductTorsion:
 
     @cached_property
     def parity(self) -> Ints:
-        """Of the products at K = 0 under reversal of both tops."""
+        """Sign of the products at K = 0 under reversal of both tops."""
         return np.asarray(self.first.parity[self.retained[:, 0]] * self.second.parity[self.retained[:, 1]])
 
     def tables(self, operator: Any, change: int) -> Floats:
         """⟨K + change, t'|o1 o2|K t⟩ as (K, t', t) of a pair of operators."""
         pair: Pair = (None, None) if operator is None else operator
         left, right = self.first.tables(pair[0], change), self.second.tables(pair[1], change)
-        one, two = self.retained[:, 0], self.retained[:, 1]
-        return np.asarray(left[:, one[:, None], one] * right[:, two[:, None], two])
+        t1, t2 = self.retained[:, 0], self.retained[:, 1]
+        return np.asarray(left[:, t1[:, None], t1] * right[:, t2[:, None], t2])
 
 
 @dataclass(frozen=True)
 class TwoTops:
-    """Constants of a molecule with two internal rotors, MHz: A, B, C and distortion in principal axes, both tops, and what couples them.
+    """Constants (MHz) of a molecule with two internal rotors: A, B, C and distortion in principal axes, both tops, and their coupling.
 
-    axis: about which C2 exchanges the tops, which then are equivalent; "" for others.
+    axis: axis of the C2 rotation that exchanges equivalent tops; "" if they are not equivalent.
     """
 
     rotation: Mapping[str, float]
@@ -117,7 +117,7 @@ class TwoTops:
 
     @property
     def species(self) -> Mapping[str, tuple[int, int]]:
-        """(σ1, σ2) by name; each stands for (-σ1, -σ2) too, and AE of equivalent tops for EA."""
+        """(σ1, σ2) by name; each stands for (-σ1, -σ2) too, and AE for EA if the tops are equivalent."""
         return {name: sigma for name, sigma in SPECIES.items() if name != "EA" or not self.axis}
 
     @property
@@ -226,7 +226,7 @@ class TwoTops:
     def slopes_by_rho(self, species: tuple[int, int]) -> dict[str, list[Product]]:
         """∂H/∂ρ_ig = F_i (-2 p_i P_g + {ρ_i·P, P_g}) + F12 (-2 p_j P_g + {ρ_j·P, P_g}), by the names rho_1a, rho_1b, ...
 
-        Of a molecule with the plane ab those along c are left out: they vanish.
+        With a mirror plane ab the slopes along c vanish and are left out.
         """
         p, along, slopes = [p_alpha(sigma) for sigma in species], self._along, {}
         for i, top in enumerate(self.tops):
@@ -259,7 +259,7 @@ class TwoTops:
 
 
 def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> TwoTops:
-    """Two tops from F0, delta and epsilon of each, and their barriers.
+    """Model of two tops from F0, delta, epsilon and the barrier of each.
 
     With the unit vectors λ_i of the axes, B_g = A, B, C and F0_i = ħ²/2I_αi, eliminating the velocities from T gives
 
@@ -272,7 +272,7 @@ def two_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> T
     rotation : mapping
         A, B, C and distortion in principal axes, MHz.
     constants : mapping
-        F0_1, delta_1, V3_1, F0_2 ... as `rotor.tops.internal_rotation` has them.
+        F0_1, delta_1, V3_1, F0_2 ..., named as in `rotor.tops.internal_rotation`.
 
     Returns
     -------
@@ -310,7 +310,7 @@ def torsional_kinetics(rotation: Mapping[str, float], constants: Mapping[str, fl
 
 
 def _exchanging(first: InternalTop, second: InternalTop) -> str:
-    """The axis about which C2 exchanges tops of equal constants, "" where they differ."""
+    """The axis of the C2 rotation that exchanges tops of equal constants; "" if there is none."""
     numbers = [np.array([top.f_mhz, top.v3_mhz, top.v6_mhz]) for top in (first, second)]
     if np.abs(numbers[0] - numbers[1]).max() > ALIKE * np.abs(numbers[0]).max() or abs(
         first.v3_mhz - second.v3_mhz
@@ -322,7 +322,7 @@ def _exchanging(first: InternalTop, second: InternalTop) -> str:
 
 
 def _lowest(energies: Floats, count: int, exchanged: bool) -> Ints:
-    """(t1, t2) of the lowest products (products, 2); of equivalent tops with the partner of each."""
+    """(t1, t2) of the lowest products (products, 2); equivalent tops retain the partner (t2, t1) of each."""
     pairs = np.column_stack(np.unravel_index(np.argsort(energies, axis=None, kind="stable"), energies.shape))
     retained = pairs[:count]
     if exchanged and tuple(retained[-1][::-1]) not in set(map(tuple, retained.tolist())):
@@ -331,13 +331,15 @@ def _lowest(energies: Floats, count: int, exchanged: bool) -> Ints:
 
 
 def _sum(operators: list[Operator]) -> Operator:
+    """Sum of operators."""
     return reduce(lambda x, y: x + y, operators, Operator())
 
 
 def _at(top: int, operator: Operator) -> Any:
-    """An operator of one top, the unit operator of the other."""
+    """Pair of torsional operators: `operator` for one top, the unit operator for the other."""
     return (operator, None) if top == 0 else (None, operator)
 
 
 def _both(first: Operator, second: Operator) -> Any:
+    """Pair of torsional operators, one for each top."""
     return (first, second)

@@ -91,7 +91,7 @@ CASES = [
 @pytest.mark.parametrize(("sigma", "n", "pairs"), CASES)
 @pytest.mark.parametrize("x", [1, -1])
 def test_spin_weights_are_those_of_permuted_spins(sigma, x, n, pairs):
-    counted = SpinCounts(n, pairs).of_species(sigma, np.array([x]))
+    counted = SpinCounts(n, pairs).functions_of_species(sigma, np.array([x]))
     assert counted.tolist() == [allowed_functions(sigma, x, n, pairs)]
 
 
@@ -99,10 +99,10 @@ def test_spin_weights_are_those_of_permuted_spins(sigma, x, n, pairs):
 def test_weights_sum_to_all_spin_functions(n):
     """Σ over C3 ≀ C2 of (spin functions of a species) times its dimension over its copies is n⁶."""
     counts, both = SpinCounts(n), np.array([1, -1])
-    total = counts.of_species((0, 0), both).sum() + counts.of_species((1, 1), both).sum()
-    total += 2 * counts.of_species((1, -1), both)[0] + 2 * counts.of_species((0, 1), both)[0]
+    total = counts.functions_of_species((0, 0), both).sum() + counts.functions_of_species((1, 1), both).sum()
+    total += 2 * counts.functions_of_species((1, -1), both)[0] + 2 * counts.functions_of_species((0, 1), both)[0]
     assert total == n**6
-    assert counts.of_species((0, 0), both).tolist() == ([6, 10] if n == 2 else [66, 55])
+    assert counts.functions_of_species((0, 0), both).tolist() == ([6, 10] if n == 2 else [66, 55])
 
 
 # Levels
