@@ -1,7 +1,7 @@
-"""The command line: verbs as they are declared in `rotor.verbs` and here, and one runner for all.
+"""The command line: verbs declared in `rotor.verbs` and in this folder, carried out by one runner.
 
-docs/command_line.md and docs/verbs are the contract: options, columns, JSON keys, error texts, exit codes. Nothing heavy is imported
-before a verb has looked at what it was given.
+docs/command_line.md and docs/verbs are the contract: options, columns, JSON keys, error texts, exit codes. Heavy modules are imported
+only after a verb has checked its input.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rotor.verbs.names import declared_verbs
 if TYPE_CHECKING:
     from rotor.verbs.verb import Verb
 
-VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
+VERBS = {  # with their lines in the list of verbs, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
     "emission": "Lines as a radio telescope sees them.",
     "info": "A molecule as a top: frame, constants, kind, Q(T).",
@@ -55,18 +55,18 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "cat": "A catalogue as a table, filtered or compared.",
     "new": "A commented scene file to begin with.",
     "plan": "What a scene will do, its cost, what it omits.",
-    "run": "A scene file run; a sweep goes on where it stopped.",
+    "run": "Run a scene file; a sweep resumes where it stopped.",
     "accuracy": "What accuracy costs in a scene: errors and times.",
 }
-VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # what is new says itself what it is
+VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # the list shows a new verb's declaration
 FILES = {"run": "run_scene"}  # a verb whose name is that of a function of this module
 ONE_THREAD = frozenset(
     {"spectrum", "levels", "raman", "thermo", "emission", "fit", "identify"}
-)  # small blocks; set before numpy is loaded
+)  # verbs of small matrix blocks, where threads of BLAS cost time; the limit must be set before numpy is loaded
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
-_ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
+_UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 
 EXAMPLES = """\b
 Examples:
@@ -95,7 +95,7 @@ Examples:
 
 
 def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer.Typer:
-    """The command with some of its verbs. listed: their names and lines of help alone, whose modules are not loaded."""
+    """The command with these verbs. listed: only their names and help lines; their modules are not loaded."""
     app = typer.Typer(
         cls=PlainGroup,
         add_completion=False,
@@ -127,11 +127,11 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
 
 
 def _listed() -> None:
-    """A verb in a list of verbs."""
+    """Placeholder of a verb in the list of verbs."""
 
 
 def declaration(name: str) -> tuple[Verb, Any]:
-    """A verb as it is declared, and what carries it out."""
+    """The declaration of a verb and the function that carries it out."""
     from rotor.cli.shared.runner import run_verb
 
     folder = "cli" if find_spec(f"rotor.verbs.{name}") is None else "verbs"
@@ -139,8 +139,8 @@ def declaration(name: str) -> tuple[Verb, Any]:
     return module.VERB, getattr(module, "run_declared", run_verb)
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         import rotor
 
         print(f"rotor {rotor.__version__}")
@@ -148,7 +148,7 @@ def _print_version(asked: bool) -> None:
 
 
 class Terminated(BaseException):
-    """The process was asked to end (SIGTERM, SIGHUP): what is not finished is removed, as after Ctrl-C."""
+    """SIGTERM or SIGHUP arrived: unfinished files are removed, as after Ctrl-C."""
 
 
 def _terminated(number: int, frame: object) -> None:
@@ -156,17 +156,17 @@ def _terminated(number: int, frame: object) -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Carry out a command and return its exit code; every error is one line on standard error, unless --debug is given."""
+    """Carry out a command and return its exit code. An error is one line on standard error, or a traceback with --debug."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if "--debug" in arguments:  # an option of the command, which one adds at the end
+    if "--debug" in arguments:  # typer expects it first; users add it at the end
         arguments = ["--debug", *(word for word in arguments if word != "--debug")]
     try:
         return _run(arguments)
-    except _ERROR_OF_USE as error:
-        return _fail(WRONG_INPUT, _text_of_use(error), arguments)
+    except _UsageError as error:
+        return _fail(WRONG_INPUT, _usage_text(error), arguments)
     except (NoAnswerError, RunStopped) as error:
         return _fail(NO_ANSWER, str(error), arguments)
-    except BrokenPipeError:  # the reader of the pipe has closed it: nothing more is written, at exit neither
+    except BrokenPipeError:  # the reader closed the pipe: write nothing more, also at exit
         _close_output()
         return 0
     except Terminated:
@@ -174,7 +174,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
-        return _fail(_code_of(error), _text_of(error), arguments)
+        return _fail(_exit_code(error), _message(error), arguments)
     except MemoryError:
         return _fail(NO_ANSWER, "not enough memory for this; fewer atoms, levels, lines or times need less", arguments)
     except Exception as error:  # a defect of the program, not of the input
@@ -186,15 +186,15 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
-    known = bool(words) and words[0] in VERBS
-    verbs = words[:1] if known else VERBS  # what is not asked for is not loaded
+    is_verb = bool(words) and words[0] in VERBS
+    verbs = words[:1] if is_verb else VERBS  # modules of other verbs are not loaded
     if words[:1] and words[0] in ONE_THREAD:
         jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
         process.one_thread_of_blas(int(jmax[1]) if jmax else None)
     if verbs == ["run"]:
         process.start_workers_ahead(arguments)
-    command = typer.main.get_command(_application(verbs, listed=not known))
-    # bytes of a file's name that the locale could not read are read as UTF-8, or shown as �
+    command = typer.main.get_command(_application(verbs, listed=not is_verb))
+    # undecodable bytes of file names are read as UTF-8, or shown as �
     provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     try:
         with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
@@ -205,10 +205,10 @@ def _run(arguments: list[str]) -> int:
         return end.exit_code
 
 
-def _text_of_use(error: Exception) -> str:
-    """What the parser of the command line says; of words that no argument takes, what would do."""
+def _usage_text(error: Exception) -> str:
+    """Message of the command-line parser, with a remedy for superfluous words."""
     text = str(error.format_message())  # type: ignore[attr-defined]
-    if text.startswith("No such command") and text.endswith("."):  # with a guess it ends with a question
+    if text.startswith("No such command") and text.endswith("."):  # with a guess, the text ends with a question mark
         return f"{text.rstrip('.')}; --help lists the commands"
     extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
     if extra == text:
@@ -216,32 +216,34 @@ def _text_of_use(error: Exception) -> str:
     return f"{extra.strip('()')}: more than the command takes; an option begins with --, --help shows what there is"
 
 
-def _code_of(error: ValueError | OSError) -> int:
-    """A disk that is full is no mistake in the input."""
+def _exit_code(error: ValueError | OSError) -> int:
+    """Exit code of an error: a full disk is not wrong input."""
     from rotor.formats.atomic_write import FULL
 
     return NO_ANSWER if isinstance(error, OSError) and error.errno in FULL else WRONG_INPUT
 
 
-def _text_of(error: ValueError | OSError) -> str:
+def _message(error: ValueError | OSError) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    if error.filename is None and _code_of(error) == NO_ANSWER:  # every file is named where it is written
+    if (
+        error.filename is None and _exit_code(error) == NO_ANSWER
+    ):  # errors of files carry their names: this is the output
         _close_output()
         return f"standard output: {error.strerror}"
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 
 def _close_output() -> None:
-    """Nothing more goes to standard output, what is still in its buffer neither."""
-    with suppress(OSError):  # of an output that is no file
+    """Discard standard output from now on, including its buffer."""
+    with suppress(OSError):  # standard output without a file descriptor
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(code: int, message: str, arguments: Sequence[str]) -> int:
     if "--debug" in arguments[:1]:
         traceback.print_exc()
-    with suppress(OSError):  # of a standard error that is full or closed
+    with suppress(OSError):  # standard error is full or closed
         print("error:", " ".join(message.split()), file=sys.stderr)
     return code
 
@@ -251,8 +253,8 @@ def main() -> None:
     process.begin()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback
-    for name in ("SIGTERM", "SIGHUP"):  # the second is not on Windows, and a process started by nohup goes on
+            stream.reconfigure(errors="replace")  # a terminal without Greek letters shows question marks
+    for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP; under nohup it stays ignored
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _terminated)

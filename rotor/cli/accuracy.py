@@ -1,4 +1,4 @@
-"""`rotor accuracy`: every numerical knob of a scene swept, error against a finer reference, and what each setting costs."""
+"""`rotor accuracy`: error and time of each value of every numerical knob of a scene, against a finer reference."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ Examples:
 
 @dataclass(frozen=True)
 class AccuracyRequest:
-    """The scene, and how long its sweeps may take."""
+    """A scene, and the processor time that its sweeps may take."""
 
     scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
     seconds: float = declared(
         120.0,
         Quantity("s", above=0, metavar="S"),
-        "Of the processor, for all sweeps together; what is beyond is left out",
+        "Processor time for all sweeps together; settings beyond it are left out",
     )
 
     def __post_init__(self) -> None:
@@ -42,20 +42,20 @@ class AccuracyRequest:
 
 
 @dataclass(frozen=True)
-class Swept:
+class AccuracyAnswer:
     """A scene, and errors and times of its knobs."""
 
     path: str
     scene: Scene
-    found: WorkPrecision
+    table: WorkPrecision
 
     def facts(self) -> dict[str, Any]:
-        """Every setting, by the keys of docs/verbs."""
-        return {"scene": self.path, **self.found.provenance, "settings": [asdict(row) for row in self.found.rows]}
+        """All settings, by the keys of docs/verbs."""
+        return {"scene": self.path, **self.table.provenance, "settings": [asdict(row) for row in self.table.rows]}
 
 
-def answer(request: AccuracyRequest, work: Work) -> Swept:
-    """The whole table; what there is of it is printed before an interrupt ends the command."""
+def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
+    """The complete table; an interrupt prints the knobs swept so far before it ends the command."""
     from rotor.scenes.accuracy_sweep import work_precision
     from rotor.scenes.scene_file import read_scene
 
@@ -69,16 +69,16 @@ def answer(request: AccuracyRequest, work: Work) -> Swept:
     except KeyboardInterrupt:
         work.note("interrupted: the knobs swept so far follow, no file is written")
         if so_far:
-            show(Swept(request.scene, scene, so_far[-1]), None)
+            show(AccuracyAnswer(request.scene, scene, so_far[-1]), None)
         raise
     if "plot" in work.files and not table.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
-    return Swept(request.scene, scene, table)
+    return AccuracyAnswer(request.scene, scene, table)
 
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str, str], object]]:
-    """A line on a terminal, rewritten before each calculation; nothing elsewhere."""
+    """A status line on a terminal, rewritten before each calculation."""
     if not sys.stderr.isatty():
         yield lambda knob, setting: None
         return
@@ -88,36 +88,36 @@ def _progress() -> Iterator[Callable[[str, str], object]]:
         yield lambda knob, setting: status.update(f"{knob}: {setting}")
 
 
-def draw(answer: Swept, path: Path, report: Report) -> None:
-    """Error against time, one panel a knob."""
+def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:
+    """Error against time, one panel for each knob."""
     from rotor.plots.work_precision import plot_work_precision
     from rotor.scenes.accuracy_panels import panels_of
 
     facts = {name: report.content[name] for name in ("command", "scene", "references")}
-    plot_work_precision(panels_of(answer.found), path, title=_title(answer.scene), facts=facts)
+    plot_work_precision(panels_of(answer.table), path, title=_title(answer.scene), facts=facts)
 
 
-def write_rows(answer: Swept, path: Path, report: Report) -> None:
+def write_rows(answer: AccuracyAnswer, path: Path, report: Report) -> None:
     """The table as a file."""
     from rotor.formats import write
 
-    write(answer.found, path)
+    write(answer.table, path)
 
 
 def _title(scene: Scene) -> str:
     return scene.title or f"a scene of the kind {scene.kind}"
 
 
-def show(answer: Swept, _: Any) -> None:
-    """Print a table for each knob, and what they are held against."""
-    table = answer.found
+def show(answer: AccuracyAnswer, _: Any) -> None:
+    """Print a table for each knob, then the references and remarks."""
+    table = answer.table
     print(_title(answer.scene))
     for (knob, error_of, unit), rows in table.curves().items():
         print()
         heading = f"error ({unit})" if unit else "error"
         show_table(Table(f"{knob}: {error_of}", ["setting", "", heading, "seconds"], [_cells(row) for row in rows]))
     if table.rows:
-        print("\n* what the scene has; seconds of the processor, without start-up and compilation")
+        print("\n* value in the scene; processor seconds, without start-up and compilation")
     facts = [("against", f"{name}: {text}") for name, text in table.references.items()]
     facts += [("remark", text) for text in table.remarks]
     show_facts([(name if not n or facts[n - 1][0] != name else "", text) for n, (name, text) in enumerate(facts)])
@@ -129,7 +129,7 @@ def _cells(row: Row) -> list[str]:
 
 VERB = Tool(
     name="accuracy",
-    about="What accuracy costs in a scene: each numerical knob swept, error against a finer reference, processor time.",
+    about="What accuracy costs in a scene: error and processor time of each value of its numerical knobs.",
     examples=EXAMPLES,
     request=AccuracyRequest,
     of="scene",
@@ -137,7 +137,7 @@ VERB = Tool(
     show=show,
     outputs=(
         Output("csv", (".csv",), "All settings with error and time", write_rows),
-        Output("plot", PICTURES, "Error against time, one panel a knob", draw),
+        Output("plot", PICTURES, "Error against time, one panel for each knob", draw),
     ),
     stepwise=True,
 )

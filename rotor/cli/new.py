@@ -1,4 +1,4 @@
-"""`rotor new`: a commented scene file to begin with."""
+"""`rotor new`: a commented scene file to start from."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ Examples:
 
 @dataclass(frozen=True)
 class NewRequest:
-    """Which scene."""
+    """The kind of scene, or the schema of all kinds."""
 
     kind: str | None = declared(None, Text(), ", ".join(SCENE_VERBS), option="KIND")
-    schema: bool = declared(False, Flag(), "The JSON Schema of scene files instead, for editors")
+    schema: bool = declared(False, Flag(), "Write the JSON Schema of scene files instead, for editors")
 
 
 @dataclass(frozen=True)
 class New:
-    """The text of a file; written: whether into a file."""
+    """The text of a scene or schema. written: whether it went into a file."""
 
     text: str
     written: bool
 
     def facts(self) -> dict[str, Any]:
-        """None."""
+        """Empty: `rotor new` has no JSON."""
         return {}
 
 
@@ -51,10 +51,10 @@ def answer(request: NewRequest, work: Work) -> New:
 
 
 def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
-    """ValueError for a file that is there: a scene that was edited is not lost."""
+    """Refuse to overwrite a file, which may hold an edited scene."""
     for path in outputs.get("out", ()):
         if path.exists():
-            raise ValueError(f"--out {path}: is there already; remove it, or give another name")
+            raise ValueError(f"--out {path}: exists already; remove it, or give another name")
 
 
 def _schema() -> str:
@@ -67,7 +67,7 @@ def _schema() -> str:
 
 VERB = Tool(
     name="new",
-    about="A scene file with every key, commented: what to simulate, to be edited and run.",
+    about="A scene file with every key, commented, to edit and run.",
     examples=EXAMPLES,
     request=NewRequest,
     answer=answer,
@@ -77,7 +77,7 @@ VERB = Tool(
         Output(
             "out",
             (".toml", ".json"),
-            "Write it into a file",
+            "Write to a file",
             lambda answer, path, report: write_text(path, answer.text),
         ),
     ),

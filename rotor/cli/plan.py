@@ -1,4 +1,4 @@
-"""`rotor plan`: what a scene will do, at what cost, and what it leaves out."""
+"""`rotor plan`: method, cost and neglected effects of a scene, before it is run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PlanRequest:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlanAnswer:
     """A scene and its plan."""
 
     path: str
@@ -42,15 +42,15 @@ class Planned:
         return {"scene": self.path, **self.plan.facts()}
 
 
-def answer(request: PlanRequest, work: Work) -> Planned:
+def answer(request: PlanRequest, work: Work) -> PlanAnswer:
     """The plan of the scene."""
     from rotor.scenes.scene_file import read_scene
 
     scene = read_scene(request.scene)
-    return Planned(request.scene, scene, scene.plan(folder=Path(request.scene).parent))
+    return PlanAnswer(request.scene, scene, scene.plan(folder=Path(request.scene).parent))
 
 
-def show(answer: Planned, _: Any) -> None:
+def show(answer: PlanAnswer, _: Any) -> None:
     """Print the plan."""
     from rotor.requests.plan import larger_items
 
@@ -61,8 +61,8 @@ def show(answer: Planned, _: Any) -> None:
         ("conserved" if plan.kind in ("tumble", "gas", "fluid") else "good numbers", ", ".join(plan.good) or "none"),
         *plan.parts,
         *((name, f"{count:,}") for name, count in plan.counts.items()),
-        ("seconds", f"{plan.seconds:.2g} of the processor, without start-up and compilation"),
-        ("memory", f"{plan.memory_mb:.2g} MB at the most, in use at one time"),
+        ("seconds", f"{plan.seconds:.2g} processor time, without start-up and compilation"),
+        ("memory", f"{plan.memory_mb:.2g} MB peak"),
     ]
     larger, others = larger_items(plan.left_out, lambda part: part.size, lambda part: part.name)
     texts = [_text(part) for part in larger] + ([others] if others else [])
@@ -76,7 +76,7 @@ def _text(part: LeftOut) -> str:
 
 VERB = Tool(
     name="plan",
-    about="Before a scene is run: method, basis, counts, seconds and memory, and the effects left out by size.",
+    about="Plan of a scene: method, basis, counts, seconds, memory, and neglected effects by size.",
     examples=EXAMPLES,
     request=PlanRequest,
     of="scene",

@@ -1,4 +1,4 @@
-"""`rotor run`: a scene file run, or all points of its sweep."""
+"""`rotor run`: one scene, or all points of its sweep."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from rotor.scenes.sweep import SweepResult
     from rotor.table import Table as Columns
 
-SHOWN = 20  # rows of the table in the report, and reasons of points that failed
-SHOWN_OF_REASON = 3  # points that failed for one reason
+SHOWN = 20  # rows of the table, and reasons of failed points, in the report
+SHOWN_OF_REASON = 3  # points listed for one reason
 
 EXAMPLES = """\b
 Examples:
@@ -49,34 +49,39 @@ SWEEP = "Sweep"
 
 @dataclass(frozen=True)
 class Options:
-    """The scene, and where its files go."""
+    """The scene, the folder of its files, and the processes that share the work."""
 
     scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
-    out: str = declared(".", Text(metavar="FOLDER"), "From which the files that are written are counted", panel=OUTPUT)
+    out: str = declared(
+        ".", Text(metavar="FOLDER"), "Folder of the files that the scene names in [outputs]", panel=OUTPUT
+    )
     workers: int | None = declared(
         None, Whole(1, MOST_WORKERS), "Spread the points of a sweep, or the work, over N processes", panel=NUMERICS
     )
     dask: str | None = declared(
         None,
         Text(metavar="ADDRESS"),
-        "Spread them over the workers of a Dask scheduler instead: tcp://head:8786",
+        "Use the workers of a Dask scheduler instead: tcp://head:8786",
         panel=NUMERICS,
     )
     dask_tls: str | None = declared(
         None,
         Text(metavar="CA,CERT,KEY"),
-        "Of an encrypted cluster: PEM files of the authority, the certificate, its key",
+        "PEM files of an encrypted cluster: authority, certificate, key",
         panel=NUMERICS,
     )
     record: str | None = declared(
-        None, Text(metavar="FILE"), "What is done; by default SCENE.sweep.jsonl in the folder of --out", panel=SWEEP
+        None,
+        Text(metavar="FILE"),
+        "Record of finished points; by default SCENE.sweep.jsonl in the folder of --out",
+        panel=SWEEP,
     )
-    retry_failed: bool = declared(False, Flag(), "Run again the points that failed before", panel=SWEEP)
+    retry_failed: bool = declared(False, Flag(), "Run failed points again", panel=SWEEP)
     errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", panel=OUTPUT)
 
 
 def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -> None:
-    """Run a scene: write the files that it names, and report; a sweep goes on where it stopped."""
+    """Run a scene, write the files that it names, and report; a sweep resumes where it stopped."""
     from rotor.cli.shared.runner import refuse_overwriting
     from rotor.scenes.run import refuse_outside
     from rotor.scenes.scene_file import read_scene
@@ -87,11 +92,11 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)
     swept = is_sweep(scene, _folder(options))
-    for name, used in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
-        if used and not swept:
+    for name, set_by_user in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
+        if set_by_user and not swept:
             raise ValueError(f"{name}: this scene has no sweep")
     if swept and options.errors:
-        raise ValueError("--errors: is of one scene; a sweep has the errors of each point in its files")
+        raise ValueError("--errors: needs a single scene; files of a sweep hold the errors of each point")
     refuse_outside(scene, options.out)
     files = Files()
     files.ask_json(typed.get("json"))
@@ -106,12 +111,12 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
 
 @contextmanager
 def _workers(options: Options) -> Iterator[Executor | None]:
-    """A pool of processes, or of workers of a cluster; None for one process."""
+    """A pool of processes or of cluster workers; None for a single process."""
     number = options.workers
     if options.dask is not None:
         if number is not None:
             raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
-        with _of_dask(options.dask, options.dask_tls) as cluster:
+        with _dask_pool(options.dask, options.dask_tls) as cluster:
             yield cluster
         return
     if options.dask_tls is not None:
@@ -126,14 +131,14 @@ def _workers(options: Options) -> Iterator[Executor | None]:
 
 
 @contextmanager
-def _of_dask(address: str, certificates: str | None) -> Iterator[Executor]:
+def _dask_pool(address: str, certificates: str | None) -> Iterator[Executor]:
     from contextlib import ExitStack
 
     from rotor.scenes.cluster import dask_executor, tls_security
 
     files = [] if certificates is None else certificates.split(",")
     if files and len(files) != 3:
-        raise ValueError(f"--dask-tls {certificates}: expected three files: of the authority, the certificate, its key")
+        raise ValueError(f"--dask-tls {certificates}: expected three files: authority, certificate, key")
     with ExitStack() as stack:
         try:
             pool = stack.enter_context(dask_executor(address, tls_security(*files) if files else None))
@@ -158,17 +163,17 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
 
 
 def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
-    """What the verb of the scene prints, and the files and seconds of the run."""
+    """Print the report of the verb, then files and seconds of the run."""
     from rotor.plots.view import WHOLE
     from rotor.reports.error_table import show_errors
-    from rotor.scenes.structures import given_of
+    from rotor.scenes.structures import entries_of
     from rotor.verbs.verb import verb_of
 
     scene, verb = result.scene, verb_of(result.scene.kind)
     head = {"command": command, "input": options.scene, "scene": options.scene, "kind_of_scene": scene.kind}
     with answering():
-        report = report_of(verb, result.answer, head, given_of(scene, verb), WHOLE)
-    content = {**report.content, **_of_run(result)}
+        report = report_of(verb, result.answer, head, entries_of(scene, verb), WHOLE)
+    content = {**report.content, **_run_facts(result)}
 
     def show() -> None:
         """The report, after the title of the scene."""
@@ -183,7 +188,7 @@ def _deliver(result: SceneResult, options: Options, files: Files, command: str) 
     deliver(files, {}, lambda: verb.json(result.answer, content), show)
 
 
-def _of_run(result: SceneResult) -> dict[str, Any]:
+def _run_facts(result: SceneResult) -> dict[str, Any]:
     accuracy = None if result.reached is None else asdict(result.reached)
     return {"accuracy": accuracy, "seconds": result.seconds, "files": [str(path) for path in result.files]}
 
@@ -195,7 +200,7 @@ def _notes(result: SceneResult) -> list[str]:
 
 
 def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
-    """The accuracy that the scene requests beside the numerical error, and beside the other errors where they are known."""
+    """The requested accuracy beside the numerical error, and beside larger errors if they are estimated."""
     reached = result.reached
     if reached is None:
         return []
@@ -206,8 +211,8 @@ def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
     return [("accuracy", text + (f"; {larger}" if larger else ""))]
 
 
-def _some_rows(table: Columns) -> Table:
-    """Some rows of a table, evenly chosen."""
+def _sampled_rows(table: Columns) -> Table:
+    """Evenly spaced rows of a table."""
     count, columns = len(table), table.columns
     cells = [[_cell(column[row]) for column in columns.values()] for row in evenly(count, SHOWN)]
     return Table("all rows" if len(cells) == count else f"{len(cells)} of {count} rows", list(columns), cells)
@@ -215,9 +220,8 @@ def _some_rows(table: Columns) -> Table:
 
 def _cell(value: Any) -> str:
     number = hasattr(value, "dtype") and value.dtype.kind == "f"
-    return (
-        ("-" if math.isnan(value) else f"{value:.8g}") if number else str(value)
-    )  # what a molecule does not have: A of a linear one
+    # NaN: a quantity that the molecule lacks, such as A of a linear one
+    return ("-" if math.isnan(value) else f"{value:.8g}") if number else str(value)
 
 
 def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
@@ -239,7 +243,7 @@ def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, 
         )
     seconds = time.monotonic() - start
     head = {"rotor_version": rotor.__version__, "command": command, "scene": options.scene, "kind_of_scene": scene.kind}
-    failed = [{"values": dict(made["values"]), "error": made["error"]} for made in result.failed]
+    failed = [{"values": dict(point["values"]), "error": point["error"]} for point in result.failed]
     content = {**head, "record": record, "computed": result.computed, "failed": failed, "files": list(result.files)}
     text = lambda: json_with_rows(result, "points", content)  # noqa: E731
     deliver(files, {}, text, lambda: _show_sweep(result))
@@ -249,7 +253,7 @@ def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, 
 
 
 def _summary(result: SweepResult, record: str, seconds: float) -> str:
-    """One line: how many points there are, were run now, and failed."""
+    """One line: number of points, points computed now and before, failures."""
     before = len(result) - result.computed
     parts = [f"{result.computed} computed now in {seconds:.3g} s"]
     parts += [f"{before} done before ({record})"] if before else []
@@ -258,12 +262,12 @@ def _summary(result: SweepResult, record: str, seconds: float) -> str:
 
 
 def _failures(result: SweepResult, record: str) -> str:
-    """The points that failed, those of one reason together."""
+    """The failed points, grouped by reason."""
     from rotor.scenes.sweep.points import text_of
 
     reasons: dict[str, list[str]] = {}
-    for made in result.failed:
-        reasons.setdefault(made["error"], []).append(text_of(made["values"]))
+    for point in result.failed:
+        reasons.setdefault(point["error"], []).append(text_of(point["values"]))
     listed = [
         f"{'; '.join(points[:SHOWN_OF_REASON])}{' and others' if len(points) > SHOWN_OF_REASON else ''}: {reason}"
         for reason, points in reasons.items()
@@ -276,12 +280,12 @@ def _failures(result: SweepResult, record: str) -> str:
 
 
 def _show_sweep(result: SweepResult) -> None:
-    show_table(_some_rows(result))
+    show_table(_sampled_rows(result))
 
 
 VERB = Tool(
     name="run",
-    about="Run a scene: write the files that it names, and report; a sweep goes on where it stopped.",
+    about="Run a scene, write the files that it names, and report; a sweep resumes where it stopped.",
     examples=EXAMPLES,
     request=Options,
     of="scene",

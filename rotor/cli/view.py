@@ -26,10 +26,10 @@ Examples:
 
 @dataclass(frozen=True)
 class ViewRequest:
-    """Spectrum, molecules, and how they are shown."""
+    """A spectrum, the molecules to predict, and display settings."""
 
     source: str = declared(
-        REQUIRED, Text(), "A spectrum: text, FITS or .npy; or the session file of one (.view.json)", option="SPECTRUM"
+        REQUIRED, Text(), "A spectrum: text, FITS or .npy; or a saved session (.view.json)", option="SPECTRUM"
     )
     molecules: tuple[str, ...] = declared(
         (), Names(), 'Species to predict: names, files, SMILES:..., "A=9 B=3 C=2 GHz"', option="MOLECULE"
@@ -54,7 +54,7 @@ class ViewRequest:
     noise: float | None = declared(
         None, Quantity(), "Noise of a channel; estimated from line-free channels", panel=PANEL
     )
-    port: int = declared(0, Whole(0, 65535), "Port on this machine; 0 takes any that is free", panel=OUTPUT)
+    port: int = declared(0, Whole(0, 65535), "Port on this machine; 0 takes a free port", panel=OUTPUT)
     no_browser: bool = declared(False, Flag(), "Print the address; open no browser", panel=OUTPUT)
 
     def __post_init__(self) -> None:
@@ -63,23 +63,23 @@ class ViewRequest:
 
 @dataclass(frozen=True)
 class Opened:
-    """A session, and the page that it is written into, if any."""
+    """An open session. page: file of an exported page, if any."""
 
     request: ViewRequest
     service: Service
     page: Path | None
 
     def facts(self) -> dict[str, Any]:
-        """None."""
+        """Empty: `rotor view` has no JSON."""
         return {}
 
 
 def answer(request: ViewRequest, work: Work) -> Opened:
-    """Open the session; it is given up when the command has ended."""
+    """Open the session; it is released when the command ends."""
     from rotor.viewer.assets import bokeh_js
     from rotor.viewer.opening import open_session
 
-    bokeh_js()  # says what to install, before anything is read
+    bokeh_js()  # fails early, with the command that installs it
     page = work.files.get("export", (None,))[0]
     service = open_session(
         request.source,
@@ -105,7 +105,7 @@ def export(answer: Opened, path: Path, _: Report) -> None:
 
 
 def show(answer: Opened, _: Report) -> None:
-    """Print what the page has, or serve the session until the process is interrupted."""
+    """Report the exported page, or serve the session until the process is interrupted."""
     service = answer.service
     if answer.page is None:
         _serve(service, answer.request)
@@ -120,7 +120,7 @@ def _serve(service: Service, request: ViewRequest) -> None:
     server = ViewServer(service, request.port)
 
     def started(address: str) -> None:
-        """Say where the page is, and open it."""
+        """Print the address of the page, and open it."""
         print(f"{address}\nsession: {service.session.path}; Ctrl-C ends", flush=True)
         if not request.no_browser and sys.stdout.isatty():
             import webbrowser

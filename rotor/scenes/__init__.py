@@ -1,4 +1,4 @@
-"""Scenes: what to simulate, written in one file; read, planned and run."""
+"""Scenes: simulations described in one file; read, planned and run."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from rotor.scenes.verbs import VERBS
 
 
 def _run(*arguments: Any, **named: Any) -> Any:
-    """`rotor.scenes.run.run_scene`, loaded when a scene is run."""
+    """Call `rotor.scenes.run.run_scene`, imported on first use."""
     from rotor.scenes.run import run_scene
 
     return run_scene(*arguments, **named)
 
 
 def _plan(*arguments: Any) -> Any:
-    """`rotor.scenes.plan.plan_of`, likewise."""
+    """Call `rotor.scenes.plan.plan_of`, imported on first use."""
     from rotor.scenes.plan import plan_of
 
     return plan_of(*arguments)

@@ -1,4 +1,4 @@
-"""Accuracy as an input: the cheapest settings that reach what a scene asks for, and the error that was reached.
+"""Accuracy as an input: the cheapest settings that reach the requested accuracy, and the error that is reached.
 
 | kind | accuracy of | what is chosen | error stated |
 |---|---|---|---|
@@ -13,8 +13,8 @@
 | torsion | levels | nothing: exact | functions, terms of the series |
 | gas, fluid | see `rotor.thermodynamics.gas_numerics`, `rotor.fluids.numerics` | | |
 
-It is the numerical error with the constants as given. Their own uncertainty, and orders of distortion that they do not have, are
-beside it in a plan. What double precision cannot give is refused.
+The accuracy concerns the numerical error with the constants as given. Uncertain constants and missing orders of distortion are listed
+in the plan. An accuracy beyond double precision is refused.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stan
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
-def asked_of(scene: Scene) -> float | None:
-    """The accuracy that a scene asks for, in the unit of its kind; None where it asks for none.
+def accuracy_of(scene: Scene) -> float | None:
+    """The accuracy that a scene requests, in the unit of its kind; None if it requests none.
 
     >>> from rotor.scenes.scene import StarkScene, ThermoScene
-    >>> asked_of(StarkScene(molecule="OCS", accuracy="1 kHz")), asked_of(ThermoScene(molecule="CO", accuracy="0.1 %"))
+    >>> accuracy_of(StarkScene(molecule="OCS", accuracy="1 kHz")), accuracy_of(ThermoScene(molecule="CO", accuracy="0.1 %"))
     (0.001, 0.001)
     """
     stated = accuracy_text(scene)
@@ -60,7 +60,7 @@ def asked_of(scene: Scene) -> float | None:
 
 
 def accuracy_text(scene: Any) -> str | float | None:
-    """The accuracy as the scene gives it, of the total or of the numerical error."""
+    """The accuracy as the scene states it, for the total or the numerical error."""
     stated: Accuracy = getattr(scene, "accuracy", None)
     return stated.total if isinstance(stated, TotalAccuracy) else stated
 
@@ -69,7 +69,7 @@ def unit_of(scene: Scene) -> str:
     """The unit of the accuracy of a scene.
 
     >>> from rotor.scenes.scene import GasScene
-    >>> [unit_of(GasScene(molecule="water", accuracy=one)) for one in ("1 K", "0.1 %", 0.02)]
+    >>> [unit_of(GasScene(molecule="water", accuracy=text)) for text in ("1 K", "0.1 %", 0.02)]
     ['K', '%', '']
     """
     numerics, text = numerics_of(scene.kind), str(accuracy_text(scene)).strip()
@@ -81,11 +81,11 @@ def unit_of(scene: Scene) -> str:
 
 
 def chosen(scene: Scene, request: Any) -> Choice:
-    """The request with the cheapest settings that reach the accuracy of its scene; without a field that decides on it, nothing is cheaper.
+    """The request with the cheapest settings that reach the accuracy of its scene; unchanged if no field decides on it.
 
-    Raises ValueError for what double precision cannot give, and where a knob is given by hand as well.
+    Raises ValueError for an accuracy beyond double precision, and for a knob that is set as well.
     """
-    goal, unit = asked_of(scene), unit_of(scene)
+    goal, unit = accuracy_of(scene), unit_of(scene)
     assert goal is not None
     if by_kind := numerics_of(scene.kind).goals[unit].choose:
         return by_kind(scene, request, goal)
@@ -96,8 +96,8 @@ def chosen(scene: Scene, request: Any) -> Choice:
 
 
 def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
-    """The error that an answer reached; ValueError where it is more than what was asked for, with the reason."""
-    goal = asked_of(scene)
+    """The error that an answer reached; ValueError, with the reason, if it exceeds the requested accuracy."""
+    goal = accuracy_of(scene)
     assert goal is not None
     unit = unit_of(scene)
     error = max(numerics_of(scene.kind).goals[unit].error(answer), choice.error)
@@ -109,32 +109,32 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
 
 
 def out_of_reach(goal: float, error: float, unit: str, how: str) -> ValueError:
-    """The refusal of an accuracy that the settings, or double precision, do not reach."""
+    """The error for an accuracy that the settings, or double precision, do not reach."""
     return ValueError(
         f"accuracy: {goal:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({how}); ask for less"
     )
 
 
 def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:
-    """The budget with the error that was found while the settings were chosen, where the answer alone does not say it."""
+    """The budget with the error estimated during the choice of settings, if the answer has no truncation error."""
     if not choice.error or budget.truncation.value is not None:
         return budget
     return replace(budget, truncation=ErrorTerm(choice.error, choice.how))
 
 
 def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
-    """ValueError where the total of a budget is larger than an accuracy, or not estimated: with the terms, and what would lower them."""
+    """Raise ValueError if the total of a budget exceeds the accuracy or is not estimated; the text has the terms and remedies."""
     requested = f"accuracy.total: {accuracy:g} {unit}".rstrip()
     if budget.unit != unit:
         raise ValueError(
             f"{requested}: the errors here are of {budget.of} in {budget.unit or 'parts of 1'}; use that unit"
         )
     alone = "an accuracy without total is that of the numerical error alone"
-    unknown = [(name, term) for name, term in budget.shown() if term.value is None]
-    if unknown:
+    unestimated = [(name, term) for name, term in budget.shown() if term.value is None]
+    if unestimated:
         texts = [
             f"{name} {term.text(unit)}" + (f" ({term.remedy} would lower it)" if term.remedy else "")
-            for name, term in unknown
+            for name, term in unestimated
         ]
         larger = filter(None, (budget.shortfall(accuracy), *texts))
         raise ValueError(f"{requested} cannot be given: {'; '.join(larger)}; {alone}")

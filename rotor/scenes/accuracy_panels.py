@@ -1,4 +1,4 @@
-"""From a sweep of knobs to the panels of its picture."""
+"""Panels of the work-precision picture from a sweep of knobs."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ TITLES = {
     "numerics.step": "length of a step", "numerics.molecules": "number of molecules", "numerics.iterations": "iterations of the search",
     "numerics.ewald_tolerance": "tolerance of Ewald's sum", "numerics.cutoff": "cutoff of the forces (Å)",
     "observables.min_lgint": "least intensity in the list, log10(nm² MHz)",
-    "observables.min_relative": "weakest line in the list, of the strongest",
+    "observables.min_relative": "weakest line in the list, relative to the strongest",
     "observables.least_depth": "least optical depth of a line", "observables.classical_molecules": "molecules of the classical gas",
 }  # fmt: skip
 
 
 def panels_of(table: WorkPrecision) -> list[Panel]:
-    """One panel a knob and error, with a title in words; the orders of a splitting share one.
+    """One panel for each knob and error, titled in words; orders of one splitting share a panel.
 
     >>> from rotor.scenes.accuracy_sweep import work_precision
     >>> from rotor.scenes.scene import LevelsScene
-    >>> [(one.title, one.of) for one in panels_of(work_precision(LevelsScene(molecule="CO")))]
+    >>> [(panel.title, panel.of) for panel in panels_of(work_precision(LevelsScene(molecule="CO")))]
     [('order of centrifugal distortion', 'energy of a level (MHz)')]
     """
     grouped: dict[tuple[str, str], dict[str, list[Point]]] = {}
@@ -36,7 +36,7 @@ def panels_of(table: WorkPrecision) -> list[Panel]:
 
 
 def title_of(knob: str) -> str:
-    """A knob in words; of a kind outside the package, the last part of its key.
+    """A knob in words; for unlisted knobs, the last part of the key.
 
     >>> title_of("numerics.jmax"), title_of("numerics.grid_points")
     ('highest J of the basis', 'grid points')

@@ -1,11 +1,11 @@
-"""What accuracy costs in one scene: every numerical knob swept, error against a reference about a hundred times finer, and time.
+"""Cost of accuracy in one scene: error and time of each value of every numerical knob, against a reference about 100 times finer.
 
     table = work_precision(read_scene("s.toml"))
 
-Coarse settings come first and the reference last. Where the time limit ends a sweep before its reference, the finest answer that
-there is serves as one, and the table says so. Times are those of the processor. Settings that are short are timed in rounds, each
-setting once a round, so that other work on the machine slows all of them alike; the median of the rounds counts. Times of neighbours
-that differ by less than their scatter have one value, the mean (`without_scatter`).
+Settings run from coarse to fine; the reference comes last. If the time limit ends a sweep before its reference, the finest answer
+serves as reference, and the table says so. Times are processor times. Short settings are timed in rounds, each setting once a round, so
+that other load on the machine slows all of them alike; the median counts. Neighbouring times that fall by less than their scatter are
+replaced by their mean (`without_scatter`).
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from rotor.scenes.scene import Scene
 from rotor.table import Table
 
 Progress = Callable[[str, str], object]
-SHORT_SECONDS, ROUNDS = 1.0, 5  # settings that are shorter are timed in so many rounds
-KNOWN_SECONDS = 0.1  # below which one call does not say how much longer the next one takes
-LEAST_SCATTER = 0.1  # of a time: processor time depends on what else uses memory and caches
-LEAST_SECONDS = 5e-3  # of one timing: shorter calls are repeated in it
-JUMP = 8.0  # a setting that takes so many times as long as the coarser one may have compiled a kernel
-COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated
+SHORT_SECONDS, ROUNDS = 1.0, 5  # shorter settings are timed in this many rounds
+KNOWN_SECONDS = 0.1  # shorter times do not predict the time of the next setting
+LEAST_SCATTER = 0.1  # relative, of a time: processor time depends on other users of memory and caches
+LEAST_SECONDS = 5e-3  # of one timing; shorter calls are repeated
+JUMP = 8.0  # a setting this many times slower than the coarser one may have compiled a kernel
+COMPILING_SECONDS = 20.0  # a longer first call is not repeated
 USUAL_LIMIT = 120.0  # seconds of processor time for all knobs together
 
 
 @dataclass(frozen=True)
 class Row:
-    """One error of one setting. own: whether the scene has it. seconds: of the processor, of one calculation."""
+    """One error of one setting. own: whether the scene has this setting. seconds: processor time of one calculation."""
 
     knob: str
     setting: str
@@ -52,10 +52,10 @@ class Row:
 
 @dataclass(frozen=True, repr=False)
 class WorkPrecision(Table):
-    """Errors and times of every setting of every knob.
+    """Errors and times of all settings of all knobs.
 
-    kind: of the scene. rows: coarse settings first. references: by knob, what errors are measured against. remarks: what has no
-    knob, what was not swept and why.
+    kind: of the scene. rows: coarse settings first. references: what errors are measured against, by knob. remarks: approximations
+    without a knob, and sweeps left out, with the reason.
     """
 
     kind: str
@@ -83,7 +83,7 @@ class WorkPrecision(Table):
         }
 
     def curves(self) -> dict[tuple[str, str, str], list[Row]]:
-        """The rows by knob, what the error is of, and unit."""
+        """The rows by knob, observable and unit."""
         by_knob: dict[tuple[str, str, str], list[Row]] = {}
         for row in self.rows:
             by_knob.setdefault((row.knob, row.error_of, row.unit), []).append(row)
@@ -91,9 +91,9 @@ class WorkPrecision(Table):
 
 
 def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
-    """All numerical knobs of a scene in a folder; where it asks for an accuracy, about the settings that are chosen for it.
+    """All numerical knobs of a scene in a folder; a requested accuracy first chooses the settings around which they are swept.
 
-    Raises ValueError for a scene with a sweep, and whatever the scene itself would be refused for.
+    Raises ValueError for a scene with a sweep, and for any scene that a run refuses.
     """
     if scene.sweep:
         raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
@@ -120,9 +120,9 @@ def work_precision(
     scene : Scene
         Without a sweep.
     folder : path
-        From which the files that the scene reads are counted.
+        Folder of the files that the scene reads.
     limit_seconds : float
-        Of processor time for all knobs together; each has an equal share of what is left.
+        Processor time for all knobs together; each knob gets an equal share of the remainder.
     progress : callable
         Called with the knob and the setting before each calculation.
     on_knob : callable
@@ -131,12 +131,12 @@ def work_precision(
     Returns
     -------
     WorkPrecision
-        Without rows where nothing can be swept; the remarks say why.
+        Without rows if nothing can be swept; the remarks say why.
 
     Raises
     ------
     ValueError
-        Whatever the scene itself would be refused for.
+        As a run of the scene.
 
     Examples
     --------
@@ -159,9 +159,9 @@ def work_precision(
 def sweep(
     knob: Sweep, limit_seconds: float, progress: Progress = lambda knob, setting: None
 ) -> tuple[list[Row], str, list[str], float]:
-    """The rows of one knob, what their errors are measured against, remarks on what was left out, and the seconds that were timed.
+    """Rows of one knob, the reference in words, remarks on omitted settings, and the seconds spent.
 
-    A setting that would go beyond the limit, judged by how much longer each setting took than the one before, is left out.
+    A setting is omitted if it would exceed the limit, judged by how the time grew from setting to setting.
     """
     settings = [*knob.settings, *([] if knob.reference is None else [Setting("the reference", knob.reference)])]
     done: list[tuple[Setting, Any, float]] = []
@@ -204,7 +204,7 @@ def sweep(
 
 
 def _next_seconds(taken: list[float]) -> float:
-    """How long the next setting may take: as much longer than the last one as that was than the one before; nothing is known at first."""
+    """Expected time of the next setting: the last time, scaled by its ratio to the one before; 0 without data."""
     if not taken:
         return 0.0
     if len(taken) == 1 or taken[-2] < KNOWN_SECONDS:
@@ -213,10 +213,10 @@ def _next_seconds(taken: list[float]) -> float:
 
 
 def timed(call: Callable[[], Any], usual: float | None = 0.0) -> tuple[Any, float, float]:
-    """The answer of a call, its processor time in seconds, and that of all calls that were made.
+    """The answer of a call, its processor time in seconds, and that of all calls made.
 
-    usual: seconds of the coarser setting, None for the first one, 0 where a single call is enough. A call may load modules or compile
-    if it is the first one or takes JUMP times as long as the coarser setting; it is made once more then, and its first time does not count.
+    usual: seconds of the coarser setting; None for the first setting; 0 if a single call is enough. The first call, and one that takes
+    JUMP times as long as the coarser setting, may load modules or compile; it is then repeated, and only the second time counts.
     """
     answer, first = _once(call)
     compiles = usual is None or (usual > 0 and first > max(JUMP * usual, KNOWN_SECONDS))
@@ -229,9 +229,9 @@ def timed(call: Callable[[], Any], usual: float | None = 0.0) -> tuple[Any, floa
 def in_rounds(
     calls: Sequence[Callable[[], Any]], first: Sequence[float], limit_seconds: float = math.inf
 ) -> tuple[list[float], float]:
-    """Times of calls in seconds, medians of rounds where they are short, and the seconds that the rounds took.
+    """Times of calls in seconds (medians of rounds for short calls), and the total time of the rounds.
 
-    first: the time of each by one call. Rounds end where another one would go beyond the limit.
+    first: the time of one call each. Rounds end before they would exceed the limit.
     """
     counts = {
         n: max(1, math.ceil(LEAST_SECONDS / max(seconds, 1e-9)))
@@ -255,10 +255,9 @@ def _repeat(call: Callable[[], Any], count: int) -> None:
 
 
 def without_scatter(samples: Sequence[Sequence[float]]) -> list[float]:
-    """Medians of the times of settings, coarse ones first; those that fall by less than their scatter have a common mean.
+    """Median times of settings, coarse ones first; times that fall by less than their scatter are replaced by their mean.
 
-    A finer setting that seems to be faster by less than the interquartile range of either, or than a tenth, is not known to be faster.
-
+    A finer setting that seems faster by less than the interquartile range of either, or by less than a tenth, is not known to be faster.
     >>> without_scatter([[1.0, 1.1, 1.3], [0.9, 1.0, 1.2], [2.0, 2.1, 2.2]])
     [1.05, 1.05, 2.1]
     >>> without_scatter([[5.0, 5.1, 5.2], [1.0, 1.1, 1.2]])

@@ -1,4 +1,4 @@
-"""What an accuracy comes to: the settings that were chosen for it, and the error that a result has reached."""
+"""Result of an accuracy goal: the chosen settings and the error that was reached."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Accuracy = str | float | TotalAccuracy | None
 
 @dataclass(frozen=True)
 class Reached:
-    """asked, error: in `unit`. how: which settings were chosen for it."""
+    """The accuracy that was asked for and the error reached, in `unit`. how: the settings chosen for it."""
 
     asked: float
     error: float

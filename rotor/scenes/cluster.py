@@ -1,7 +1,7 @@
-"""Workers of a Dask cluster as an executor: for what outgrows one machine.
+"""Workers of a Dask cluster as an executor, for work that exceeds one machine.
 
-Any `concurrent.futures.Executor` serves where the library takes `executor=`; this one is `distributed.Client.get_executor()`. The
-workers need this package, and what a scene reads and writes must be the same folders for all of them.
+The library takes any `concurrent.futures.Executor` as `executor=`; this one is `distributed.Client.get_executor()`. The workers need
+this package, and must see the folders that a scene reads and writes under the same paths.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ WAIT_SECONDS = 10  # for a scheduler to answer
 
 @contextmanager
 def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
-    """The workers of a Dask scheduler, until the end of the context; where it ends with an error, what has not begun is cancelled.
+    """The workers of a Dask scheduler, until the end of the context; after an error, pieces not yet begun are cancelled.
 
-    address: tcp://head:8786, or tls://head:8786. security: a `distributed.Security` with the certificates of an encrypted cluster, as
-    `tls_security` reads them; by default that of Dask's own configuration. Raises ValueError where dask.distributed is not
-    installed, with the command that installs it, and where no scheduler answers.
+    address: tcp://head:8786, or tls://head:8786. security: a `distributed.Security` with the certificates of an encrypted cluster
+    (`tls_security`); by default Dask's configuration. Raises ValueError if dask.distributed is not installed, with the command that
+    installs it, or if no scheduler answers.
     """
     try:
         from distributed import Client
@@ -48,9 +48,9 @@ def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
 
 
 def tls_security(authority: str, certificate: str, key: str) -> Any:
-    """The security of a client of an encrypted cluster: files in PEM of the authority, the client's certificate and its key.
+    """Security of a client in an encrypted cluster, from PEM files of the authority, the client's certificate and its key.
 
-    Raises ValueError for a file that is not there, and where dask.distributed is not installed.
+    Raises ValueError for a missing file, and if dask.distributed is not installed.
     """
     for name in (authority, certificate, key):
         if not Path(name).is_file():

@@ -1,4 +1,4 @@
-"""Choosing and sweeping a request by what its verb declares: the knobs of its fields, and its `rotor.requests.numerics.Numerics`."""
+"""Accuracy goals and sweeps of a request, as its verb declares them: knobs of its fields, and `rotor.requests.numerics.Numerics`."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from rotor.verbs.verb import Work, verb_of
 
 
 def numerics_of(kind: str) -> Numerics:
-    """The numerics of a kind; those of its declared knobs alone where its verb names none."""
+    """The numerics of a kind of scene."""
     numerics: Numerics = verb_of(kind).load_numerics()
     return numerics
 
 
 def answering(kind: str) -> Callable[[Any], Any]:
-    """What answers a request of a kind, with no options of printing."""
+    """Function that answers a request of a kind, with default display options."""
     verb = verb_of(kind)
     work = Work(shown=verb.read_shown(Entries()))
     return lambda request: verb.answer(request, work)
 
 
 def sweeps_of(kind: str, request: Any) -> Sweeps:
-    """Everything of a request that is swept: the knobs of its fields, then what its verb has beside them."""
+    """All sweeps of a request: knobs of its fields first, then further sweeps of its verb."""
     answer = answering(kind)
     declared = [knob.sweep(field, request, answer) for field, knob in knobs_of_fields(request)]
     further = numerics_of(kind).sweeps(request)

@@ -1,4 +1,4 @@
-"""What a scene will do, before it is done: method, basis, counts, time and memory - and what it leaves out, by size."""
+"""Plan of a scene: method, basis, counts, time, memory, and neglected effects by size."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from rotor.scenes.run import answer_as_run, choice_of, output_paths
 from rotor.scenes.scene import Scene
 from rotor.verbs.verb import verb_of
 
-SHARE = 0.1  # of what is uncertain besides, below which a numerical error does not count
-SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory of a scene that is run for its plan
+SHARE = 0.1  # of the model or data error: a smaller numerical error does not matter
+SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory up to which a scene is run for its plan
 
 
 def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.PathLike[str] = ".") -> Plan:
-    """The plan of a scene. One that takes a second or less is run too, so that whatever it would be refused for is known.
+    """The plan of a scene. A scene of at most a second is also run, so that its errors are found.
 
     Parameters
     ----------
     scene : Scene
         Without a sweep.
     folder : path
-        From which the files that the scene reads are counted.
+        Folder of the files that the scene reads.
     out : path
-        From which the files that it writes are counted; none is written.
+        Folder of the files that the scene would write; none is written.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.Pa
     Raises
     ------
     ValueError
-        Whatever the scene itself would be refused for, in the same words; of one that takes long, what is known before it is run.
+        As a run, in the same words; for long scenes, only what is known before the calculation.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.Pa
 
 
 def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None) -> Plan:
-    """The plan, with a warning where the run reaches no result, or with settings that would do; ValueError as the run."""
+    """The plan with a warning if the run has no result, or with coarser settings that would do; ValueError as in a run."""
     try:
         answer = answer_as_run(scene, request, choice)
     except NoResultError as reason:
@@ -71,9 +71,9 @@ def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None)
 
 
 def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> str:
-    """The accuracy that is a tenth of what the model or the data leave uncertain; empty where the settings are no finer than that.
+    """Advice to use an accuracy of a tenth of the model or data error; empty if the settings are no finer than that.
 
-    Of kinds whose accuracy one field decides on, and where that field is not given.
+    Only for kinds whose accuracy is set by one field, and if the scene leaves that field out.
     """
     from rotor.scenes.accuracy import chosen
 
@@ -86,7 +86,7 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
         return ""
     try:
         choice = chosen(msgspec.structs.replace(scene, accuracy=goal), request)
-    except ValueError:  # the field is given
+    except ValueError:  # the scene sets the field
         return ""
     if choice.how == NOTHING_CHEAPER:
         return ""
@@ -95,10 +95,10 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
 
 
 def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
-    """The plan, and the settings for the accuracy of the scene; None where it asks for none, or where the run alone finds them."""
-    from rotor.scenes.accuracy import asked_of, unit_of
+    """The plan, and the settings for the accuracy of the scene; None without an accuracy, or if only the run finds the settings."""
+    from rotor.scenes.accuracy import accuracy_of, unit_of
 
-    goal, numerics = asked_of(scene), numerics_of(scene.kind)
+    goal, numerics = accuracy_of(scene), numerics_of(scene.kind)
     if goal is None:
         return plan_of_request(scene.kind, request), None
     if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
@@ -117,7 +117,7 @@ def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
 
 
 def plan_of_request(kind: str, request: Any) -> Plan:
-    """The plan of a request; of a kind that says nothing of its plan that of a run."""
+    """The plan of a request; from a complete run if its kind declares no plan."""
     if plan := numerics_of(kind).plan:
         return plan(request)
     answer, table = answering(kind), verb_of(kind).table
@@ -125,9 +125,9 @@ def plan_of_request(kind: str, request: Any) -> Plan:
 
 
 def _checked(rounding: float, goal: float, choice: Choice) -> float:
-    """Rounding of the energies of the highest J in MHz; ValueError where it is clearly more than the accuracy asked for.
+    """Rounding error of the energies at the highest J in MHz; ValueError if it clearly exceeds the requested accuracy.
 
-    A run leaves out levels beyond the reach of the distortion constants, so that its rounding may be a little less.
+    The factor of 2: a run omits levels beyond the reach of the distortion constants, so that its rounding may be less.
     """
     from rotor.scenes.accuracy import out_of_reach
 

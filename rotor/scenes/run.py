@@ -1,4 +1,4 @@
-"""A scene run: its request filled, answered, and the answer written into the files that the scene names."""
+"""Run a scene: make its request, answer it, and write the files that the scene names."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def run_scene(
     scene : Scene
         Without a sweep; `rotor.scenes.sweep.run_sweep` runs one.
     folder : path
-        From which the files that the scene reads are counted.
+        Folder of the files that the scene reads.
     out : path
-        From which the files that it writes are counted.
+        Folder of the files that the scene writes.
     executor : Executor, optional
-        J, blocks or states are spread over it.
+        Shares the work: J, blocks or states.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def run_scene(
     Raises
     ------
     ValueError
-        What the scene asks for cannot be: with the key; another run is writing one of its files. Nothing is written then.
+        If the scene cannot be computed (with the key), or another run writes one of its files. No file is written then.
 
     Examples
     --------
@@ -78,15 +78,15 @@ def _run(
     request = request if choice is None else choice.request
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start
-    found = None if choice is None else _reached(scene, answer, choice)
+    outcome = None if choice is None else _reached(scene, answer, choice)
     table = kind.verb.table(answer)
-    _write(scene, kind, answer, table, targets, found)
+    _write(scene, kind, answer, table, targets, outcome)
     files = tuple(path for paths in targets.values() for path in paths)
-    return SceneResult(scene, request, answer, table, files, seconds, found)
+    return SceneResult(scene, request, answer, table, files, seconds, outcome)
 
 
 def choice_of(scene: Scene, request: Any) -> Choice | None:
-    """The settings that the accuracy of a scene asks for; None where it asks for none."""
+    """Settings for the accuracy of a scene; None if it requests none."""
     if getattr(scene, "accuracy", None) is None:
         return None
     from rotor.scenes.accuracy import chosen
@@ -96,7 +96,7 @@ def choice_of(scene: Scene, request: Any) -> Choice | None:
 
 
 def answer_as_run(scene: Scene, request: Any, choice: Choice | None) -> Any:
-    """The answer of a run without its files, or whatever it would raise; choice: the settings for its accuracy."""
+    """The answer of a run without its files, with the run's errors. choice: the settings for its accuracy."""
     kind = kind_of(scene)
     bare = msgspec.structs.replace(scene, outputs=type(scene.outputs)())  # type: ignore[attr-defined]
     answer = kind.answer(request if choice is None else choice.request, bare, ".", None)
@@ -106,7 +106,7 @@ def answer_as_run(scene: Scene, request: Any, choice: Choice | None) -> Any:
 
 
 def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:
-    """Refuse outputs outside the folder from which they are counted, so that a scene from elsewhere replaces no other files.
+    """Refuse outputs outside the folder `out`, so that a scene from elsewhere cannot replace other files.
 
     >>> from rotor.scenes.scene import LevelsScene
     >>> from rotor.scenes.sections import LevelsOutputs
@@ -125,17 +125,17 @@ def refuse_outside(scene: Scene, out: str | os.PathLike[str]) -> None:
 
 
 def output_names(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Every output that is a file, with the name that the scene gives it."""
+    """Pairs of output and file name, for all files that the scene names."""
     for name in suffixes_of(scene.kind):
-        given = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
-        names: list[str] = given if isinstance(given, list) else [] if given is None else [given]
-        yield from ((name, one) for one in names)
+        value = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
+        names: list[str] = value if isinstance(value, list) else [] if value is None else [value]
+        yield from ((name, file_name) for file_name in names)
 
 
 def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
-    """The suffixes of every output of a kind of scene that is a file."""
+    """Allowed suffixes of the outputs of a kind of scene."""
     outputs = verb_of(kind).outputs
-    return {one.name: one.suffixes for one in outputs if one.scene} | {"json": (".json",)}
+    return {output.name: output.suffixes for output in outputs if output.scene} | {"json": (".json",)}
 
 
 def _reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
@@ -147,17 +147,17 @@ def _reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
 def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     """The files that a scene writes, by the name of the output.
 
-    Raises ValueError for a suffix that an output has not, a folder that is not there, and one file for two outputs.
+    Raises ValueError for a wrong suffix, a missing folder, and one file for two outputs.
     """
-    found: dict[str, list[Path]] = {}
+    targets: dict[str, list[Path]] = {}
     suffixes = suffixes_of(scene.kind)
     for name, text in output_names(scene):
-        found.setdefault(name, []).append(_checked_path(f"outputs.{name}", within(out, text), suffixes[name]))
-    paths = [path.resolve() for every in found.values() for path in every]
+        targets.setdefault(name, []).append(_checked_path(f"outputs.{name}", within(out, text), suffixes[name]))
+    paths = [path.resolve() for named in targets.values() for path in named]
     for path in paths:
         if paths.count(path) > 1:
             raise ValueError(f"outputs: {path.name}: two outputs write this file; give another name")
-    return found
+    return targets
 
 
 def _checked_path(name: str, text: str, suffixes: tuple[str, ...]) -> Path:
@@ -172,17 +172,17 @@ def _checked_path(name: str, text: str, suffixes: tuple[str, ...]) -> Path:
 
 
 def _write(
-    scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]], found: Reached | None
+    scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]], outcome: Reached | None
 ) -> None:
-    """Write all files together, but those that the answer itself has written; without any, nothing of them is computed."""
+    """Write all files together, except those written during the calculation; without files, nothing is prepared."""
     if not targets.keys() - kind.grows:
         return
     from rotor.formats.atomic_write import write_together
     from rotor.scenes.scene_file import scene_text
 
     provenance: dict[str, Any] = {"scene": scene_text(scene)}
-    if found is not None:
-        provenance["accuracy"] = asdict(found)
+    if outcome is not None:
+        provenance["accuracy"] = asdict(outcome)
     if (budget := getattr(answer, "errors", None)) is not None:
         provenance["errors"] = budget.as_json()
 
@@ -192,5 +192,5 @@ def _write(
         write(table, path, settings=provenance)
 
     writers: dict[str, Writer] = {"csv": rows, "parquet": rows, "json": rows, **kind.writers(answer, scene, provenance)}
-    asked = {path: writers[name] for name, paths in targets.items() if name not in kind.grows for path in paths}
-    write_together(asked)
+    pending = {path: writers[name] for name, paths in targets.items() if name not in kind.grows for path in paths}
+    write_together(pending)

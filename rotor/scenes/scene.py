@@ -1,6 +1,6 @@
-"""A scene: what to simulate, as one object; the same as a scene file (`rotor.scenes.scene_file`).
+"""A scene: a simulation as one object, with the content of a scene file (`rotor.scenes.scene_file`).
 
-Nothing of the physics is imported here: a scene is data, checked for names and types; the library's requests check the rest.
+No physics is imported here: a scene is data, checked for names and types; requests check the values.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SCHEMA = 1
 
 
 class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind"):
-    """What every kind of scene has. schema: version of the format."""
+    """Fields of all kinds of scene. schema: version of the format."""
 
     schema: Annotated[int, said("version of this format")] = SCHEMA
     title: Annotated[str, said("a line for reports", "Water in the microwave region")] = ""
@@ -43,7 +43,7 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
 
     @property
     def kind(self) -> str:
-        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark, align, fit or emission."""
+        """Name of the kind, such as spectrum or stark; `rotor.verbs.names.SCENE_VERBS` lists all."""
         return str(self.__struct_config__.tag)
 
     def run(
@@ -58,15 +58,15 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         return result
 
     def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
-        """What the scene will do and leave out, see `rotor.scenes.plan.plan_of`."""
+        """Plan of the scene with neglected effects, see `rotor.scenes.plan.plan_of`."""
         plan: Plan = VERBS["plan"](self, folder)
         return plan
 
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the
-    answer. reached: the error, where the scene asks for an accuracy."""
+    """Result of a scene. request, answer: objects of the library. table: the rows. files: written files. seconds: time of the
+    calculation. reached: the error, if the scene requests an accuracy."""
 
     scene: Scene
     request: Any
@@ -77,7 +77,7 @@ class SceneResult:
     reached: Reached | None = None
 
     def _repr_html_(self) -> str:
-        """The rows for notebooks, and how far they can be trusted."""
+        """The rows and their errors, for notebooks."""
         from rotor.table import html_of_errors
 
         return self.table._repr_html_() + html_of_errors(self.answer)
@@ -85,7 +85,7 @@ class SceneResult:
 
 @cache
 def _scene_class(kind: str) -> Any:
-    """The structure of a kind of scene."""
+    """The structure of a kind of scene, made from the declaration of its verb."""
     verb = verb_of(kind)
     entries = entries_before(verb)
     if verb.accuracy:
@@ -101,7 +101,7 @@ def _scene_class(kind: str) -> Any:
 
 
 class Kinds(Mapping[str, type[Scene]]):
-    """The structures of all kinds of scene, each made from the declaration of its verb when it is first used."""
+    """The structures of all kinds of scene, each made on first use."""
 
     def __getitem__(self, kind: str) -> type[Scene]:
         if kind not in SCENE_VERBS:
@@ -120,7 +120,7 @@ KINDS = Kinds()
 
 
 def __getattr__(name: str) -> Any:
-    """The structure of a kind: `RamanScene`."""
+    """Structures by name, such as `RamanScene`."""
     kind = name.removesuffix("Scene").lower()
     if name.endswith("Scene") and kind in SCENE_VERBS and name == f"{kind.capitalize()}Scene":
         return KINDS[kind]
@@ -128,7 +128,7 @@ def __getattr__(name: str) -> Any:
 
 
 def molecule_of(scene: Scene) -> MoleculeSection | None:
-    """The molecule of a scene as a table, a name alone being its source; None where the scene has none.
+    """The molecule of a scene as a table (a plain name is its source); None if the scene has none.
 
     >>> molecule_of(KINDS["thermo"](molecule="water")).source
     'water'
@@ -138,5 +138,5 @@ def molecule_of(scene: Scene) -> MoleculeSection | None:
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:
-    """A file name of a scene, counted from the folder that the scene is in."""
+    """Path of a file that a scene names, relative to the scene's folder."""
     return str(Path(folder) / name)

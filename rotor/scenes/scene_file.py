@@ -1,6 +1,6 @@
-"""Scene files: TOML read and checked, written, and their JSON Schema.
+"""Scene files in TOML: reading with checks, writing, JSON Schema.
 
-An unknown key is an error with the nearest right one; types are checked by msgspec; ranges by the library's requests.
+An unknown key is an error that names the nearest valid key. msgspec checks types; the requests check ranges.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from rotor.scenes.scene import KINDS, SCHEMA, Scene
 _TYPES = {
     "int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "array": "a list", "object": "a table",
     "null": "nothing",
-}  # fmt: skip  # of msgspec, in words
+}  # fmt: skip  # types of msgspec in words
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
     """The scene of a file.
 
-    Raises ValueError, with file and key, for text that is no TOML, unknown keys, and values of another type.
+    Raises ValueError, with file and key, for invalid TOML, unknown keys and wrong types.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -39,7 +39,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def parse_scene(text: str, where: str = "scene") -> Scene:
-    """The scene that a text in TOML describes; `where` names it in errors.
+    """The scene of a TOML text; `where` names the text in errors.
 
     >>> parse_scene('schema = 1\\nkind = "levels"\\nmolecule = "CO"').molecule
     'CO'
@@ -56,9 +56,9 @@ def parse_scene(text: str, where: str = "scene") -> Scene:
 
 
 def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
-    """The scene that tables, as of a TOML file, describe.
+    """The scene of nested tables, as parsed from TOML.
 
-    Raises ValueError for a version or a kind that there is not, unknown keys, and values of another type.
+    Raises ValueError for an unknown version or kind, unknown keys and wrong types.
     """
     kind = _kind_of(content.get("schema"), content.get("kind"), where)
     rest = {key: value for key, value in content.items() if key != "kind"}
@@ -72,16 +72,16 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
 
 def _kind_of(schema: Any, kind: Any, where: str) -> type[Scene]:
     if schema != SCHEMA:
-        said = "it has none" if schema is None else f"this one has {schema!r}"
-        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {said}")
+        problem = "it has none" if schema is None else f"this one has {schema!r}"
+        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {problem}")
     if not isinstance(kind, str) or kind not in KINDS:
-        said = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), KINDS)}"
-        raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {said}")
+        problem = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), KINDS)}"
+        raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {problem}")
     return KINDS[kind]
 
 
 def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, place: str, scene: type[Scene]) -> None:
-    """Refuse keys that a table of a scene has not, with the place where the scene has such a key."""
+    """Refuse keys that a table does not have, and say where the scene has such a key."""
     hints = get_type_hints(kind)
     for key, value in content.items():
         if kind.__struct_config__.tag_field == key:
@@ -101,7 +101,7 @@ def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, plac
 
 
 def _other_place(key: str, scene: type[Scene]) -> str:
-    """Where a scene has a key of that name, outside tables of lists; empty for nowhere."""
+    """Where a scene has a key of this name, outside lists of tables; empty if nowhere."""
     if key in scene.__struct_fields__:
         return "; it stands before the first table"
     tables = [
@@ -113,20 +113,20 @@ def _other_place(key: str, scene: type[Scene]) -> str:
 
 
 def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
-    """Refuse an effect or a shape of a pulse that there is not, with the nearest."""
-    known = {
+    """Refuse an unknown effect or pulse shape, and name the nearest."""
+    tag_fields = {
         structure.__struct_config__.tag: structure.__struct_config__.tag_field for structure in structures_in(hint)
     }
     for number, item in enumerate(value if isinstance(value, list) else ()):
-        for word in {word for word in known.values() if word is not None and isinstance(item, Mapping)}:
-            if isinstance(item.get(word), str) and item[word] not in known:
+        for word in {word for word in tag_fields.values() if word is not None and isinstance(item, Mapping)}:
+            if isinstance(item.get(word), str) and item[word] not in tag_fields:
                 raise ValueError(
-                    f"{where}: {place}[{number}].{word}: {item[word]!r} is none; {nearest(item[word], known)}"
+                    f"{where}: {place}[{number}].{word}: {item[word]!r} is none; {nearest(item[word], tag_fields)}"
                 )
 
 
 def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any], str]]:
-    """Tables in a value, each with the structure that it must have and its number in a list, such as [0]."""
+    """Tables in a value: each with its structure and its place in a list, such as [0]."""
     structures = structures_in(hint)
     if isinstance(value, Mapping) and len(structures) == 1:
         return [(structures[0], value, "")]
@@ -145,21 +145,21 @@ def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any], str]
 
 
 def structures_in(hint: Any) -> list[Any]:
-    """The structures that a type allows."""
+    """The msgspec structures that a type allows."""
     if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
         return [hint]
     return [structure for part in get_args(hint) for structure in structures_in(part)]
 
 
 def _said(error: msgspec.ValidationError) -> str:
-    """The words of msgspec with the key first: "Expected `int`, got `str` - at `$.numerics.jmax`"."""
+    """Message of msgspec with the key first: "Expected `int`, got `str` - at `$.numerics.jmax`"."""
     text = str(error)
     match = re.fullmatch(r"(.*) - at `\$\.?(.*)`", text)
     return f"{match[2]}: {_plain(match[1])}" if match else _plain(text)
 
 
 def _plain(text: str) -> str:
-    """What msgspec says, with the words of a scene file: "Expected `int | null`, got `str`" is "expected a whole number, found a text".
+    """Message of msgspec in the words of scene files: "Expected `int | null`, got `str`" is "expected a whole number, found a text".
 
     >>> _plain("Object missing required field `pulses`")
     "the key 'pulses' is missing"
@@ -175,7 +175,7 @@ def _plain(text: str) -> str:
 
 
 def scene_text(scene: Scene) -> str:
-    """The scene as TOML; what has its default is left out, and every number reads back as the same double.
+    """The scene as TOML. Defaults are left out; numbers read back as the same doubles.
 
     >>> from rotor.scenes.scene import LevelsScene
     >>> print(scene_text(LevelsScene(molecule="CO")), end="")
@@ -190,7 +190,7 @@ def scene_text(scene: Scene) -> str:
 
 
 def _lines_of(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
-    """Lines of a table: its values first, then the tables in it."""
+    """Lines of a table: values first, then inner tables."""
     plain = {key: value for key, value in table.items() if not _is_table(value)}
     lines = [f"{_key(key)} = {toml_value(value)}\n" for key, value in plain.items() if value is not None]
     for key, value in table.items():
@@ -215,7 +215,7 @@ def _key(key: str) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML writes it, every number such that the same double is read back."""
+    """A value in TOML; a float reads back as the same double."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -228,7 +228,7 @@ def toml_value(value: Any) -> str:
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene as TOML, whole or not at all."""
+    """Write a scene as TOML, completely or not at all."""
     from rotor.formats.atomic_write import open_atomic
 
     with open_atomic(path, "w", encoding="utf-8", newline="\n") as handle:
@@ -236,7 +236,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON Schema of all kinds of scene, from which editors complete scene files."""
-    schemas: Any = Union[tuple(KINDS.values())]  # noqa: UP007  # of types that are known when it runs
+    """JSON Schema of all kinds of scene, for completion in editors."""
+    schemas: Any = Union[tuple(KINDS.values())]  # noqa: UP007  # the types are known only at run time
     schema: dict[str, Any] = msgspec.json.schema(schemas)
     return {"title": "A scene of rotor", **schema}

@@ -1,7 +1,7 @@
-"""The tables of a scene file: molecule, effects, conditions, observables, numerics and outputs, kind by kind.
+"""Tables of a scene file: molecule, effects, conditions, observables, numerics and outputs of each kind.
 
-Each field carries its description, from which templates and the JSON Schema are made. A quantity is a number in the unit that the
-description names, or a text with a unit of its own ("300 K"); a grid is a list of numbers or a text ("0:100kV/cm:21").
+Field descriptions feed templates and the JSON Schema. A quantity is a number in the unit of the description, or a text with a unit
+("300 K"); a grid is a list of numbers or a text ("0:100kV/cm:21").
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ MoleculeSection: Any = molecule_section()
 _SHARED = {
     "QuantumEffects": "SpectrumEffects", "VibrationSection": "SpectrumVibration", "BasisNumerics": "SpectrumNumerics",
     "FieldEffects": "StarkEffects", "BodySection": "TumbleBody",
-}  # fmt: skip  # tables that several kinds have
+}  # fmt: skip  # tables that several kinds share
 
 
 def __getattr__(name: str) -> Any:
-    """The structure of a table of a kind: `RamanConditions` is that of [conditions] of raman."""
+    """Structures by name: `RamanConditions` is the table [conditions] of raman."""
     name = _SHARED.get(name, name)
     if name == "EmittingMolecule":
         from rotor.verbs.emission import emitting_molecule
@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _section_of_list(name: str) -> Any:
-    """The structure of a table of a list, such as GaussianSection of [[pulses]]."""
+    """Structure of an item in a list of tables, such as GaussianSection of [[pulses]]."""
     from rotor.alignment.request import PULSES
     from rotor.classical.driven import BODY_EFFECTS
     from rotor.verbs.tables import structures_of

@@ -1,4 +1,4 @@
-"""From a scene to what a verb is given, and from a request that was answered back to a scene."""
+"""Entries of a verb from a scene, and the scene of an answered request."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from rotor.verbs.scene_tables import keyed
 from rotor.verbs.verb import Verb
 
 
-def given_of(scene: Any, verb: Verb) -> Entries:
-    """What a scene gives, by key; what has its default is not among it."""
+def entries_of(scene: Any, verb: Verb) -> Entries:
+    """Values of a scene by key, without defaults."""
     content: dict[str, Any] = msgspec.to_builtins(scene)
     tables = verb.subject.tables(content)
     return Entries(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
@@ -25,7 +25,7 @@ def given_of(scene: Any, verb: Verb) -> Entries:
 def saved_scene(
     verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], entries: Entries
 ) -> Any:
-    """The scene of a request that was answered. outputs: files by name. given: settings of files among it."""
+    """The scene of an answered request. outputs: files by name. entries: may hold settings of these files."""
     flat = {
         **verb.saved(request, subject, folder),
         **{f"outputs.{name}": _plain(value) for name, value in outputs.items()},

@@ -1,4 +1,4 @@
-"""Scene files to begin with: every key of a kind with what it means, those that need no change left as comments."""
+"""Templates of scene files: every key of a kind with its meaning; keys with usable defaults are comments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TAGS = {
 def template(kind: str) -> str:
     """A commented scene file of a kind.
 
-    Raises ValueError, with the kinds that there are, for another one.
+    Raises ValueError, with all kinds, for an unknown kind.
 
     >>> template("levels").splitlines()[3]
     'kind = "levels"'
@@ -40,7 +40,7 @@ def template(kind: str) -> str:
 
 @cache
 def _start(kind: str) -> dict[str, Any]:
-    """What a template has switched on, by dotted name."""
+    """Values that a template sets, by dotted name."""
     start = dict(verb_of(kind).start)
     if isinstance(start.get("molecule"), str):
         start["molecule.source"] = start.pop("molecule")
@@ -48,7 +48,7 @@ def _start(kind: str) -> dict[str, Any]:
 
 
 def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
-    """Lines of a table: its keys, then the tables in it."""
+    """Lines of a table: keys first, then inner tables."""
     hints = get_type_hints(structure, include_extras=True)
     inner: list[tuple[str, Any, bool]] = []
     for field in msgspec.structs.fields(structure):
@@ -78,7 +78,7 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
 
 
 def sweep_example(kind: str) -> dict[str, list[str]]:
-    """What a template sweeps: temperatures where the kind has one, else the first input of its start."""
+    """Example of a sweep: temperatures if the kind has them, else the first text input of its template."""
     verb = verb_of(kind)
     if kelvin := next(
         (name for name in ("conditions.temperature", "conditions.excitation") if name in verb.fields), ""
@@ -90,19 +90,19 @@ def sweep_example(kind: str) -> dict[str, list[str]]:
 
 
 def _is_list(hint: Any) -> bool:
-    """Whether a type is that of a list of tables."""
+    """Whether a type is a list of tables."""
     inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     return get_origin(inner) is list
 
 
 def _in_comment(line: str) -> str:
-    """A line of a table that is an example itself."""
+    """A line of a table that is shown as an example, turned into a comment."""
     text = line if "# example:" in line else line.replace("  # ", "  # example: ", 1)
     return text if text.startswith("#") else f"# {text}"
 
 
 def _key_line(field: Any, hint: Any, start: Any) -> str:
-    """A key with its value and description: in force where it has a start, else a comment."""
+    """A key with value and description: active if the template sets it, else a comment."""
     meta = next((item for item in get_args(hint) if isinstance(item, msgspec.Meta)), None)
     about = meta.description if meta is not None else ""
     example = (meta.examples or [None])[0] if meta is not None else None

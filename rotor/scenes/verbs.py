@@ -1,6 +1,6 @@
-"""What can be done with a scene: functions that the package `rotor.scenes` registers, above all of its modules.
+"""Functions on scenes, registered by the package `rotor.scenes`, which imports all of its modules.
 
-A scene is data and imports neither `rotor.scenes.run` nor `rotor.scenes.plan`; `scene.run()` and `scene.plan()` call what stands here.
+A scene is data and imports neither `rotor.scenes.run` nor `rotor.scenes.plan`; `scene.run()` and `scene.plan()` call these functions.
 """
 
 from __future__ import annotations

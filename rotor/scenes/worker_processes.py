@@ -1,9 +1,9 @@
-"""Processes that share work, each on its own: one that is killed costs the piece that it was at, not the others.
+"""Independent worker processes: one that is killed loses only its current piece of work.
 
-A `ProcessPoolExecutor` is broken for good when one of its processes ends, as the system ends one that takes too much memory. Here every
-process is a pool of one, which is started again. Each takes one thread of BLAS: several processes of several threads wait for each other.
+A `ProcessPoolExecutor` breaks for good when one of its processes ends, for instance killed for lack of memory. Here each process is a
+pool of one, which is restarted. Each uses one BLAS thread, since several processes with several threads wait for each other.
 
-On Linux the modules of the work are imported once, by a server from which the processes are forked; elsewhere by each of them. The server
+On Linux a server imports the common modules once, and the processes are forked from it; elsewhere each process imports them. The server
 can start before anything else of a command is loaded (`start_ahead`).
 """
 
@@ -26,7 +26,7 @@ from typing import Any, ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_STARTING = threading.Lock()  # the environment is that of the whole process
+_STARTING = threading.Lock()  # guards os.environ, which all threads share
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # a fork after imports is not safe on macOS
 _COMMON = (
     "rotor.scenes.sweep.run",
@@ -34,19 +34,24 @@ _COMMON = (
     "rotor.formats.tables",
     "rotor.quantum.estimates.budgets",
 )
-_OF_SMILES = ("rdkit.Chem", "rdkit.Chem.rdDistGeom", "rdkit.Chem.rdForceFieldHelpers", "rotor.molecules.readers.smiles")
+_SMILES_MODULES = (
+    "rdkit.Chem",
+    "rdkit.Chem.rdDistGeom",
+    "rdkit.Chem.rdForceFieldHelpers",
+    "rotor.molecules.readers.smiles",
+)
 _KIND = re.compile(r"""\bkind"?\s*[=:]\s*["'](\w+)["']""")
 
 
 class WorkerKilledError(RuntimeError):
-    """The process that computed a piece has ended before it was done."""
+    """A worker process ended before its piece was done."""
 
 
 class WorkerProcesses(Executor):
     """An executor of processes that do not depend on each other."""
 
     def __init__(self, number: int) -> None:
-        """So many processes."""
+        """Start `number` processes."""
         self._threads = ThreadPoolExecutor(number)
         self._free: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
         self._ended = False
@@ -55,7 +60,7 @@ class WorkerProcesses(Executor):
             self._free.put(pool)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """One call, in the next process that is free; its future has WorkerKilledError where that process ends."""
+        """Call in the next free process; the future raises WorkerKilledError if that process ends."""
         return self._threads.submit(self._call, fn, args, kwargs)
 
     def _call(self, fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
@@ -73,13 +78,13 @@ class WorkerProcesses(Executor):
             self._free.put(pool)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when they have done what was submitted, or, of that, only what has begun."""
+        """End the processes after all submitted calls, or with cancel_futures after the running ones."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         for pool in tuple(self._pools):
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def terminate(self) -> None:
-        """End the processes now; what they were at is lost."""
+        """End the processes at once; their current pieces are lost."""
         self._ended = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for pool in tuple(self._pools):
@@ -90,7 +95,7 @@ class WorkerProcesses(Executor):
 
 @contextmanager
 def worker_processes(number: int) -> Iterator[WorkerProcesses]:
-    """So many processes until the end of the context; where it ends with an error or Ctrl-C, they are ended at once."""
+    """`number` processes until the end of the context; an error or Ctrl-C ends them at once."""
     pool = WorkerProcesses(number)
     try:
         yield pool
@@ -101,17 +106,17 @@ def worker_processes(number: int) -> Iterator[WorkerProcesses]:
 
 
 def start_ahead(scene_text: str = "") -> None:
-    """Begin the server that imports what computing a scene needs, where there is one, and do not wait for it.
+    """Start the server that imports the modules of a scene's calculation, if the platform has one, without waiting for it.
 
-    scene_text: of its file; what it needs beyond the rest, by its kind and by what names its molecules. Modules that cannot be imported
-    are left to the work itself. Without effect once the server runs.
+    scene_text: of the scene file; its kind and molecules decide on further modules. Modules that cannot be imported are left to the
+    work itself. No effect once the server runs.
     """
     if _METHOD != "forkserver":
         return
     from multiprocessing import forkserver
 
     kinds = tuple(f"rotor.verbs.{name}" for name in _KIND.findall(scene_text)[:1])
-    smiles = _OF_SMILES if any(sign in scene_text for sign in ("SMILES:", ".csv", ".sdf", ".mol")) else ()
+    smiles = _SMILES_MODULES if any(sign in scene_text for sign in ("SMILES:", ".csv", ".sdf", ".mol")) else ()
     forkserver.set_forkserver_preload([*_COMMON, *kinds, *smiles])
     with _one_thread():
         forkserver.ensure_running()
@@ -119,7 +124,7 @@ def start_ahead(scene_text: str = "") -> None:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """One thread of BLAS for processes that start inside."""
+    """Context in which started processes have one BLAS thread."""
     with _STARTING:
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -134,7 +139,7 @@ def _one_thread() -> Iterator[None]:
 
 
 def _started_process() -> ProcessPoolExecutor:
-    """A pool of one process that has started with one thread of BLAS, whatever this process has."""
+    """A pool of one running process with one BLAS thread."""
     start_ahead()
     pool = ProcessPoolExecutor(
         1, mp_context=get_context(_METHOD), initializer=_begin, initargs=(_environment(), gc.get_threshold())
@@ -142,28 +147,28 @@ def _started_process() -> ProcessPoolExecutor:
     with _one_thread():
         try:
             pool.submit(_nothing)
-        except (EOFError, ConnectionError):  # the server was ended from outside; another one is started
+        except (EOFError, ConnectionError):  # the server was killed; submit starts another
             pool.submit(_nothing)
     return pool
 
 
 def _nothing() -> None:
-    """The first piece: a process is started when it has one."""
+    """First piece of work: submitting it starts the process."""
 
 
 def _environment() -> dict[str, str]:
-    """That of this process with one thread of BLAS; a server has the environment of its own start."""
+    """This process's environment, with one BLAS thread; the server holds an older copy."""
     return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
 
 
 def _begin(environment: dict[str, str], threshold: tuple[int, int, int]) -> None:
-    """Take the environment of the process that began, and its threshold of the search for cycles, 5 to 15 % of a point at Python's.
+    """Take over the parent's environment and its threshold of garbage collection (Python's default costs 5 to 15 % of a point).
 
-    Ctrl-C reaches all processes of a terminal: the one that began ends the others, which end with it whatever ends it.
+    Ctrl-C reaches all processes of a terminal, so workers ignore it: the parent ends them, and they end with it.
     """
     os.environ.clear()
     os.environ.update(environment)
-    gc.freeze()  # modules stay: they are not searched for what is no longer used
+    gc.freeze()  # exempt imported modules from garbage collection
     gc.set_threshold(*threshold)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(ValueError):  # not in the main thread
@@ -171,7 +176,7 @@ def _begin(environment: dict[str, str], threshold: tuple[int, int, int]) -> None
 
 
 def _end_with_parent() -> None:
-    """Wait for the end of the process that began, and end this one; a worker alone would wait for pieces for ever."""
+    """Wait for the end of the parent process, then exit; an orphaned worker would wait for work forever."""
     if (parent := parent_process()) is not None:
         parent.join()
         os._exit(1)

@@ -44,7 +44,7 @@ def contents() -> dict[str, bytes]:
         ("cat a.cat --range 1:2Hz --out ./a.cat", "--out a.cat: is an input of this command"),
         ("cat a.cat --measured a.cat --out a.cat", "--out a.cat: is an input of this command"),
         ("levels m.toml --save-scene m.toml", "--save-scene m.toml: is an input of this command"),
-        ("new levels --out s.toml", "--out s.toml: is there already"),
+        ("new levels --out s.toml", "--out s.toml: exists already"),
     ],
 )
 def test_no_file_that_is_read_is_written_over(files, words, said):

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rotor.scenes.accuracy import asked_of
+from rotor.scenes.accuracy import accuracy_of
 from rotor.scenes.scene_file import parse_scene
 
 LINES_OF_CO = (
@@ -95,7 +95,7 @@ def test_a_cut_is_lowered_where_it_leaves_out_too_much():
 
 @pytest.mark.parametrize(("accuracy", "value"), [("1 mK", 1e-3), ("2 K", 2.0)])
 def test_brightness_is_asked_for_in_kelvin(accuracy, value):
-    assert asked_of(parse_scene(HEAD.format("emission", accuracy) + EMISSION)) == pytest.approx(value)
+    assert accuracy_of(parse_scene(HEAD.format("emission", accuracy) + EMISSION)) == pytest.approx(value)
 
 
 def test_a_decade_coarser_misses(folder):

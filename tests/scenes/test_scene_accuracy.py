@@ -20,7 +20,7 @@ from rotor.fluids.numerics import answer_followed, conserved_bound_k, conserved_
 from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
-from rotor.scenes.accuracy import asked_of, unit_of
+from rotor.scenes.accuracy import accuracy_of, unit_of
 from rotor.scenes.kind import kind_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
@@ -204,8 +204,8 @@ def test_two_percent_of_a_correlation_function():
     """C1 and C2 are 1 at first: 2 % of them is 0.02; without times a percentage is of the heat capacity."""
     seen = GasObservables(times=[0.0, 0.1])
     curves, plain = (GasScene(molecule="water", accuracy="2 %", **more) for more in ({"observables": seen}, {}))
-    assert (asked_of(curves), unit_of(curves)) == (0.02, "")
-    assert (asked_of(plain), unit_of(plain)) == (2.0, "%")
+    assert (accuracy_of(curves), unit_of(curves)) == (0.02, "")
+    assert (accuracy_of(plain), unit_of(plain)) == (2.0, "%")
 
 
 def test_the_rounding_that_is_stated_bounds_the_true_one():
@@ -256,7 +256,7 @@ def test_what_cannot_be_given_is_refused(folder, scene, said):
 @pytest.mark.parametrize("scene", [LevelsScene, RamanScene])
 def test_levels_and_raman_lines_are_exact(scene):
     result = run_scene(scene(molecule="N2", accuracy="1 kHz"))
-    assert asked_of(scene(molecule="N2")) is None
+    assert accuracy_of(scene(molecule="N2")) is None
     assert result.reached.how == "exact: nothing cheaper"
     assert result.reached.error < 1e-6  # MHz: 8 ε of the 1.4e8 MHz of J = 48
 
