@@ -29,10 +29,10 @@ def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dic
     return records
 
 
-def the_first(count: int, what: str) -> str:
+def first_rows_title(count: int, what: str) -> str:
     """Title of a table that shows only the strongest (or lowest, brightest) rows.
 
-    >>> the_first(1, "strongest line"), the_first(3, "strongest line")
+    >>> first_rows_title(1, "strongest line"), first_rows_title(3, "strongest line")
     ('the strongest line', 'the 3 strongest lines')
     """
     return f"the {what}" if count == 1 else f"the {count} {what}s"
@@ -91,5 +91,5 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
         cells.append([f"{x:.3e}" for x in depth[rows]])
     labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
     columns = (*headings, "upper", "lower")
-    title = the_first(len(shown), "strongest line") if len(shown) < len(lines) else "all lines"
+    title = first_rows_title(len(shown), "strongest line") if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

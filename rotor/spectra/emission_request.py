@@ -84,7 +84,7 @@ _OF_EACH = ("column_per_cm2", "excitation_k", "fwhm_km_s", "velocity_km_s")
 
 def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
     """The source of each molecule of a subject, which has what some of them have otherwise in `values`."""
-    count, of_molecule = len(subject.values["molecules"]), subject.own
+    count, of_molecule = len(subject.values["molecules"]), subject.departures
     for name in _OF_EACH:
         values = getattr(layer, name)
         if len(values) not in (1, count):

@@ -1,1 +1,1 @@
-"""The verbs: what each of them asks, computes, writes and shows; one verb a file."""
+"""The verbs: request, answer, files and report of each; one verb in a file."""

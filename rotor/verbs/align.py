@@ -28,7 +28,7 @@ _TEXTS = {
     "--switched": ("switched", ("peak", "rise", "plateau", "fall", "start")),
     "--kick": ("kick", ("fluence", "time")),
     "--thz": ("thz", ("peak", "fwhm", "frequency", "centre")),
-}  # by option, the shape and its keys in order
+}  # shape of the pulse and order of its numbers, by option
 
 EXAMPLES = """\b
 Examples:
@@ -39,7 +39,7 @@ Examples:
 
 
 def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
-    """The top with what the pulses act on."""
+    """The top with the dipole or polarizability that the pulses act on."""
     pulses = FIELDS["pulses"].read(entries.values.get("pulses"), entries.style) or ()
     acts_on = {pulse.acts_on for pulse in pulses}
     if "dipole" in acts_on:
@@ -50,7 +50,7 @@ def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
 def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
     """All pulses of the options.
 
-    Raises ValueError, which names the option, for a text that is none, and where there is none at all.
+    Raises ValueError, with the option, for an unreadable text, and if no pulse is given.
     """
     axis = _named("--polarization", lambda: read_axis(typed.get("--polarization", "z")))
     pulses = [
@@ -73,7 +73,7 @@ def _named(option: str, make: Any) -> Any:
 
 
 def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
-    """A pulse of numbers between commas."""
+    """A pulse from numbers separated by commas."""
     shape, keys = _TEXTS[option]
     fields: dict[str, Any] = {field.key: field for field in all_fields(SHAPES[shape]).values()}
     parts = [part.strip() for part in text.split(",")]
@@ -84,8 +84,8 @@ def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
             f"{text!r}: expected {count} numbers between commas, in {', '.join(units)}; found {len(parts)}"
         )
     values = {fields[key].name: fields[key].read(part, "key") for key, part in zip(keys, parts, strict=False)}
-    made: Any = SHAPES[shape]
-    pulse: Pulse = made(**values) if shape == "thz" else made(**values, axis=axis)
+    structure: Any = SHAPES[shape]
+    pulse: Pulse = structure(**values) if shape == "thz" else structure(**values, axis=axis)
     return pulse
 
 
@@ -120,7 +120,7 @@ def _rows(path: str) -> tuple[list[str], list[list[float]]]:
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
-    """The request of a top and its pulses."""
+    """The request from a molecule, its pulses and the other inputs."""
     values = read_fields(AlignRequest, entries, subject)
     if not values.get("pulses"):
         raise ValueError('pulses: expected one or more, such as "gaussian peak=1e13W/cm2 fwhm=1ps"')
@@ -135,7 +135,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
 
 
 def draw(answer: AlignAnswer, path: Path, report: Report) -> None:
-    """The picture of the cosines as a file."""
+    """Draw the cosines against time."""
     from rotor.plots.alignment import plot_alignment
     from rotor.plots.picture import name_of_top
 
@@ -153,7 +153,7 @@ def _ensemble_text(trace: AlignmentTrace) -> str:
 
 
 def show(answer: AlignAnswer, report: Report) -> None:
-    """Print the conditions and the extremes of the cosines."""
+    """Print conditions, extremes of the cosines, sources and errors."""
     trace, content = answer.trace, report.content
     print(top_facts.heading(trace.top))
     show_facts(_facts(trace, content))
@@ -255,7 +255,7 @@ VERB = Verb(
         Extra(
             "--polarization",
             "NAME",
-            "Of all light: z, x, y, circular (in XY) or elliptical:R (I_X : I_Z = R : 1) [z]",
+            "Polarization of all pulses: z, x, y, circular (in XY) or elliptical:R (I_X : I_Z = R : 1) [z]",
             panel=CONDITIONS,
         ),
     ),

@@ -27,7 +27,7 @@ Examples:
 
 
 def spectrum_source(raw: Any) -> Any:
-    """A file by its name, or rows or columns of numbers."""
+    """The file name as text, or numbers as an array (peaks, 2 or 3): frequency, intensity[, error]."""
     if isinstance(raw, str | os.PathLike):
         return os.fspath(raw)
     import numpy as np
@@ -40,7 +40,7 @@ def spectrum_source(raw: Any) -> Any:
 
 @dataclass(frozen=True)
 class SpectrumInput:
-    """Which spectrum, and the geometry of its first species."""
+    """The spectrum, and the geometry of its first species."""
 
     source: Any = declared(
         None,
@@ -63,12 +63,12 @@ class SpectrumInput:
 
 @dataclass(frozen=True)
 class SpectrumFile(SubjectKind):
-    """The peaks of a file, and a geometry."""
+    """Peaks from a file or array, and a geometry."""
 
-    fields = {one.identity: one for one in all_fields(SpectrumInput).values()}  # noqa: RUF012
+    fields = {field.identity: field for field in all_fields(SpectrumInput).values()}  # noqa: RUF012
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The peaks and the geometry that were given."""
+        """Read the peaks and the geometry."""
         from rotor.formats import read
         from rotor.formats.peak_files import peaks_of_columns, read_peaks
 
@@ -87,26 +87,26 @@ class SpectrumFile(SubjectKind):
         return Subject(values, (inputs,), inputs.source if is_file else "numbers", place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The inputs, files counted from the folder of the scene."""
+        """The inputs, with files relative to the folder of the scene."""
         if not isinstance(subject.molecules[0].source, str):
-            raise ValueError("a scene holds no numbers of a spectrum; give a file")
+            raise ValueError("a scene cannot hold the numbers of a spectrum; give a file")
         content = written_fields(subject.molecules[0])
         return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
 
 
 def draw(answer: AssignAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw peaks, predictions and residual peaks."""
     from rotor.plots.assign import plot_assignment
 
     plot_assignment(answer, path, view=report.view, provenance=report.command)
 
 
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
-    """The assigned lines of the first species, ready for `rotor fit`."""
+    """Write the assigned lines of the first species, as input of `rotor fit`."""
     from rotor.formats.assigned_lines import write_assigned_lines
 
     if not answer.species:
-        raise ValueError(f"{path}: no species was found, so that there are no lines to write")
+        raise ValueError(f"{path}: no species was found: no lines to write")
     write_assigned_lines(answer.species[0].lines, path)
 
 
@@ -138,9 +138,9 @@ def _verdict(answer: AssignAnswer) -> str:
 
 def _table(number: int, species: AssignedSpecies) -> Table:
     constants = species.constants
-    open_ = species.refined.open_constants
+    undetermined = species.refined.open_constants
     rows = [
-        [name, value_text(constants[name], constants.uncertainties[name]), "open" if name in open_ else ""]
+        [name, value_text(constants[name], constants.uncertainties[name]), "open" if name in undetermined else ""]
         for name in constants.values
     ]
     title = f"species {number}, {species.word} (p = {species.probability:.4f})" + (

@@ -1,4 +1,4 @@
-"""Inputs of `tumble`: an ordinary body or bare moments, how it starts, and times with their unit."""
+"""Inputs of `tumble`: a named body or bare moments, initial conditions, and times with units."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _body(name: Any) -> NamedBody:
 
 
 def three(raw: Any, unit: str = "") -> Three:
-    """Three finite numbers, in a unit of their own or in `unit`."""
+    """Three finite numbers; a text may carry a unit, else `unit` holds."""
     if isinstance(raw, str):
         if raw.count(",") != 2 or ":" in raw:
             raise ValueError(f"{raw!r}: expected three numbers, such as 0.6,0.8,1.0")
@@ -61,7 +61,7 @@ def _moments(raw: Any) -> Three:
 
 
 def in_si(moments: Any) -> bool:
-    """Whether moments are given with a unit."""
+    """Whether the moments carry a unit."""
     return isinstance(moments, str) and bool(_UNIT_AT_END.search(moments))
 
 
@@ -72,7 +72,7 @@ def _units(raw: Any) -> str:
 
 
 class Vector(Reader):
-    """Three numbers, whose unit is that of the body; a text is read where the body is known."""
+    """Three numbers in the body's units. Text is read once the body is known."""
 
     scene_type: Any = list[float]
 
@@ -85,14 +85,14 @@ class Vector(Reader):
 
 
 class Times(Grid):
-    """Times in the unit of the body; a text is read where the body is known."""
+    """Times in the body's unit. Text is read once the body is known."""
 
     def read(self, raw: Any) -> Any:
-        """What was given."""
+        """The input unchanged."""
         return raw
 
     def write(self, value: Any) -> Any:
-        """A text as it is, numbers as a list."""
+        """Text unchanged, numbers as a list."""
         return value if isinstance(value, str) else super().write(value)
 
 
@@ -101,19 +101,19 @@ class BodyInput:
     """A rigid body instead of a molecule, in any coherent units."""
 
     body: NamedBody | None = declared(
-        None, Custom(_body, lambda body: body.name, "NAME"), "Ordinary body instead of a molecule: book, phone, racket or wing-nut",
+        None, Custom(_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
         "body.name", option="--body", panel=MOLECULE, common=True, example="book",
     )  # fmt: skip
     moments: Three | None = declared(
         None, Custom(_moments, list, "I1,I2,I3", list[float] | str),
-        'Principal moments instead of a molecule, in any order: "1,2,3 kg m2", or plain numbers of any coherent units', "body.moments",
+        'Principal moments instead of a molecule, in any order: "1,2,3 kg m2", or plain numbers in any coherent units', "body.moments",
         panel=MOLECULE, common=True, example=[0.3, 0.35, 0.4],
     )  # fmt: skip
     units: str = declared("", Custom(_units), '"SI" (kg m², s, J), or "" for any coherent set', "body.units", option="")
     angular_momentum: Three | None = declared(
         None,
         Vector("L1,L2,L3"),
-        "At time 0 in principal axes",
+        "Angular momentum at time 0, in principal axes",
         "body.angular_momentum",
         option="",
         example=[1.8, 0.4, -0.9],
@@ -130,14 +130,14 @@ class BodyInput:
 
 @dataclass(frozen=True)
 class MotionInput:
-    """How a body starts, what acts on it, and when it is looked at."""
+    """Initial motion of a body, torques on it, and output times."""
 
     temperature_k: float = declared(
         300.0, Quantity("K", above=0, metavar="T"), "Temperature of the thermal mean |L| of a molecule (K)",
         "conditions.temperature", common=True,
     )  # fmt: skip
     angular_momentum: Three | None = declared(
-        None, Vector("L1,L2,L3"), "At time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
+        None, Vector("L1,L2,L3"), "Angular momentum at time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
         "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
     )  # fmt: skip
     times: Any = declared(
@@ -145,7 +145,7 @@ class MotionInput:
         example="0:2:201",
     )  # fmt: skip
     effects: tuple[Any, ...] = declared(
-        (), BODY_EFFECTS, 'What acts on a body: a name and its parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
+        (), BODY_EFFECTS, 'Torque or other effect: its name and parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
         "effects", option="--effect", common=True,
     )  # fmt: skip
     tolerance: float = declared(

@@ -1,4 +1,4 @@
-"""`rotor cat`: a catalogue shown, filtered, drawn, with measured lines merged in, or compared with another list."""
+"""`rotor cat`: show, filter or draw a catalogue, merge measured lines into it, or compare it with another list."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ Examples:
 
 @dataclass(frozen=True)
 class CatAnswer:
-    """Lines, and how another list differs from them."""
+    """The selected lines, and the comparison with another list."""
 
     request: CatRequest
     lines: Catalogue
     compared: Compared | None
 
     def facts(self) -> dict[str, Any]:
-        """What the lines are, by the keys of docs/verbs."""
+        """Number, range and species of the lines, by the keys of docs/verbs."""
         import numpy as np
 
         from rotor.formats.spcat.compare import in_mhz
@@ -64,16 +64,16 @@ class CatAnswer:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the frequencies can be trusted, as the file prints them."""
+        """Error budget of the frequencies, from the errors in the file."""
         from rotor.formats.spcat.catalogue_budget import catalogue_budget
 
         return catalogue_budget(self.lines)
 
 
 def answer(request: CatRequest, work: Work) -> CatAnswer:
-    """The lines that are left, and the comparison where one is requested."""
+    """The selected lines, and the comparison if one is requested."""
     if request.compare is not None and work.view.vertical is not None:
-        raise ValueError("--plot-vertical: a comparison shows both lists whole; expected without --compare")
+        raise ValueError("--plot-vertical: cannot be combined with --compare, whose picture fixes its vertical axis")
     lines = request.chosen(read_catalogue(request.file))
     if request.measured is not None:
         from rotor.formats.spcat.compare import with_measured_lines
@@ -83,14 +83,14 @@ def answer(request: CatRequest, work: Work) -> CatAnswer:
 
 
 def write_lines(answer: CatAnswer, path: Path, report: Report) -> None:
-    """The lines as a catalogue."""
+    """Write the lines as a catalogue."""
     from rotor.formats.spcat.text.cat import write_cat
 
     write_cat(answer.lines, path)
 
 
 def draw(answer: CatAnswer, path: Path, report: Report) -> None:
-    """Sticks of the lines, measured ones in another colour; or both lists of a comparison, with the differences."""
+    """Draw the lines with measured ones in another colour; for a comparison, both lists and the differences."""
     name, command = Path(answer.request.file).name, str(report.content["command"])
     if answer.compared is not None:
         from rotor.plots.comparison import plot_comparison
@@ -104,12 +104,12 @@ def draw(answer: CatAnswer, path: Path, report: Report) -> None:
 
 
 def json_of(answer: CatAnswer, content: Mapping[str, Any]) -> str:
-    """The facts with every line."""
+    """The facts and all lines as JSON."""
     return json_text({**content, "lines": [line_record(answer.lines, row) for row in range(len(answer.lines))]})
 
 
 def show(answer: CatAnswer, report: Report) -> None:
-    """Print what the lines are and the strongest of them, or what a comparison found."""
+    """Print a summary and the strongest lines, or the result of a comparison."""
     lines, content, shown = answer.lines, report.content, answer.request.top_lines
     print(content["input"])
     first, last = content["range_mhz"] or (math.nan, math.nan)

@@ -1,4 +1,4 @@
-"""What `rotor cat` takes: which lines of a catalogue are shown, and what they are compared with."""
+"""Inputs of `rotor cat`: the selection of lines, and the list for a comparison."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COMPARED = "Comparison"
 
 @dataclass(frozen=True)
 class CatRequest:
-    """Which lines are shown, and what they are compared with."""
+    """The selection of lines, and the list for a comparison."""
 
     file: str = declared(REQUIRED, Text(metavar="FILE"), "Catalogue (.cat, .cat.gz)", option="FILE")
     range_mhz: tuple[float, float] = declared(
@@ -25,7 +25,7 @@ class CatRequest:
     min_lgint: float | None = declared(
         None,
         Quantity(least=-300, most=300),
-        "Leave out lines with log10(nm² MHz) below",
+        "Least log10 of the intensity in nm² MHz",
         option="--min-lgint",
         none="none",
     )
@@ -33,13 +33,13 @@ class CatRequest:
     compare: str | None = declared(
         None,
         Text(metavar="OTHER"),
-        "Another .cat, an .int, or a molecule to predict: what differs in OTHER",
+        "List for a comparison: another .cat, an .int, or a molecule to predict",
         panel=COMPARED,
     )
     temperature: float | None = declared(
         None,
         Quantity("K", above=0, metavar="T"),
-        "Of the intensities of FILE, for a molecule (K; by default what FILE says, else 300)",
+        "Temperature of the intensities in FILE, for a molecule (K; by default what FILE says, else 300)",
         panel=COMPARED,
     )
     isotope: tuple[str, ...] = declared(
@@ -51,19 +51,19 @@ class CatRequest:
     as_spcat: bool = declared(
         False,
         Flag(),
-        "OTHER, an .int, is predicted with SPCAT's own numbers also where it errs, see rotor spectrum",
+        "Predict the .int as SPCAT does, also where SPCAT errs (see rotor spectrum)",
         panel=COMPARED,
     )
     full_basis: bool = declared(
         False,
         Flag(),
-        "OTHER, an .int, is predicted with every K in the basis, whatever KNMIN and KNMAX say",
+        "Predict the .int with every K in the basis, ignoring KNMIN and KNMAX",
         panel=COMPARED,
     )
-    top_lines: int = declared(20, Whole(0), "How many lines are shown", option="--top", panel=OUTPUT)
+    top_lines: int = declared(20, Whole(0), "Number of lines shown", option="--top", panel=OUTPUT)
 
     def __post_init__(self) -> None:
-        """--temperature and --isotope belong to a molecule that is predicted, --as-spcat and --full-basis to an .int file."""
+        """Check that options of a predicted molecule or of an .int file have such a file or molecule."""
         check_fields(self)
         other = (self.compare or "").lower()
         for name in ("as_spcat", "full_basis"):
@@ -74,7 +74,7 @@ class CatRequest:
                 raise ValueError(f"{name}: expected with --compare and a molecule to predict; a file has its own")
 
     def chosen(self, lines: Catalogue) -> Catalogue:
-        """The lines in the range and above the cut."""
+        """The lines in the range and above the intensity cut."""
         import numpy as np
 
         from rotor.formats.spcat.compare import in_mhz

@@ -1,4 +1,4 @@
-"""`rotor catalogue`: a local catalogue of lines in one file: add sources, list species, look into a range."""
+"""`rotor catalogue`: a local catalogue of lines in one file: add sources, list species, show a range."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ Examples:
   rotor catalogue show CO "HC3N, v7=1" --catalogue lines.rotorcat --range 84:116GHz --csv lines.csv"""
 
 
-ADDED = "What is added"
+ADDED = "Added sources"
 
 
 @dataclass(frozen=True)
 class CatalogueRequest:
-    """What is done with which catalogue."""
+    """The action, the catalogue, and the inputs of the action."""
 
     action: str = declared(REQUIRED, Text(ACTIONS), "add, list or show", option="ACTION")
     words: tuple[str, ...] = declared(
@@ -44,14 +44,14 @@ class CatalogueRequest:
     )
     catalogue: str = declared("lines.rotorcat", Text(metavar="FILE"), "The catalogue")
     catdir: str | None = declared(
-        None, Text(metavar="FILE"), "Table of species with Q(T); those beside .cat files", panel=ADDED
+        None, Text(metavar="FILE"), "Table of species with Q(T); by default the one beside .cat files", panel=ADDED
     )
-    licence: str = declared("", Text(), "Licence of what is added", panel=ADDED)
-    citation: str = declared("", Text(), "Citation of what is added", panel=ADDED)
-    database: str = declared("", Text(metavar="NAME"), "Database of what is added", panel=ADDED)
+    licence: str = declared("", Text(), "Licence of the added sources", panel=ADDED)
+    citation: str = declared("", Text(), "Citation of the added sources", panel=ADDED)
+    database: str = declared("", Text(metavar="NAME"), "Database of the added sources", panel=ADDED)
     range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Frequencies of show (MHz)", option="--range")
     top_lines: int = declared(
-        20, Whole(0), "How many lines are shown, the strongest at 300 K", option="--top", panel=OUTPUT
+        20, Whole(0), "Number of lines shown, the strongest at 300 K", option="--top", panel=OUTPUT
     )
 
     def __post_init__(self) -> None:
@@ -62,7 +62,7 @@ class CatalogueRequest:
 
 @dataclass(frozen=True)
 class Added:
-    """Sources that were added to a catalogue, and faults of others."""
+    """Sources added to a catalogue, and sources with faults."""
 
     catalogue: str
     added: list[Any]
@@ -79,13 +79,13 @@ class Added:
         }
 
     def show(self) -> None:
-        """Print how much was added."""
+        """Print the number of added lines and sources."""
         total = f"{sum(species.lines for species in self.added)} lines from {len(self.added)} sources"
         show_facts([("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))])
 
 
 def add(request: CatalogueRequest, work: Work) -> Added:
-    """Add sources; faults are reported, and the others added."""
+    """Add sources; those with faults are reported and left out."""
     from rotor.formats.catalogue.build import SourceFacts, add_sources
 
     facts = SourceFacts(request.database, request.licence, request.citation)
@@ -101,7 +101,7 @@ def add(request: CatalogueRequest, work: Work) -> Added:
 
 @dataclass(frozen=True)
 class Listed:
-    """The species of a catalogue, and the number of its lines."""
+    """The species of a catalogue, and its number of lines."""
 
     catalogue: str
     table: Columns
@@ -132,8 +132,8 @@ def list_species(request: CatalogueRequest, work: Work) -> Listed:
 
 
 @dataclass(frozen=True)
-class Found:
-    """Lines of a range, rising in frequency."""
+class LinesInRange:
+    """Lines of a range, in order of frequency."""
 
     request: CatalogueRequest
     rows: list[tuple[Any, ...]]
@@ -146,7 +146,7 @@ class Found:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the frequencies can be trusted, by the errors of their sources."""
+        """Error budget of the frequencies, from the errors in their sources."""
         import numpy as np
 
         from rotor.formats.spcat.catalogue_budget import stored_budget
@@ -154,7 +154,7 @@ class Found:
         return stored_budget(*np.array([row[1:4] for row in self.rows], dtype=np.float64).reshape(-1, 3).T)
 
     def show(self) -> None:
-        """Print the strongest at 300 K in order of frequency."""
+        """Print the strongest lines at 300 K, in order of frequency."""
         count = f"{len(self.rows)} of {self.species} species"
         errors = error_facts(self.errors.as_json())
         show_facts([("catalogue", self.request.catalogue), ("lines", count), *errors])
@@ -163,13 +163,13 @@ class Found:
             show_table(_table(self.rows, self.request.top_lines))
 
 
-def find_lines(request: CatalogueRequest, work: Work) -> Found:
+def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
     """Lines of a range."""
     from rotor.formats.catalogue.database import LineCatalogue
 
     with LineCatalogue(request.catalogue) as catalogue:
         species = catalogue.species_between(*request.range_mhz, list(request.words))
-    return Found(request, _line_rows(species), len(species))
+    return LinesInRange(request, _line_rows(species), len(species))
 
 
 _COLUMNS = (
@@ -186,23 +186,23 @@ _COLUMNS = (
 
 
 def _line_rows(species: Sequence[Any]) -> list[tuple[Any, ...]]:
-    """A row for each line, rising in frequency."""
+    """A row for each line, in order of frequency."""
     import numpy as np
 
     rows: list[tuple[Any, ...]] = []
-    for each in species:
-        low, high = each.partition.range_k
-        intensity = np.log10(each.intensity_nm2_mhz(min(max(300.0, low), high)))
+    for lines in species:
+        low, high = lines.partition.range_k
+        intensity = np.log10(lines.intensity_nm2_mhz(min(max(300.0, low), high)))
         numbers = (
-            each.frequency_mhz,
-            each.error_mhz,
+            lines.frequency_mhz,
+            lines.error_mhz,
             intensity,
-            each.energy_lower_k,
-            each.g_upper,
-            each.einstein_a_per_s,
+            lines.energy_lower_k,
+            lines.g_upper,
+            lines.einstein_a_per_s,
         )
-        texts = (each.upper.tolist(), each.lower.tolist())
-        rows += [(each.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
+        texts = (lines.upper.tolist(), lines.lower.tolist())
+        rows += [(lines.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
     return sorted(rows, key=lambda row: row[1])
 
 
@@ -217,8 +217,8 @@ def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
     return Table(f"{title}, in order of frequency", heads, cells, frozenset({"species"}))
 
 
-def write_csv(answer: Listed | Found, path: Path, report: Report) -> None:
-    """The species, or the lines."""
+def write_csv(answer: Listed | LinesInRange, path: Path, report: Report) -> None:
+    """Write the species or the lines as CSV."""
     if isinstance(answer, Listed):
         from rotor.formats import write
 
@@ -232,9 +232,9 @@ def write_csv(answer: Listed | Found, path: Path, report: Report) -> None:
 
 
 def check(request: CatalogueRequest, outputs: Any, _: Any) -> None:
-    """ValueError for a table of what adds."""
+    """Refuse a table for the action add."""
     if request.action == ADD and "csv" in outputs:
-        raise ValueError("--csv: writes what list and show print; expected without add")
+        raise ValueError("--csv: is for list and show, not for add")
 
 
 VERB = Tool(

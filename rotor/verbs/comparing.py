@@ -1,4 +1,4 @@
-"""A catalogue beside another list: what stands in OTHER of `rotor cat --compare`, at which temperature and in which range."""
+"""Comparison of a catalogue with another list, for `rotor cat --compare`: its temperature and range."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 FORMAT_K = 300.0  # intensities of the 80-column format are those at 300 K
 DIFFERENCES = ("frequency_mhz", "lgint", "energy_lower_cm")
-UNLIKE = 0.05  # a temperature of intensities further off than this is pointed out
+UNLIKE = 0.05  # relative difference of temperatures above which a note is given
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Two lists side by side, and for a molecule that was predicted its temperature with where that is from."""
+    """Two lists side by side; for a predicted molecule, its temperature and the source of that temperature."""
 
     comparison: Comparison
     temperature_k: float | None = None
@@ -37,14 +37,14 @@ class Compared:
 
     @cached_property
     def likely_temperature_k(self) -> float:
-        """The temperature at which the intensities are most alike; nan where they do not say."""
+        """The temperature (K) at which the intensities agree best; nan if they do not determine it."""
         from rotor.formats.spcat.compare import likely_temperature_k
 
         return likely_temperature_k(self.comparison, self.temperature_k or FORMAT_K)
 
 
 def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
-    """The lines of a file beside those of OTHER that the request means."""
+    """Compare the lines of a file with those of OTHER."""
     from rotor.formats.spcat.compare import compare, within
     from rotor.formats.spcat.predict import predict_file
 
@@ -66,7 +66,7 @@ def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
 
 
 def read_catalogue(path: str) -> Catalogue:
-    """The catalogue in a file; ValueError for a file of something else."""
+    """Read a catalogue; ValueError for another kind of file."""
     if not path.lower().endswith((".cat", ".cat.gz")):
         raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
     from rotor.formats.spcat.text.cat import read_cat
@@ -75,22 +75,22 @@ def read_catalogue(path: str) -> Catalogue:
 
 
 def temperature_of(file: str, option: float | None) -> tuple[float, str]:
-    """The temperature of a catalogue's intensities in K, and where it is from: an option, the file beside it, the format."""
+    """Temperature of a catalogue's intensities (K) and its source: the option, the provenance file, or the format."""
     if option is not None:
         return option, "given (--temperature)"
-    beside = Path(f"{file}.provenance.json")
-    if beside.is_file():
+    provenance = Path(f"{file}.provenance.json")
+    if provenance.is_file():
         try:
-            known = json.loads(beside.read_text(encoding="utf-8")).get("temperature_k")
+            stated = json.loads(provenance.read_text(encoding="utf-8")).get("temperature_k")
         except (ValueError, AttributeError):
-            raise ValueError(f"{beside}: expected a JSON object with temperature_k; give --temperature") from None
-        if isinstance(known, int | float) and known > 0:
-            return float(known), beside.name
+            raise ValueError(f"{provenance}: expected a JSON object with temperature_k; give --temperature") from None
+        if isinstance(stated, int | float) and stated > 0:
+            return float(stated), provenance.name
     return FORMAT_K, "the format's"
 
 
 def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) -> Catalogue:
-    """Lines of a molecule to the highest J of the catalogue, down to its weakest line and somewhat beyond its range."""
+    """Lines of a molecule up to the highest J and down to the weakest line of the catalogue, somewhat beyond its range."""
     from rotor.formats.line_tables import catalogue
     from rotor.formats.spcat.compare import in_mhz
     from rotor.spectra.lines import line_list
@@ -98,8 +98,8 @@ def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) 
     source = request.compare or ""
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
     frequency, _ = in_mhz(lines)
-    reach = 1000.0 + 0.01 * float(frequency.max())  # lines that lie elsewhere with other constants are found too
-    made = line_list(
+    reach = 1000.0 + 0.01 * float(frequency.max())  # other constants may shift lines out of the range
+    prediction = line_list(
         top_of_word(source, note, request.isotope, with_some_dipole),
         temperature_k=kelvin,
         jmax=highest,
@@ -107,18 +107,18 @@ def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) 
         untrusted=True,
         range_mhz=(max(0.0, float(frequency.min()) - reach), float(frequency.max()) + reach),
     )
-    note(f"{source}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")
-    if not len(made):
+    note(f"{source}: predicted at {prediction.temperature_k:g} K with Q = {prediction.q:.6g}, J up to {highest}")
+    if not len(prediction):
         raise NoAnswerError(f"--compare: {source} has no lines in the range of the catalogue")
-    return catalogue(made)
+    return catalogue(prediction)
 
 
 def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, Any]:
-    """Matched, missing and extra lines and the differences, ours (OTHER) minus the catalogue."""
+    """Counts of matched, missing and extra lines, and differences (OTHER minus the catalogue), for JSON."""
     from rotor.formats.spcat.compare import agreement
 
     comparison = compared.comparison
-    met = agreement(comparison)
+    measured = agreement(comparison)
     return {
         "other": other,
         "temperature_k": compared.temperature_k,
@@ -133,14 +133,14 @@ def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, A
         "degeneracies_that_differ": None
         if comparison.collapsed
         else int((comparison.differences("g_upper") != 0).sum()),
-        "measured": met._asdict() if met.lines else None,
+        "measured": measured._asdict() if measured.lines else None,
         "missing_lines": [line_record(comparison.reference, row) for row in comparison.missing[:shown].tolist()],
         "extra_lines": [line_record(comparison.ours, row) for row in comparison.extra[:shown].tolist()],
     }
 
 
 def temperature_note(compared: Compared | None) -> list[str]:
-    """A remark where the intensities of a catalogue are like those at another temperature than that of the prediction."""
+    """A note if the intensities of a catalogue fit another temperature better than that of the prediction."""
     if compared is None or compared.temperature_k is None:
         return []
     kelvin, likely = compared.temperature_k, compared.likely_temperature_k
@@ -160,7 +160,7 @@ def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:
 
 
 def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
-    """One line by the fields of the format, without blank quantum numbers."""
+    """A line by the fields of the format, without blank quantum numbers."""
     from rotor.formats.spcat.text.fields import BLANK
 
     record = lines.record(row)._asdict()
@@ -170,10 +170,10 @@ def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
 
 
 def comparison_facts(record: dict[str, Any]) -> list[tuple[str, str]]:
-    """What a comparison found, as names and texts."""
+    """Rows of the report on a comparison."""
     facts = [
         ("compared with", record["other"]),
-        ("matched", str(record["matched"]) + (" (components of spins added)" if record["spins_collapsed"] else "")),
+        ("matched", str(record["matched"]) + (" (hyperfine components summed)" if record["spins_collapsed"] else "")),
         ("missing there", str(record["missing"])),
         ("only there", str(record["extra"])),
     ]
@@ -191,9 +191,10 @@ def comparison_facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     if record["degeneracies_that_differ"] is not None:
         facts.append(("degeneracy", f"differs in {counted(record['degeneracies_that_differ'], 'line')}"))
     if record["measured"]:
-        met = record["measured"]
+        measured = record["measured"]
         text = (
-            f"{met['lines']}: median |obs - calc| {met['median_mhz']:.4g} MHz, {met['within_3_sigma']:.1%} within 3 σ"
+            f"{measured['lines']}: median |obs - calc| {measured['median_mhz']:.4g} MHz, "
+            f"{measured['within_3_sigma']:.1%} within 3 σ"
         )
         facts.append(("measured lines", text))
     return facts

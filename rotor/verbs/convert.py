@@ -1,4 +1,4 @@
-"""`rotor convert`: constants from one format into another, SPFIT's files to TOML and back."""
+"""`rotor convert`: constants from one file format into another."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Examples:
 
 @dataclass(frozen=True)
 class ConvertRequest:
-    """What is read, and how far a file of SPFIT goes."""
+    """The source, and the highest quantum number of a file for SPFIT or SPCAT."""
 
     source: str = declared(REQUIRED, Text(), "File (.par, .var, .int, .toml, ...) or name", option="SOURCE")
     kmax: int = declared(99, Whole(0, 359), "Highest K of a .par or .var (KNMAX), highest F of an .int", panel=OUTPUT)
@@ -44,7 +44,7 @@ class ConvertRequest:
 
 @dataclass(frozen=True)
 class Converted:
-    """The top of the source, and what writes it. target: the file as named."""
+    """The top of the source, the target as the user named it, and the function that writes it."""
 
     request: ConvertRequest
     top: Top
@@ -52,20 +52,20 @@ class Converted:
     write: Callable[[Path], None]
 
     def facts(self) -> dict[str, Any]:
-        """The top, as `rotor info` states it."""
+        """The top, by the keys of `rotor info`."""
         errors = self.errors
         return top_facts(self.top) | ({} if errors is None else {"errors": errors.as_json()})
 
     @property
     def errors(self) -> ErrorBudget | None:
-        """How far the constants can be trusted, of which every digit of a double is written; None of an .int, which has none of them."""
+        """Error budget of the constants; None for an .int file, which holds no constants."""
         from rotor.tops.constants_budget import constants_budget
 
         return None if self.target.lower().endswith(".int") else constants_budget([self.top])
 
 
 def answer(request: ConvertRequest, work: Work) -> Converted:
-    """Read the source, and see that the target can hold it."""
+    """Read the source, and check that the target format can hold it."""
     target = str(work.files["target"][0])
     top = top_with_errors(request.source, work.note)
     write = writer_of(top, request, target, work.note)
@@ -75,22 +75,22 @@ def answer(request: ConvertRequest, work: Work) -> Converted:
 
 
 def _further(top: Top) -> str:
-    """What goes with the constants of the first state, in words."""
+    """Further vibrational states and spins, in words."""
     states = f"; {top.states.count} states" if top.states else ""
     spins = f"; spins {', '.join(top.spin_constants.twice)}" if top.spin_constants else ""
     return states + spins
 
 
 def refuse_overwriting(request: ConvertRequest, outputs: Mapping[str, Any], _: Any) -> None:
-    """The .var, .par and .int beside an .int, which are read with it, are not written over."""
+    """Refuse to overwrite the .var or .par beside an .int source, which is read with it."""
     source, target = Path(request.source), outputs["target"][0]
     beside = [source.with_suffix(suffix) for suffix in (".var", ".par")] if source.suffix.lower() == ".int" else []
     if source.is_file() and target.resolve() in {path.resolve() for path in beside}:
-        raise ValueError(f"TARGET {target}: is an input of this command; write the result under another name")
+        raise ValueError(f"TARGET {target}: is an input of this command; give another name")
 
 
 def parameters_of(source: str) -> Path:
-    """The file of a source, for an .int file that of the parameters beside it."""
+    """The file of a source; for an .int file, the parameter file beside it."""
     path = Path(source)
     if path.suffix.lower() != ".int":
         return path
@@ -100,7 +100,7 @@ def parameters_of(source: str) -> Path:
 
 
 def top_with_errors(source: str, note: Note = silent) -> Top:
-    """The top a source means; of a .var file the errors of its parameters are the constants' uncertainties."""
+    """The top of a source; uncertainties of its constants come from the errors in a .var file."""
     path = parameters_of(source)
     if path.suffix.lower() != ".var" or not path.exists():
         return top_of_word(source, note)
@@ -115,7 +115,7 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
 
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:
-    """What writes the top in the format that the target's suffix names; what that cannot say is refused or noted."""
+    """Function that writes the top in the target's format; content that the format cannot hold is refused or noted."""
     suffix = Path(target).suffix
     if suffix.lower() == ".toml":
         from rotor.formats.molecules.molecule_writer import write_molecule_file
@@ -127,7 +127,7 @@ def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Cal
 
     without_internal_rotation(top, f"a {suffix} file")
     if top.level_table is not None:
-        note(f"a {suffix} file has no place for the table of level energies, which count before the constants")
+        note(f"a {suffix} file cannot hold the table of level energies, which replace energies of the constants")
     if suffix.lower() == ".int":
         from rotor.formats.spcat.text.int_file import write_int
 
@@ -140,13 +140,13 @@ def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Cal
     moments = [top.dipole_abc_debye or (0.0, 0.0, 0.0), *(top.states.dipoles.values() if top.states else ())]
     if any(map(any, moments)):
         dipole = ", ".join(f"{mu:g}" for mu in moments[0])
-        note(f"a {suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
+        note(f"a {suffix} file cannot hold the dipole ({dipole} D); an .int file can")
     parameters = named_parameter_file(top, request.kmax)
     return lambda path: write_par(parameters, path)
 
 
 def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
-    """The file of a top; ValueError where it would be refused when it is read. stem: its name, where the top has none."""
+    """The molecule file of a top, checked to be readable again. stem: its name if the top has none."""
     from rotor.formats.molecules.molecule_file import MoleculeFile
 
     sources = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
@@ -171,7 +171,7 @@ def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
 
 
 def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
-    """ValueError where a .toml of this top would be refused when read, as for dipoles or couplings that the spin weights forbid."""
+    """Raise ValueError if reading the .toml would fail, as for dipoles or couplings that the spin weights forbid."""
     from rotor.formats.molecules.molecule_file import parse_molecule_file
     from rotor.formats.molecules.molecule_writer import molecule_file_text
     from rotor.formats.read_write import top_of_file
@@ -181,16 +181,16 @@ def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
         top = top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
         refuse_weights_of_another_kind(top)
         if top.spin_constants is not None:
-            effects_of(top, True)  # weights that count a total spin of the file a second time
+            effects_of(top, True)  # fails if the spin weights count a total spin of the file twice
     except ValueError as reason:
         raise ValueError(
-            f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "
-            "that joins levels of unlike weight makes no line unless they mix), or predict from the files themselves"
+            f"{source}: a .toml of it could not be read: {reason}; remove the part named here from the source (a dipole "
+            "between levels of different weight gives no line unless they mix), or predict from the files themselves"
         ) from None
 
 
 def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
-    """A remark on what of the options of SPFIT's files is not taken along and comes back otherwise: DIAG, KNMAX, NLINE."""
+    """Note on options of SPFIT's files (DIAG, KNMAX, NLINE) that the target does not keep."""
     path = parameters_of(request.source)
     if path.suffix.lower() not in (".par", ".var") or not path.is_file() or target.lower().endswith(".int"):
         return []
@@ -205,15 +205,15 @@ def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
     if not lost:
         return []
     others = ", ".join(f"{name} = {value}" for name, value in written.items())
-    what = "are not part of a .toml" if target.lower().endswith(".toml") else "are not taken along"
+    what = "have no place in a .toml" if target.lower().endswith(".toml") else "are not converted"
     return [
-        f"{', '.join(lost)} of {path.name} {what}: a .par or .var written of these constants has {others}; "
-        "K above KNMAX is left out by SPCAT (--kmax)"
+        f"{', '.join(lost)} of {path.name} {what}: a .par or .var written from these constants has {others}; "
+        "SPCAT omits K above KNMAX (--kmax)"
     ]
 
 
 def _intensities(top: Top, highest: int) -> IntensityFile:
-    """The .int file at 300 K, F to `highest`, with Q summed over the levels and spins of the top."""
+    """The .int file at 300 K with F up to `highest`; Q is summed over the levels and spins of the top."""
     from rotor.formats.spcat.model import intensity_file
     from rotor.formats.spcat.text.int_file import Request
     from rotor.quantum.effects.of_top import effects_of
@@ -226,7 +226,7 @@ def _intensities(top: Top, highest: int) -> IntensityFile:
 
 
 def show(answer: Converted, report: Report) -> None:
-    """Print what was written, and how far it can be trusted."""
+    """Print the written constants and their errors."""
     print(f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}")
     if facts := error_facts(report.content.get("errors")):
         show_facts(facts)
@@ -234,7 +234,7 @@ def show(answer: Converted, report: Report) -> None:
 
 VERB = Tool(
     name="convert",
-    about="Constants, spins, states, dipoles and weights into another format; nothing is converted but the format.",
+    about="Constants, spins, states, dipoles and weights into another file format; values stay the same.",
     examples=EXAMPLES,
     request=ConvertRequest,
     of="source",

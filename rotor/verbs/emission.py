@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 
-from rotor.reports.line_tables import the_first
+from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
@@ -49,22 +49,30 @@ Examples:
   rotor emission CH3OH HCN --over spectrum.fits --column 1e16,1e14 --velocity 4 --plot pages.pdf
   rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width
   rotor emission --fit cube.fits CH3CN --catalogue lines.rotorcat --maps maps.fits --workers 2"""
-_OF_ONE = ("isotopes", "spin_constants", "spins", *STATES)  # what belongs to a single molecule
-_OWN = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
+_SINGLE_ONLY = ("isotopes", "spin_constants", "spins", *STATES)  # inputs that need a single molecule
+_CONDITIONS = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")  # that may differ between molecules
 
 
 @dataclass(frozen=True)
 class EmitterInput:
-    """What a molecule of a source has of its own."""
+    """Inputs of one molecule in a source; those left out follow the conditions."""
 
     column_per_cm2: float = declared(
-        1e14, Quantity("1/cm2", above=0), "Molecules in the line of sight (1/cm²)", "column"
+        1e14, Quantity("1/cm2", above=0), "Column density of the molecule (1/cm²)", "column"
     )
     excitation_k: float | None = declared(
-        None, Quantity("K", above=0), "Instead of that of the conditions (K)", "excitation", example="50 K"
+        None,
+        Quantity("K", above=0),
+        "Excitation temperature, if it differs from the conditions (K)",
+        "excitation",
+        example="50 K",
     )
-    velocity_km_s: float | None = declared(None, Quantity("km/s"), "Likewise (km/s)", "velocity", example=5.6)
-    fwhm_km_s: float | None = declared(None, Quantity("km/s"), "Likewise (km/s)", "width", example=2.0)
+    velocity_km_s: float | None = declared(
+        None, Quantity("km/s"), "Velocity, if it differs (km/s)", "velocity", example=5.6
+    )
+    fwhm_km_s: float | None = declared(
+        None, Quantity("km/s"), "Width of the lines, if it differs (km/s)", "width", example=2.0
+    )
     partition: str | None = declared(
         None, Text(metavar="FILE"), "Q(T) of a .cat file: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", "partition",
         example="300=108.87,75=27.46",
@@ -72,16 +80,16 @@ class EmitterInput:
 
 
 class SeveralMolecules(SubjectKind):
-    """Several molecules, or one with inputs of its own; .cat files with Q(T) among them."""
+    """Several molecules, or one with further inputs; .cat files with Q(T) may be among them."""
 
-    fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _OF_ONE}}  # noqa: RUF012
+    fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _SINGLE_ONLY}}  # noqa: RUF012
     tables_read = ("molecules",)
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The molecules that were given."""
+        """Read all molecules and their inputs."""
         tables = self._tables(entries)
         molecules: list[Top | CatalogueLines] = []
-        inputs, own_values = [], []
+        inputs, departures = [], []
         for number, (molecule, emitter) in enumerate(tables):
             try:
                 molecules.append(
@@ -90,16 +98,13 @@ class SeveralMolecules(SubjectKind):
             except ValueError as error:
                 raise ValueError(f"molecules[{number}]: {error}" if entries.style == "key" else str(error)) from None
             inputs.append(molecule)
-            values = {
-                name: getattr(emitter, name)
-                for name in ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
-            }
-            mine = (
+            values = {name: getattr(emitter, name) for name in _CONDITIONS}
+            stated = (
                 {name: value for name, value in values.items() if value is not None} if entries.style == "key" else {}
             )
-            own_values.append(mine if emitter.partition is None else {**mine, "partition": emitter.partition})
+            departures.append(stated if emitter.partition is None else {**stated, "partition": emitter.partition})
         text = " ".join(str(molecule_input.source or molecule_input.constants) for molecule_input in inputs)
-        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(own_values))
+        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(departures))
 
     def _tables(self, entries: Entries) -> list[tuple[MoleculeInput, EmitterInput]]:
         """The inputs of each molecule."""
@@ -107,15 +112,17 @@ class SeveralMolecules(SubjectKind):
             tables = entries.values.get("molecules", ())
             if not tables:
                 raise ValueError("molecules: expected one molecule or more")
-            return [_of_table(table) for table in tables]
+            return [_read_table(table) for table in tables]
         several: SeveralInput = read_instance(SeveralInput, entries)
         if not several.names:
             raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
-        for field in (FIELDS[name] for name in _OF_ONE):
+        for field in (FIELDS[name] for name in _SINGLE_ONLY):
             if entries.has(field) and (len(several.names) > 1 or is_catalogue(several.names[0])):
-                raise ValueError(f"{field.called(entries.style)}: expected with a single molecule that is no catalogue")
+                raise ValueError(
+                    f"{field.called(entries.style)}: expected with a single molecule, not with a catalogue"
+                )
         if several.partition is not None and not any(map(is_catalogue, several.names)):
-            raise ValueError("--partition: is Q(T) of .cat files, and none is among the molecules")
+            raise ValueError("--partition: needs a .cat file among the molecules; it gives their Q(T)")
         values = {name: value for name, value in entries.values.items() if name.startswith("molecule.")}
         return [
             (
@@ -134,7 +141,9 @@ class SeveralMolecules(SubjectKind):
         """The tables of the molecules."""
         first = request.sources[0]
         tables = []
-        for molecule, source, values_of_molecule in zip(subject.molecules, request.sources, subject.own, strict=True):
+        for molecule, source, values_of_molecule in zip(
+            subject.molecules, request.sources, subject.departures, strict=True
+        ):
             flat = saved_molecule(molecule, folder)
             content = (
                 {"source": flat["molecule"]}
@@ -155,7 +164,7 @@ class SeveralMolecules(SubjectKind):
 
 
 def emitting_molecule() -> Any:
-    """The structure of a molecule of a source."""
+    """Structure of a molecule in the scene's list; made once, since msgspec identifies structures by class."""
     fields: tuple[Field, ...] = (*FIELDS.values(), *all_fields(EmitterInput).values())
     if not _STRUCTURE:
         _STRUCTURE.append(
@@ -170,7 +179,7 @@ def emitting_molecule() -> Any:
 _STRUCTURE: list[Any] = []
 
 
-def _of_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
+def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
     names = {field.key for field in all_fields(EmitterInput).values()}
     values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
     emitter: EmitterInput = read_instance(
@@ -184,7 +193,7 @@ def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
     source = reading.given.source
     if not is_catalogue(source):
         if partition is not None:
-            raise ValueError("partition: is Q(T) of a .cat file, and the source is none")
+            raise ValueError("partition: needs a .cat file as source; it gives its Q(T)")
         return with_some_dipole(top_of(reading), reading)
     from rotor.formats.catalogue.cat_species import read_cat_with
 
@@ -199,13 +208,13 @@ def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
 
 @dataclass(frozen=True)
 class EmissionShown(Shown):
-    """How much is shown."""
+    """Display options of `emission`."""
 
-    top_lines: int = declared(20, Whole(0), "How many of the brightest lines are shown", option="--top", panel=OUTPUT)
+    top_lines: int = declared(20, Whole(0), "Number of brightest lines shown", option="--top", panel=OUTPUT)
 
 
 def draw(answer: EmissionAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw the brightness temperature of all molecules."""
     from rotor.plots.emission import plot_emission
 
     plot_emission(answer, path, provenance=dict(report.provenance), **report.view)
@@ -230,8 +239,8 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         quanta = f"; upper, lower: {headings(lines.quanta)}" if lines.quanta else ""
         facts.append((name, f"{gas}, {motion}, Q = {lines.q:.6g}{quanta}"))
     for name, lines in zip(request.names, answer.emitted, strict=True):
-        of_which = f"{name}: " if len(request.names) > 1 else ""
-        facts += [(title, of_which + text) for title, text in hyperfine_lines(lines.hyperfine)]
+        prefix = f"{name}: " if len(request.names) > 1 else ""
+        facts += [(title, prefix + text) for title, text in hyperfine_lines(lines.hyperfine)]
     if (peak := answer.peak) is not None:
         line = f"{request.names[int(answer.lines.molecule[peak.row])]} {answer.lines.upper[peak.row]} – {answer.lines.lower[peak.row]}"
         facts.append(
@@ -259,7 +268,7 @@ def show(answer: EmissionAnswer, report: Report) -> None:
 
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
-    """What is left out: of the source, and the largest of each molecule."""
+    """Neglected effects: of the source, and the largest of each molecule."""
     from rotor.quantum.estimates.limits import model_limits, populated_j
 
     request = answer.request
@@ -273,7 +282,7 @@ def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
 
 
 def _table(answer: EmissionAnswer, shown: int) -> Table:
-    """The brightest lines, in order of frequency."""
+    """The brightest lines in order of frequency."""
     import numpy as np
 
     lines, names = answer.lines, answer.request.names
@@ -294,11 +303,11 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         )
         for i in rows
     ]
-    title = the_first(len(rows), "brightest line") if len(rows) < len(lines) else "all lines"
+    title = first_rows_title(len(rows), "brightest line") if len(rows) < len(lines) else "all lines"
     columns = (
         "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
     )  # fmt: skip
-    return Table(f"{title}, in order of frequency; each by itself", columns, cells, frozenset({"molecule"}))
+    return Table(f"{title}, in order of frequency; each alone", columns, cells, frozenset({"molecule"}))
 
 
 VERB = Verb(
@@ -319,7 +328,7 @@ VERB = Verb(
             example="profile.csv",
             of=lambda answer: answer.spectrum,
         ),
-        Output("plot", PICTURES, "Draw T_B of every molecule (.png, .pdf, .svg)", draw, "emission.png"),
+        Output("plot", PICTURES, "Draw T_B of all molecules (.png, .pdf, .svg)", draw, "emission.png"),
     ),
     subject=SeveralMolecules(),
     shown=EmissionShown,

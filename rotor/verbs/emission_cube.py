@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from rotor.formats.spectra.cube_file import Cube
     from rotor.observed.cube import CubeFit
 
-_OF_A_SPECTRUM = ("csv", "parquet", "profile_csv", "plot", "diagram", "corner")
+_SPECTRUM_OUTPUTS = ("csv", "parquet", "profile_csv", "plot", "diagram", "corner")
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """A cube with the maps of its fit."""
+    """A cube and the maps of its fit. pixels: number of fitted pixels."""
 
     request: ObservedRequest
     cube: Cube
@@ -81,25 +81,25 @@ class Mapped:
 
 
 def _quantiles(values: Any) -> tuple[float | None, ...]:
-    """Values below which 16, 50 and 84 % of the finite ones are."""
+    """16, 50 and 84 % quantiles of the finite values; None without any."""
     finite = values[np.isfinite(values)]
     return tuple(np.quantile(finite, (0.16, 0.5, 0.84)).tolist()) if len(finite) else (None, None, None)
 
 
 def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None:
-    """ValueError for what belongs to a single spectrum beside maps, for a mask without maps, and for pictures without what they show."""
+    """Refuse options of a single spectrum beside maps, a mask without maps, and pictures without their data."""
     if "maps" in outputs:
         if request.fit is None:
             raise ValueError("--maps: belongs to a fit of a cube; expected with --fit CUBE")
-        if other := next((name for name in _OF_A_SPECTRUM if name in outputs), None):
+        if other := next((name for name in _SPECTRUM_OUTPUTS if name in outputs), None):
             raise ValueError(
-                f"--{other.replace('_', '-')}: of a single spectrum; expected without --maps, with --pixel X,Y"
+                f"--{other.replace('_', '-')}: needs a single spectrum; expected without --maps, with --pixel X,Y"
             )
         file = request.spectrum
         for flag, typed in (("--pixel", file.pixel), ("--row", file.row), ("--baseline", file.baseline), ("--reject", request.reject),
                             ("--sample", request.sample or None)):  # fmt: skip
             if typed is not None:
-                raise ValueError(f"{flag}: of a single spectrum; expected without --maps")
+                raise ValueError(f"{flag}: needs a single spectrum; expected without --maps")
         return
     if request.mask is not None:
         raise ValueError("--mask: belongs to maps of a cube; expected with --maps FILE")
@@ -110,7 +110,7 @@ def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None
 
 
 def answer(request: ObservedRequest, work: Work) -> Mapped:
-    """Read the cube, estimate a start from its brightest pixel, and fit every pixel."""
+    """Read the cube, start from its brightest pixel, and fit every pixel."""
     from rotor.formats.spectra.cube_file import read_cube, read_mask
     from rotor.observed.cube import fit_cube
     from rotor.observed.spectrum import observed_spectrum
@@ -126,7 +126,7 @@ def answer(request: ObservedRequest, work: Work) -> Mapped:
         where = (
             "inside the mask with noise and half of its channels" if request.mask else "above five standard deviations"
         )
-        raise ValueError(f"{cube.source}: no pixel {where}, so that there is nothing to fit")
+        raise ValueError(f"{cube.source}: no pixel {where}, nothing to fit")
     y, x = np.unravel_index(np.argmax(np.where(chosen, peak, -np.inf)), shape)
     brightest = observed_spectrum(
         cube.frequency_mhz, cube.intensity_k[:, y, x], noise=float(cube.noise_k[y, x]), beam_arcsec=cube.beam_arcsec,
@@ -144,7 +144,7 @@ def answer(request: ObservedRequest, work: Work) -> Mapped:
 
 
 def write(mapped: Mapped, path: Path, report: Report) -> None:
-    """Every map with the coordinates of the cube."""
+    """Write the maps with the coordinates of the cube."""
     from rotor.formats.spectra.cube_file import write_maps
 
     write_maps(mapped.fit, mapped.cube, path, str(report.content["command"]))

@@ -1,4 +1,4 @@
-"""`rotor emission --over` and `--fit`: a model over an observed spectrum, and the source that describes it best."""
+"""`rotor emission --over` and `--fit`: a model over an observed spectrum, and its best fit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Observed:
-    """A spectrum with the model of its source. fit: where one was requested, with what each species contributes and a sample of it."""
+    """A spectrum with the model of its source. After a fit also each species' contribution, a sample and rotational diagrams."""
 
     request: ObservedRequest
     spectrum: ObservedSpectrum
@@ -64,7 +64,7 @@ class Observed:
 
 
 def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
-    """Read the spectrum, then model or fit it; with maps the same in every pixel of a cube."""
+    """Read the spectrum, then model or fit it; with maps, fit every pixel of a cube."""
     if "maps" in work.files:
         return emission_cube.answer(request, work)
     spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz)
@@ -85,7 +85,7 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
 
 
 def _diagrams(spectrum: ObservedSpectrum, fit: SourceFit, work: Work) -> Any:
-    """Rotational diagrams of the fitted species; a note for each that has none."""
+    """Rotational diagrams of the fitted species; a note for each species without one."""
     from rotor.observed.diagrams import species_diagrams
 
     diagrams = species_diagrams(spectrum, fit.components, fit.sight)
@@ -95,7 +95,7 @@ def _diagrams(spectrum: ObservedSpectrum, fit: SourceFit, work: Work) -> Any:
 
 
 def withheld(answer: Observed | Mapped, names: Sequence[str]) -> dict[str, str]:
-    """Why there is no picture of diagrams: the fit is printed all the same."""
+    """Reason why the picture of diagrams is not written; the fit is still printed."""
     empty = isinstance(answer, Observed) and answer.diagrams is not None and not answer.diagrams.names
     return {"diagram": "no species has a rotational diagram"} if empty and "diagram" in names else {}
 
@@ -114,7 +114,7 @@ def _fitted(
 
 
 def draw(answer: Observed, path: Path, report: Report) -> None:
-    """Pages of panels."""
+    """Draw pages of panels with the spectrum and the model."""
     from rotor.plots.overlay import plot_overlay
 
     plot_overlay(answer.spectrum, answer.components, path, sight=answer.sight, provenance=report.command)
@@ -131,7 +131,7 @@ LEFT = frozenset({"species", "parameter"})
 
 
 def draw_diagrams(answer: Observed, path: Path, report: Report) -> None:
-    """The points of all species as CSV, or a picture."""
+    """Write the points of all diagrams as CSV, or draw them."""
     if path.suffix.lower() == ".csv":
         from rotor.formats import write
 
@@ -143,7 +143,7 @@ def draw_diagrams(answer: Observed, path: Path, report: Report) -> None:
 
 
 def draw_corner(answer: Observed, path: Path, _: Report) -> None:
-    """The draws of every two parameters."""
+    """Draw the sample of every pair of parameters."""
     from rotor.observed.sampling import plot_corner
 
     plot_corner(answer.chain, path)
@@ -187,14 +187,14 @@ def _show_fit(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Non
     print()
     show_table(_parameter_table(fit))
     print()
-    rows = [(each.species, f"{each.signal:.1f}", "yes" if each.needed else "no", _limit(each)) for each in needed]
+    rows = [(part.species, f"{part.signal:.1f}", "yes" if part.needed else "no", _limit(part)) for part in needed]
     columns = ("species", "Δχ²", "needed", "limit, 3σ (1/cm²)")
     show_table(Table("what each species contributes", columns, rows, LEFT))
     facts = [("undetermined", combination.text) for combination in fit.statistics.undetermined]
-    for part_ in (facts, [] if chain is None else [("sample", chain.text)]):
-        if part_:
+    for section in (facts, [] if chain is None else [("sample", chain.text)]):
+        if section:
             print()
-            show_facts(part_)
+            show_facts(section)
 
 
 def _limit(contribution: Contribution) -> str:
@@ -228,7 +228,7 @@ OBSERVED = Tool(
         Output(
             "diagram", (".csv", *PICTURES), "Rotational diagrams of the fitted species as CSV or picture", draw_diagrams
         ),
-        Output("corner", PICTURES, "Draw the sample of every two parameters (extra sampling)", draw_corner),
+        Output("corner", PICTURES, "Draw the sample of every pair of parameters (extra sampling)", draw_corner),
         Output("maps", (".fits",), "Fit every pixel of a cube and write maps of the parameters", emission_cube.write),
     ),
     check=emission_cube.refuse,

@@ -147,7 +147,7 @@ def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: F
     lines = Path(request.files.source).with_suffix(".lin").resolve()
     for name, paths in outputs.items():
         if lines.exists() and any(path.resolve() == lines for path in paths):
-            raise ValueError(f"--{name.replace('_', '-')}: {paths[0]} is an input; write the result under another name")
+            raise ValueError(f"--{name.replace('_', '-')}: {paths[0]} is an input; give another name")
 
 
 def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
-from rotor.reports.line_tables import the_first
+from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.reports.spins import hyperfine_lines
@@ -118,7 +118,7 @@ def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     labels = table.levels.labels(table.rows[rows])
     numbers = energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist()
     cells = [(label, form.format(e), str(weight), str(g)) for label, e, weight, g in zip(labels, *numbers, strict=True)]
-    title = the_first(len(rows), "lowest level") if len(rows) < len(existing) else "all levels"
+    title = first_rows_title(len(rows), "lowest level") if len(rows) < len(existing) else "all levels"
     head = (quanta.headings(table.levels.quanta_names), f"E ({shown.unit})", "spin weight", "g")
     return Table(f"{title}, in order of energy", head, cells)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
-from rotor.reports.line_tables import the_first
+from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.reports.spins import hyperfine_lines
@@ -94,7 +94,7 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, selected.columns.values(), strict=False)]
     labels = [selected.levels.labels(states) for states in (selected.initial, selected.final)]
-    title = the_first(len(selected), "strongest line") if len(selected) < len(lines) else "all lines"
+    title = first_rows_title(len(selected), "strongest line") if len(selected) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))
 
 

@@ -43,14 +43,14 @@ class Place:
 @dataclass(frozen=True, eq=False, repr=False)
 class Subject:
     """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks.
-    own: of several molecules, what each has otherwise than the others.
+    departures: of several molecules, the inputs in which each differs from the conditions.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
     molecules: tuple[Any, ...] = ()
     text: str = ""
     note: Note = silent
-    own: tuple[Mapping[str, Any], ...] = ()
+    departures: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def top(self) -> Any:

@@ -66,7 +66,7 @@ def test_constants_go_to_toml_and_back(call, tmp_path):
     assert call("convert", "so2.var", "so2.toml")[0] == 0
     code, _, err = call("convert", "so2.toml", "back.par", "--kmax", "60")
     assert code == 0
-    assert err.startswith("note: a .par file has no place for the dipole")
+    assert err.startswith("note: a .par file cannot hold the dipole")
     there, back = read_par(tmp_path / "so2.var"), read_par(tmp_path / "back.par")
     assert [(p.code, p.value) for p in back.parameters] == [(p.code, p.value) for p in there.parameters]
     assert (back.options[0].iax, back.options[0].wtpl, back.options[0].wtmn, back.options[0].knmax) == (2, 1, 0, 60)

@@ -124,8 +124,8 @@ def test_jansky_per_beam_becomes_kelvin(folder):
 @pytest.mark.parametrize(
     ("options", "rule"),
     [
-        (("--maps", "m.fits", "--pixel", "1,1"), "--pixel: of a single spectrum"),
-        (("--maps", "m.fits", "--csv", "a.csv"), "--csv: of a single spectrum"),
+        (("--maps", "m.fits", "--pixel", "1,1"), "--pixel: needs a single spectrum"),
+        (("--maps", "m.fits", "--csv", "a.csv"), "--csv: needs a single spectrum"),
         (("--maps", "m.fits", "--mask", "none.fits"), "none.fits"),
         (("--maps", "m.fits", "--range", "100:101GHz"), "no channels from"),
         (("--mask", "cube.fits", "--pixel", "1,1"), "--mask: belongs to maps"),

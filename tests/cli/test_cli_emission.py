@@ -166,7 +166,7 @@ def test_several_molecules_add_their_depths(call, tmp_path):
         (("CO", "--band", "ALMA3", "--column", "1,2"), "--column: 1,2: 2 numbers for 1 molecule;"),
         (("CO", "HCN", "--band", "ALMA3", "--excitation", "1,2,3"), "--excitation: 1,2,3: 3 numbers for 2 molecules;"),
         (("CO", "--band", "ALMA3", "--redshift", "-2"), "--redshift = -2.0"),
-        (("CO", "--band", "ALMA3", "--partition", "300=100"), "--partition: is Q(T) of .cat files"),
+        (("CO", "--band", "ALMA3", "--partition", "300=100"), "--partition: needs a .cat file among the molecules"),
         (("none.cat", "--band", "ALMA3"), "none.cat: no such file"),
         (("CO", "--band", "ALMA3", "--column", "-1"), "--column"),
         (("CO", "--band", "ALMA3", "--width", "0"), "--width"),

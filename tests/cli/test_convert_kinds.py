@@ -107,7 +107,7 @@ def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(
     assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 2
     said = capsys.readouterr().err
     assert "μa = 1.3 D, μb = 0.7 D" in said
-    assert "leave out of the source what is named here" in said
+    assert "remove the part named here from the source" in said
     assert not (tmp_path / "x.toml").exists()
 
 
@@ -124,7 +124,7 @@ def test_what_of_the_option_line_is_lost_is_noted(tmp_path, capsys):
     copy = copied("water_diag1", tmp_path)
     assert run(["convert", str(copy), str(tmp_path / "x.toml")]) == 0
     said = capsys.readouterr().err
-    assert "note: DIAG = 1, KNMAX = 20, NLINE = 0 of water_diag1.var are not part of a .toml" in said
+    assert "note: DIAG = 1, KNMAX = 20, NLINE = 0 of water_diag1.var have no place in a .toml" in said
     assert "DIAG = 3, KNMAX = 99, NLINE = 1" in said
     file = read_par(copy.with_suffix(".var"))
     same = replace(file, header=replace(file.header, nline=1), options=(replace(file.options[0], diag=3),))

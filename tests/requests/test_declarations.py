@@ -85,7 +85,7 @@ def test_a_verb_without_scenes_is_one_file(monkeypatch, call, folder):
         (
             ("a.txt", "--out", "a.txt"),
             2,
-            "--out a.txt: is an input of this command; write the result under another name",
+            "--out a.txt: is an input of this command; give another name",
         ),
         (("a.txt", "--out", "a.csv"), 2, "--out a.csv: the name must end in .txt"),
     ):

@@ -163,7 +163,7 @@ def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) ->
     inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)}
     for name, path in written.items():
         if os.path.realpath(path) in inputs:
-            raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
+            raise ValueError(f"{name} {path}: is an input of this command; give another name")
 
 
 def by_name(verb: Verb, *groups: Files) -> dict[str, tuple[Path, ...]]:
