@@ -1,4 +1,4 @@
-"""`fit`: measured lines back to constants, from SPFIT's files or from a line list with constants to start from."""
+"""`fit`: constants from measured lines, from SPFIT's files or from a line list and starting constants."""
 
 from __future__ import annotations
 
@@ -42,22 +42,27 @@ Examples:
   rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
   rotor fit lines.lin --start water --free A,B,C --try DJ,DJK,DK
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaK,deltaJ --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
-MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
+MOST_SAMPLES = 100_000  # bootstrap samples; each is a fit
 FORMS = {".txt": "text", ".md": "markdown", ".tex": "latex"}
 CONSTANTS = ("toml", "par", "var")  # outputs that hold the fitted constants
 
 
 @dataclass(frozen=True)
-class Further(ErrorsShown):
-    """What is done beside the fit."""
+class FitShown(ErrorsShown):
+    """Analyses beside the fit, and display options."""
 
     try_constants: tuple[str, ...] | None = declared(
-        None, NameList(), "Try each of these constants more, or less", option="--try", panel=OBSERVABLES, common=True
+        None,
+        NameList(),
+        "Test the fit with each of these constants added or removed",
+        option="--try",
+        panel=OBSERVABLES,
+        common=True,
     )
     choose: tuple[str, ...] | None = declared(
         None,
         NameList(),
-        "Build the model up from these constants, one at a time",
+        "Build the model from these constants, one at a time",
         option="--choose",
         panel=OBSERVABLES,
         common=True,
@@ -65,14 +70,14 @@ class Further(ErrorsShown):
     all_orders: bool = declared(
         False,
         Flag(),
-        "With a choice: constants of all orders compete from the first step on",
+        "With --choose: constants of all orders compete from the first step",
         option="--all-orders",
         panel=OBSERVABLES,
     )
     suggest: str | None = declared(
         None,
         Text(metavar="NAME"),
-        "Which unmeasured line would best fix this constant",
+        "Unmeasured lines that would best determine this constant",
         option="--suggest",
         panel=OBSERVABLES,
         common=True,
@@ -80,7 +85,7 @@ class Further(ErrorsShown):
     bootstrap: int = declared(
         0,
         Whole(0, MOST_SAMPLES),
-        "Errors from N samples of the lines beside the others",
+        "Also errors from N bootstrap samples of the lines",
         option="--bootstrap",
         panel=NUMERICS,
     )
@@ -93,14 +98,14 @@ class Further(ErrorsShown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Parameters(Columns):
-    """The free parameters by the keys of the JSON."""
+    """The free parameters of a fit, by the keys of the JSON."""
 
-    of: Fit
+    fit: Fit
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
         """name, value, error, scaled_error, start."""
-        fit = self.of
+        fit = self.fit
         numbers = {
             "value": fit.values,
             "error": fit.errors,
@@ -111,10 +116,10 @@ class Parameters(Columns):
 
 
 def answer(request: FitRequest, work: Work) -> FitAnswer:
-    """The fit, and what is done beside it; iterations are shown on a terminal."""
+    """The fit and the analyses beside it; iterations are shown on a terminal."""
     from rotor.formats.fit_further import chosen_fit, with_further
 
-    further: Further = work.shown
+    further: FitShown = work.shown
     if further.all_orders and further.choose is None:
         raise ValueError("all_orders: expected with choose, which names the constants to choose from")
     if further.choose is not None and "save_scene" in work.files:
@@ -142,8 +147,8 @@ def _show_iteration(iteration: Any) -> None:
     )
 
 
-def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Further) -> None:
-    """ValueError where a file is written over the lines that stand beside a .par file."""
+def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: FitShown) -> None:
+    """Refuse to overwrite the lines beside a .par file."""
     lines = Path(request.files.source).with_suffix(".lin").resolve()
     for name, paths in outputs.items():
         if lines.exists() and any(path.resolve() == lines for path in paths):
@@ -151,26 +156,26 @@ def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: F
 
 
 def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:
-    """Why files of constants are not written: of a fit that has failed, or that their format does not hold.
+    """Reasons why files of constants are not written: the fit failed, or the format cannot hold them.
 
-    The best point of a fit that was interrupted is written.
+    The best point of an interrupted fit is written.
     """
     fit = answer.fit
     if not fit.converged and fit.minimum.status != "interrupted":
         return dict.fromkeys((name for name in CONSTANTS if name in names), "not converged")
-    left = {}
+    reasons = {}
     if fit.constants is None and "toml" in names:
-        left["toml"] = "spins or several states; the .par and .var have everything"
+        reasons["toml"] = "spins or several states; the .par and .var hold everything"
     for name in {"par", "var"} & set(names):
         try:
             fitted_par(answer, variances=name == "var")
         except ValueError as error:
-            left[name] = str(error)
-    return left
+            reasons[name] = str(error)
+    return reasons
 
 
 def failure(answer: FitAnswer) -> str:
-    """Why a fit is no result."""
+    """Reason why a fit is not a result; empty if it is."""
     fit = answer.fit
     if not fit.converged:
         more = "; --iterations allows more" if fit.minimum.status == "too many iterations" else ""
@@ -183,26 +188,26 @@ def _text(path: Path, text: str) -> None:
 
 
 def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
-    """The table of a publication as a file."""
+    """Write the table for a publication."""
     _text(path, table_of(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
 
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
-    """The assigned lines, merged, as a file."""
+    """Write the assigned lines, merged."""
     from rotor.formats.assigned_lines import write_assigned_lines
 
     write_assigned_lines(answer.fit.marked_lines, path)
 
 
 def draw(answer: FitAnswer, path: Path, report: Report) -> None:
-    """The residuals as a file."""
+    """Draw the residuals."""
     from rotor.plots.fit import plot_fit
 
     plot_fit(answer.fit, path, title=answer.request.title, provenance=report.command)
 
 
-def content(answer: FitAnswer, shown: Further) -> dict[str, Any]:
-    """Constants, correlations, lines, and what was done beside the fit."""
+def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
+    """Constants, correlations, lines and analyses, by the keys of docs/verbs."""
     from rotor.formats.fit_further import trial_record
 
     fit, names = answer.fit, ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
@@ -229,8 +234,8 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
     from rotor.fitting.report import dfbetas
 
-    of_frequencies = dfbetas(fit)
-    moved = {} if of_frequencies is None else dict(zip(fit.groups.tolist(), of_frequencies, strict=True))
+    shifts = dfbetas(fit)
+    dfbetas_of_line = {} if shifts is None else dict(zip(fit.groups.tolist(), shifts, strict=True))
     difference = fit.difference_mhz
     return [
         {
@@ -244,14 +249,14 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
             "blend": lines.blend[i],
             "used": bool(fit.used[i]),
             "leverage": leverage.get(i),
-            "dfbetas": moved.get(i),
+            "dfbetas": dfbetas_of_line.get(i),
         }
         for i in range(len(lines))
     ]
 
 
 def show(answer: FitAnswer, report: Report) -> None:
-    """Print the parameters with their errors, how well they fit, and what was done beside it."""
+    """Print parameters with errors, statistics and analyses."""
     from rotor.fitting.report import far_off, statistics_text, status_text
 
     fit = answer.fit
@@ -263,7 +268,7 @@ def show(answer: FitAnswer, report: Report) -> None:
             show_table(_trial_table(what, trials))
     if answer.suggestions:
         show_table(_suggestion_table(fit, answer.suggestions))
-    close = [] if far_off(fit) else [("lines", "none is more than 3 errors off")]
+    close = [] if far_off(fit) else [("lines", "none deviates by more than 3 errors")]
     show_facts([*close, *error_facts(report.content.get("errors"))])
 
 
@@ -296,7 +301,7 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
 
 
 def _or_dash(value: float, form: str) -> str:
-    """A number, or a dash for what so few lines leave undefined."""
+    """A number, or a dash if too few lines leave it undefined."""
     return format(value, form) if math.isfinite(value) else "-"
 
 
@@ -329,13 +334,13 @@ def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
 
 
 def _stem(text: str) -> dict[str, str]:
-    """The files of --out by their names."""
+    """The files that --out STEM writes, by output."""
     return {"report": f"{text}.fit", **{name: f"{text}.{name}" for name in CONSTANTS}}
 
 
 VERB = Verb(
     name="fit",
-    about="Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged.",
+    about="Constants from measured lines, with errors, correlations and undetermined parameters; exit code 1 unless converged.",
     examples=EXAMPLES,
     request=FitInput,
     answer=answer,
@@ -345,19 +350,19 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the fitted parameters", "fit"),
-        Output("report", (".fit",), "Write the whole report", lambda answer, path, _: _text(path, report_of(answer)), "out.fit"),
+        Output("report", (".fit",), "Write the full report", lambda answer, path, _: _text(path, report_of(answer)), "out.fit"),
         Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations",
                lambda answer, path, _: write_fitted_toml(answer, path), "out.toml"),
         Output("par", (".par",), "Write the parameters for SPFIT",
                lambda answer, path, _: write_fitted_par(answer, path, variances=False), "out.par"),
-        Output("var", (".var",), "Write the same with errors and correlations, for SPCAT",
+        Output("var", (".var",), "Write the parameters with errors and correlations, for SPCAT",
                lambda answer, path, _: write_fitted_par(answer, path, variances=True), "out.var"),
         Output("table", (".txt", ".md", ".tex"), "Write a table for a publication", write_table, "table.tex"),
         Output("save_lines", (".lin", ".csv"), "Write the assigned lines, merged", write_lines, "all.lin"),
         Output("plot", PICTURES, "Draw the residuals against frequency, J and K (.png, .pdf, .svg)", draw, "rest.png"),
     ),
     subject=MeasuredLines(),
-    shown=Further,
+    shown=FitShown,
     content=content,
     notes=lambda answer: (*answer.request.notes, *answer.fit.notes),
     drawn=None,

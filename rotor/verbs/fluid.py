@@ -1,4 +1,4 @@
-"""`fluid`: a box of rigid molecules, run, written as it runs, and resumed."""
+"""`fluid`: run a box of rigid molecules, with files that grow during the run, and resume it."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ Examples:
 
 @dataclass(frozen=True)
 class BoxInput:
-    """The box: made, or read from a file."""
+    """A box that is made on a lattice, or read from a file."""
 
     source: str | None = declared(
         None,
         Text(),
-        "A box with its cell, or with --molecules 'water' or a model's name",
+        "File of a box with its cell; with --molecules, 'water' or a model's name",
         option="SOURCE",
         panel=MOLECULE,
     )
@@ -61,17 +61,17 @@ class BoxInput:
         example=216,
     )
     density: float | None = declared(
-        None, Quantity("g/cm3", above=0, metavar="D"), "Of the box that is made (g/cm³; by default 0.997)", "conditions.density",
+        None, Quantity("g/cm3", above=0, metavar="D"), "Density of the new box (g/cm³; by default 0.997)", "conditions.density",
         common=True, example=0.997,
     )  # fmt: skip
     equilibration: float | None = declared(
-        None, Quantity("ps", least=0, metavar="T"), "Thermostat before the run (ps), 0 for none; auto: until stationary",
+        None, Quantity("ps", least=0, metavar="T"), "Equilibration before the run (ps), 0 for none; auto: until stationary",
         "conditions.equilibration", none="auto", example="20 ps",
     )  # fmt: skip
     box: str | None = declared(
         None,
         Text(),
-        "Or a file with a box, counted from the scene's folder",
+        "File of a box, relative to the scene's folder, instead of molecules",
         "conditions.box",
         option="",
         panel=CONDITIONS,
@@ -80,28 +80,30 @@ class BoxInput:
 
 
 class Box(SubjectKind):
-    """A box of rigid molecules that is read or made."""
+    """A box of rigid molecules, made or read."""
 
     fields = all_fields(BoxInput)
 
-    def read(self, given: Entries, place: Place, verb: Verb) -> Subject:
-        """The box, and where it is from."""
-        asked: BoxInput = read_instance(BoxInput, given)
-        settings = Settings(**read_fields(Settings, given))
-        self._refuse_unused(asked, settings, given)
-        if given.style == "key":
-            return self._of_scene(asked, place, _of_file(asked, given))
-        if asked.source is None:
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
+        """The box and its origin."""
+        inputs: BoxInput = read_instance(BoxInput, entries)
+        settings = Settings(**read_fields(Settings, entries))
+        self._refuse_unused(inputs, settings, entries)
+        if entries.style == "key":
+            return self._scene_box(inputs, place, _equilibration(inputs, entries))
+        if inputs.source is None:
             raise ValueError("SOURCE is missing; --help shows what the command takes")
-        if asked.molecules is not None:
-            return Subject({"box": _new_box(asked, settings), "box_source": "given"}, (), asked.source, place.note)
-        if not Path(asked.source).is_file():
-            raise ValueError(f"{asked.source}: no such file; with --molecules N a box is made of 'water' or of a model")
-        values = {"box": _read(asked.source), "box_source": asked.source, **_of_file(asked, given)}
-        return Subject(values, (), asked.source, place.note)
+        if inputs.molecules is not None:
+            return Subject({"box": _new_box(inputs, settings), "box_source": "given"}, (), inputs.source, place.note)
+        if not Path(inputs.source).is_file():
+            raise ValueError(
+                f"{inputs.source}: no such file; with --molecules N a box is made of 'water' or of a model"
+            )
+        values = {"box": _read(inputs.source), "box_source": inputs.source, **_equilibration(inputs, entries)}
+        return Subject(values, (), inputs.source, place.note)
 
-    def _refuse_unused(self, asked: BoxInput, settings: Settings, given: Entries) -> None:
-        """ValueError for what was typed and changes nothing: of another ensemble, of other charges, of a box that is made."""
+    def _refuse_unused(self, inputs: BoxInput, settings: Settings, entries: Entries) -> None:
+        """Refuse inputs without effect: of another ensemble, other electrostatics, or a new box."""
         known = all_fields(Settings) | self.fields
         uses = {
             "conditions.friction": ("conditions.ensemble", settings.ensemble, "langevin"),
@@ -109,43 +111,43 @@ class Box(SubjectKind):
             "numerics.ewald_tolerance": ("numerics.electrostatics", settings.electrostatics, "ewald"),
         }
         for name, (choice, chosen, needed) in uses.items():
-            if given.has(known[name]) and chosen != needed:
-                option, other = known[name].called(given.style), known[choice].called(given.style)
-                raise ValueError(f"{option}: expected with {other} {needed}; {chosen} has no use for it")
-        if asked.molecules is None and asked.density is not None:
-            option, other = (known[f"conditions.{n}"].called(given.style) for n in ("density", "molecules"))
+            if entries.has(known[name]) and chosen != needed:
+                option, other = known[name].called(entries.style), known[choice].called(entries.style)
+                raise ValueError(f"{option}: expected with {other} {needed}; {chosen} does not use it")
+        if inputs.molecules is None and inputs.density is not None:
+            option, other = (known[f"conditions.{n}"].called(entries.style) for n in ("density", "molecules"))
             raise ValueError(f"{option}: expected with {other}; the box of a file has the density of its cell")
 
-    def _of_scene(self, asked: BoxInput, place: Place, of_file: dict[str, Any]) -> Subject:
-        if (asked.molecules is None) == (asked.box is None):
+    def _scene_box(self, inputs: BoxInput, place: Place, equilibration: dict[str, Any]) -> Subject:
+        if (inputs.molecules is None) == (inputs.box is None):
             raise ValueError("conditions: give either molecules, to make a box of, or a box")
-        if asked.molecules is not None:
-            density = WATER_G_CM3 if asked.density is None else asked.density
-            box = NewBox(asked.molecules, density, asked.equilibration)
+        if inputs.molecules is not None:
+            density = WATER_G_CM3 if inputs.density is None else inputs.density
+            box = NewBox(inputs.molecules, density, inputs.equilibration)
             return Subject({"box": box, "box_source": "given"}, (), "", place.note)
-        path = str(Path(place.folder) / str(asked.box))
+        path = str(Path(place.folder) / str(inputs.box))
         if not Path(path).is_file():
             raise ValueError(f"conditions.box: {path}: no such file")
         try:
-            return Subject({"box": _read(path), "box_source": str(asked.box), **of_file}, (), path, place.note)
+            return Subject({"box": _read(path), "box_source": str(inputs.box), **equilibration}, (), path, place.note)
         except ValueError as error:
             raise ValueError(f"conditions.box: {error}") from None
 
     def saved(self, request: FluidRequest, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The box that is made, or the file."""
+        """The inputs of a new box, or its file."""
         if isinstance(request.box, NewBox):
-            made = BoxInput(None, request.box.molecules, request.box.density_g_cm3, request.box.equilibration_ps)
-            return written_fields(made)
+            inputs = BoxInput(None, request.box.molecules, request.box.density_g_cm3, request.box.equilibration_ps)
+            return written_fields(inputs)
         files = {"conditions.box": beside(request.box_source, folder)}
         if request.box_equilibration_ps == 0:
             return files
         return files | written_fields(BoxInput(equilibration=request.box_equilibration_ps))
 
 
-def _of_file(asked: BoxInput, given: Entries) -> dict[str, Any]:
-    """The equilibration of a box that is read: none, unless it is requested."""
+def _equilibration(inputs: BoxInput, entries: Entries) -> dict[str, Any]:
+    """The equilibration of a box from a file: none unless it is requested."""
     field = all_fields(BoxInput)["conditions.equilibration"]
-    return {"box_equilibration_ps": asked.equilibration} if given.has(field) else {}
+    return {"box_equilibration_ps": inputs.equilibration} if entries.has(field) else {}
 
 
 def _read(path: str) -> Atoms:
@@ -154,10 +156,10 @@ def _read(path: str) -> Atoms:
     return read_box(path)
 
 
-def _new_box(asked: BoxInput, settings: Settings) -> NewBox:
+def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
     from rotor.fluids.forces.models import MODELS, model_of
 
-    source = str(asked.source)
+    source = str(inputs.source)
     if source != settings.model and source in MODELS:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
@@ -166,19 +168,19 @@ def _new_box(asked: BoxInput, settings: Settings) -> NewBox:
         )
     model = model_of(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):
-        raise ValueError(f"{source!r}: --model {model.name} is no model of water; write {model.name!r}")
-    density = WATER_G_CM3 if asked.density is None else asked.density
-    return NewBox(asked.molecules or 0, density, asked.equilibration)
+        raise ValueError(f"{source!r}: --model {model.name} is not a model of water; write {model.name!r}")
+    density = WATER_G_CM3 if inputs.density is None else inputs.density
+    return NewBox(inputs.molecules or 0, density, inputs.equilibration)
 
 
 @dataclass(frozen=True)
 class FluidShown(Shown):
-    """How files grow, and whether a run continues."""
+    """Intervals of the growing files, and whether a run resumes."""
 
     frames_every: int | None = declared(
         None,
         Whole(1),
-        "Steps between frames; by default as between rows",
+        "Steps between frames; by default those between rows",
         "outputs.frames_every",
         panel=OUTPUT,
         example=100,
@@ -191,20 +193,20 @@ class FluidShown(Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DrawnFluid(FluidAnswer):
-    """A run and what its picture needs. centres: of mass (frames, n, 3) in its second half, or at its end."""
+    """A run and the data of its picture. centres: of mass (frames, n, 3) in Å, over the second half of the run or at its end."""
 
     centres: Any = None
 
 
 def answer(request: FluidRequest, work: Work) -> FluidAnswer:
-    """The run; that of a scene resumes from its checkpoint if there is one.
+    """The run; a scene resumes from its checkpoint if that exists.
 
-    A run that stops on its way is no mistake of the user.
+    A run that stops early is not a mistake of the user: NoAnswerError.
     """
-    growing = {name: [str(path) for path in work.files.get(name, ())] for name in ("csv", "trajectories", "checkpoint")}
-    csv, checkpoint = (next(iter(growing[name]), None) for name in ("csv", "checkpoint"))
+    paths = {name: [str(path) for path in work.files.get(name, ())] for name in ("csv", "trajectories", "checkpoint")}
+    csv, checkpoint = (next(iter(paths[name]), None) for name in ("csv", "checkpoint"))
     shown, from_scene = work.shown, work.from_scene
-    outputs = Outputs(csv, tuple(growing["trajectories"]), shown.frames_every, checkpoint, shown.checkpoint_every)
+    outputs = Outputs(csv, tuple(paths["trajectories"]), shown.frames_every, checkpoint, shown.checkpoint_every)
     resume = shown.resume or (from_scene and checkpoint is not None and Path(checkpoint).is_file())
     head = {**work.provenance, **_settings(request)}
 
@@ -217,27 +219,27 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
     try:
         with frames_for(outputs, "plot" in work.files) as (files, frames):
             quiet: Mapping[str, Any] = {"progress": lambda *_: None} if from_scene else {}
-            made = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
+            run = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:
-                _add_errors(csv, made)
+                _add_errors(csv, run)
             if "plot" not in work.files:
-                return made
-            values = {one.name: getattr(made, one.name) for one in fields(FluidAnswer)}
-            return DrawnFluid(**values, centres=_centres(made, frames))
+                return run
+            values = {field.name: getattr(run, field.name) for field in fields(FluidAnswer)}
+            return DrawnFluid(**values, centres=_centres(run, frames))
     except RunStopped as error:
         raise NoAnswerError(str(error)) from error
     except KeyboardInterrupt:
         if checkpoint is not None and Path(checkpoint).is_file():
-            work.note(f"interrupted; the same command with --resume goes on from {checkpoint}")
+            work.note(f"interrupted; add --resume to continue from {checkpoint}")
         raise
 
 
 def _add_errors(csv: str, answer: FluidAnswer) -> None:
-    """Add the error budget, which the end of a run gives, to the record beside its table."""
+    """Add the error budget, known only at the end of a run, to the record beside its table."""
     from rotor.formats.provenance import write_beside
 
-    beside = Path(f"{csv}.provenance.json")
-    record = json.loads(beside.read_text(encoding="utf-8")) if beside.is_file() else {}
+    path = Path(f"{csv}.provenance.json")
+    record = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     write_beside(csv, {**record, "errors": answer.errors.as_json()})
 
 
@@ -247,9 +249,9 @@ def _settings(request: FluidRequest) -> dict[str, Any]:
 
 @contextmanager
 def frames_for(outputs: Outputs, drawn: bool) -> Iterator[tuple[Outputs, str | None]]:
-    """The files of a run and the one its frames are read from: where a picture asks for some, and none is written, a temporary.
+    """The files of a run, and the file of frames for its picture: a temporary file if no trajectory is written.
 
-    A run that can be resumed has no temporary file: its checkpoint would name it. Its last frame alone is drawn.
+    A run with a checkpoint gets no temporary file, since the checkpoint would name it; then only the last frame is drawn.
     """
     if not drawn or outputs.trajectories or outputs.checkpoint is not None:
         yield outputs, str(outputs.trajectories[0]) if outputs.trajectories else None
@@ -260,7 +262,7 @@ def frames_for(outputs: Outputs, drawn: bool) -> Iterator[tuple[Outputs, str | N
 
 
 def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
-    """Centres of mass (frames, n, 3) in the second half of a run, or those at its end."""
+    """Centres of mass (frames, n, 3) in Å over the second half of a run, or at its end without frames."""
     import numpy as np
     from ase.io import read
 
@@ -270,15 +272,15 @@ def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
 
     models = models_of(answer.request.settings.model)
     shapes = shapes_of(models)
-    taken = read(frames, ":") if frames is not None else [answer.atoms]
-    for atoms in taken:
+    images = read(frames, ":") if frames is not None else [answer.atoms]
+    for atoms in images:
         if "molecule" not in atoms.arrays:
             atoms.arrays["molecule"] = model_labels(atoms, models)
-    return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
+    return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in images[len(images) // 2 :]])
 
 
 def draw(answer: FluidAnswer, path: Path, report: Report) -> None:
-    """The picture of the run as a file."""
+    """Draw temperatures, energy and the pair distribution."""
     from rotor.fluids.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
@@ -294,20 +296,20 @@ def draw(answer: FluidAnswer, path: Path, report: Report) -> None:
     plot_fluid(answer.record, shells, centres.shape[1], path, title=title, view=report.view, provenance=report.command)
 
 
-def _claim(content: Mapping[str, Any], settings: Settings) -> str:
-    """What is known of the thermometer's error; under LAMMPS' noise nothing."""
+def _thermometer_error(content: Mapping[str, Any], settings: Settings) -> str:
+    """Statement on the thermometer's error; none under LAMMPS' thermostat noise, where it is not known."""
     return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
 
 
 def _hill(symbols: str) -> str:
-    """A formula in Hill's order: OH2 is H2O."""
+    """A formula in Hill order: OH2 becomes H2O."""
     from ase.formula import Formula
 
     return str(Formula(symbols).format("hill"))
 
 
 def show(answer: FluidAnswer, report: Report) -> None:
-    """Print the run and the means of its second half."""
+    """Print the run and its means."""
     content, settings = report.content, answer.request.settings
     kinds = ", ".join(f"{kind['count']} {_hill(kind['name'])}" for kind in content["molecules"])
     degrees = content["degrees"]
@@ -320,7 +322,7 @@ def show(answer: FluidAnswer, report: Report) -> None:
             "degrees",
             f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
         ),
-        ("thermometer", content["thermometer"] + _claim(content, settings)),
+        ("thermometer", content["thermometer"] + _thermometer_error(content, settings)),
         ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
     ]
     if content["density_g_cm3"] is not None:
@@ -341,8 +343,8 @@ def show(answer: FluidAnswer, report: Report) -> None:
     ]
     print()
     columns = ["quantity", "unit", "mean", "error", "samples"]
-    rows_meant = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
-    show_table(Table(rows_meant, columns, rows, frozenset({"quantity", "unit"})))
+    title = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
+    show_table(Table(title, columns, rows, frozenset({"quantity", "unit"})))
 
 
 VERB = Verb(
@@ -355,11 +357,11 @@ VERB = Verb(
     rows="record",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write rows as they come (.csv)", example="run.csv", grows=True),
+        Output("csv", (".csv",), "Write rows during the run (.csv)", example="run.csv", grows=True),
         Output(
             "trajectories",
             FRAMES,
-            "Write frames as they come (.traj, .xyz, .extxyz); repeatable",
+            "Write frames during the run (.traj, .xyz, .extxyz); repeatable",
             example="run.traj",
             option="--trajectory",
             grows=True,

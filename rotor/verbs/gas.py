@@ -1,4 +1,4 @@
-"""`gas`: a classical gas of free molecules, tested for equipartition; its correlation functions."""
+"""`gas`: a classical gas of free molecules: test of equipartition, correlation functions."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Examples:
 
 
 def adapt(request: GasRequest, outputs: Mapping[str, Any], entries: Entries) -> GasRequest:
-    """Times until the correlation functions have settled, where files ask for them and none are given."""
+    """Add times until the correlation functions have settled, if files need them and none are given."""
     if request.times_ps is None and outputs.keys() & {"csv", "parquet", "json", "plot"}:
         return replace(request, times_ps=settling_times_ps(request.top, request.temperature_k))
     return request
 
 
 def answer(request: GasRequest, work: Work) -> GasAnswer:
-    """The gas, tested, and its correlation functions on all cores; the answer does not depend on their number."""
+    """The gas and its test, with correlation functions on all cores; the result does not depend on their number."""
     if request.times_ps is None:
         return answer_gas(request)
     bar = counting(request.molecules, "molecules") if work.progress else nullcontext()
@@ -49,7 +49,7 @@ def answer(request: GasRequest, work: Work) -> GasAnswer:
 
 
 def draw(answer: GasAnswer, path: Path, report: Report) -> None:
-    """The picture of the test and of the correlation functions as a file."""
+    """Draw the test and the correlation functions."""
     from rotor.plots.gas import plot_gas
     from rotor.plots.picture import name_of_top
 
@@ -81,7 +81,7 @@ def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str
     rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
     count = content["degrees_of_freedom"]
     drawn = f"{content['molecules']} molecules at {content['temperature_k']:g} K, seed {content['seed']}"
-    left_out = "" if top.mass_u is not None else "; translations are left out, as the mass is not known"
+    left_out = "" if top.mass_u is not None else "; translations are left out: the mass is not known"
     facts = [
         ("rigid top", f"{rigid} MHz, distortion neglected"),
         ("drawn", f"{drawn}; moved freely for {content['tested_at_ps']:.4g} ps, exactly"),

@@ -1,4 +1,4 @@
-"""`rotor identify`: which species an observed spectrum needs, ranked by evidence, and the lines that stay unidentified."""
+"""`rotor identify`: species that an observed spectrum needs, ranked by evidence, and unidentified lines."""
 
 from __future__ import annotations
 
@@ -33,26 +33,24 @@ Examples:
 
 @dataclass(frozen=True)
 class IdentifyRequest:
-    """The spectrum, the candidates, and how they are looked for."""
+    """The spectrum, the candidates, and settings of the search."""
 
     file: str = declared(REQUIRED, Text(), "Spectrum: FITS or text", option="FILE")
     catalogue: tuple[str, ...] = declared(
         (), Names("FILE"), "Local catalogue, folder of .cat, or .cat; repeatable", option="--catalogue"
     )
-    range_mhz: tuple[float, float] = declared(
-        INFINITE, Range("MHz"), "Frequencies that are used (MHz)", option="--range"
-    )
+    range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Range of frequencies (MHz)", option="--range")
     velocity_km_s: float | None = declared(
         None,
         Quantity("km/s", metavar="V"),
-        "Velocity of the source (km/s); estimated without",
+        "Velocity of the source (km/s); by default estimated",
         option="--velocity",
         panel=CONDITIONS,
     )
     fwhm_km_s: float | None = declared(
         None,
         Quantity("km/s", metavar="W"),
-        "Full width of the lines (km/s); estimated without",
+        "Full width of the lines (km/s); by default estimated",
         option="--width",
         panel=CONDITIONS,
     )
@@ -61,7 +59,7 @@ class IdentifyRequest:
     )
     redshift: float = declared(0.0, Quantity(metavar="Z"), "Redshift of the source", panel=CONDITIONS)
     model_error: float = declared(0.1, Quantity(least=0, most=1), "Error of the model as a fraction of the brightness")
-    most: int = declared(60, Whole(1), "Species at most")
+    most: int = declared(60, Whole(1), "Largest number of species")
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
 
     def __post_init__(self) -> None:
@@ -74,27 +72,27 @@ class IdentifyRequest:
 
 @dataclass(frozen=True)
 class Identified:
-    """The spectrum, and the species that it needs."""
+    """The spectrum and its species."""
 
     observed: ObservedSpectrum
     sight: Sight
-    found: Identification
+    identification: Identification
     model_error: float
 
     def facts(self) -> dict[str, Any]:
         """Spectrum and species, by the keys of docs/verbs."""
-        return {"spectrum": json_of(self.observed), **self.found.facts(), "errors": self.errors.as_json()}
+        return {"spectrum": json_of(self.observed), **self.identification.facts(), "errors": self.errors.as_json()}
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the column densities can be trusted."""
+        """Error budget of the column densities."""
         from rotor.observed.budgets import columns_budget
 
-        return columns_budget(self.found.fit, self.model_error)
+        return columns_budget(self.identification.fit, self.model_error)
 
 
 def answer(request: IdentifyRequest, work: Work) -> Identified:
-    """The species by evidence."""
+    """The species, ranked by evidence."""
     from rotor.observed.identify import IdentifyChoices, identify
 
     choices = IdentifyChoices(
@@ -115,7 +113,7 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
 
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
-    """Species with lines in the range, of catalogues, folders and files."""
+    """Species with lines in the range, from catalogues, folders and files."""
     from rotor.formats.catalogue.cat_species import read_cat_species
     from rotor.formats.catalogue.catdir import is_catdir
     from rotor.formats.catalogue.database import LineCatalogue
@@ -132,7 +130,8 @@ def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[
                 else [path]
             )
             species = [read_cat_species(file) for file in files if not is_catdir(file)]
-            out += [each.between(*range_mhz) for each in species if len(each.between(*range_mhz))]
+            in_range = [lines.between(*range_mhz) for lines in species]
+            out += [lines for lines in in_range if len(lines)]
             if path.is_dir() and not files:
                 raise ValueError(f"--catalogue {source}: no .cat file in this folder")
         else:
@@ -142,11 +141,11 @@ def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[
 
 
 def draw(answer: Identified, path: Path, report: Report) -> None:
-    """Pages with the fitted model."""
+    """Draw pages of panels with the fitted model."""
     from rotor.plots.overlay import plot_overlay
 
-    components = [evidence.component for evidence in answer.found.species]
-    marked = [line.frequency_mhz for line in answer.found.unidentified]
+    components = [evidence.component for evidence in answer.identification.species]
+    marked = [line.frequency_mhz for line in answer.identification.unidentified]
     plot_overlay(
         answer.observed, components, path, sight=answer.sight, unidentified_mhz=marked, provenance=report.command
     )
@@ -155,13 +154,13 @@ def draw(answer: Identified, path: Path, report: Report) -> None:
 def show(answer: Identified, report: Report) -> None:
     """Print the spectrum, the species by evidence and the unidentified lines."""
     show_facts(spectrum_facts(answer.observed))
-    identification = answer.found
+    identification = answer.identification
     chi = "" if identification.fit is None else f", χ²/ν = {identification.fit.reduced_chi_squared:.3g}"
     show_facts(
         [
             ("candidates", str(identification.candidates)),
             (
-                "begun with",
+                "start",
                 f"velocity {identification.velocity_km_s:.2f} km/s, width {identification.fwhm_km_s:.2f} km/s",
             ),
             ("species", f"{len(identification.species)}{chi}"),
@@ -208,12 +207,12 @@ def _species_table(identification: Identification) -> Table:
 
 VERB = Tool(
     name="identify",
-    about="Which species an observed spectrum needs, by evidence; unidentified lines.",
+    about="Species that an observed spectrum needs, by evidence; unidentified lines.",
     examples=EXAMPLES,
     request=IdentifyRequest,
     of="file",
     answer=answer,
-    table=lambda answer: answer.found,
+    table=lambda answer: answer.identification,
     show=show,
     outputs=(
         Output("csv", (".csv",), "Write the species as CSV"),

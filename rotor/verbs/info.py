@@ -1,4 +1,4 @@
-"""`info`: what a molecule is as a top."""
+"""`info`: constants, axes, kind and partition function of a molecule as a top."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Examples:
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> InfoRequest:
-    """The request, with the text of a SMILES."""
+    """The request; a SMILES is passed on as text."""
     return InfoRequest(**subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text)
 
 
 def answer(request: InfoRequest, work: Work) -> InfoAnswer:
-    """The answer, with a bar on a terminal while levels are summed."""
+    """The answer, with a progress line on a terminal while levels are summed."""
     return answer_info(request, sum_progress() if work.progress else None)
 
 
@@ -40,9 +40,9 @@ def show(answer: InfoAnswer, report: Report) -> None:
     top, content = answer.request.top, report.content
     print(top_facts.heading(top))
     show_facts(_facts(top, content))
-    others = _conformers_of(content.get("conformers", []))
+    conformers = _conformers_table(content.get("conformers", []))
     axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
-    for table in (_constants_table(top), _states_table(top), axes, nuclei, q, others):
+    for table in (_constants_table(top), _states_table(top), axes, nuclei, q, conformers):
         if table:
             print()
             show_table(table)
@@ -79,17 +79,19 @@ def _near_text(content: Mapping[str, Any]) -> str:
     if content["near_point_group"] is None:
         return ""
     off = content["near_displacement_angstrom"]
-    return f"; near {content['near_point_group']}: nuclei are up to {off:.2g} Å off it (--symmetry-tolerance takes it)"
+    return (
+        f"; near {content['near_point_group']}: nuclei are up to {off:.2g} Å off it (--symmetry-tolerance accepts it)"
+    )
 
 
 def _kind_text(kind: str, decision: Mapping[str, Any]) -> str:
-    """Which numbers decided the kind of the geometry, and how clearly."""
+    """The ratios that decided the kind of the geometry, and the margin."""
     numbers = (
         f"Ia/Ic = {decision['ia_over_ic']:.3g} (linear below {decision['linear_below']:g}), "
         f"(Ib-Ia)/Ib = {decision['ib_minus_ia_over_ib']:.3g}, (Ic-Ib)/Ic = {decision['ic_minus_ib_over_ic']:.3g} "
         f"(equal within {decision['equal_within']:g})"
     )
-    differs = "" if kind == decision["kind"] else f"; the constants given are those of another kind, {kind}"
+    differs = "" if kind == decision["kind"] else f"; the constants are those of another kind, {kind}"
     return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {_margin_text(decision['margin'])}{differs}"
 
 
@@ -98,12 +100,16 @@ def _margin_text(margin: float) -> str:
 
 
 def _constants_table(top: Top) -> Table:
-    known, estimated = top.constants.uncertainties, estimated_errors_mhz(top)
+    stated, estimated = top.constants.uncertainties, estimated_errors_mhz(top)
     rows = []
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)
         error = (
-            f"{known[name]:.2g}" if name in known else f"about {top_facts.known_digits(guess, guess)}" if guess else ""
+            f"{stated[name]:.2g}"
+            if name in stated
+            else f"about {top_facts.known_digits(guess, guess)}"
+            if guess
+            else ""
         )
         wavenumber = top_facts.known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
         rows.append((name, top_facts.known_digits(mhz, guess), error, wavenumber))
@@ -111,7 +117,7 @@ def _constants_table(top: Top) -> Table:
 
 
 def _states_table(top: Top) -> Table | None:
-    """Constants of further states and what couples them."""
+    """Constants of further vibrational states and their couplings."""
     if top.states is None:
         return None
     rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.10g}") for name, mhz in top.states.values.items()]
@@ -119,7 +125,7 @@ def _states_table(top: Top) -> Table | None:
 
 
 def _axes_table(content: Mapping[str, Any]) -> Table:
-    """Moments, planar moments, and the axes and the centre of mass in the frame of the input."""
+    """Moments and planar moments; axes and centre of mass in the frame of the input."""
     moments, planar, frame = (content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
     rows = []
@@ -132,20 +138,20 @@ def _axes_table(content: Mapping[str, Any]) -> Table:
 
 
 def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
-    """Nuclei that split lines, by how much, and the constants that are known."""
+    """Nuclei that split lines, the size of the splitting, and their constants if known."""
     rows = []
     for nucleus in content["splitting_nuclei"]:
         constants_of_spin = top.spin_constants.of(nucleus["nucleus"]) if nucleus["known"] and top.spin_constants else {}
         constants = ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())
-        said = constants or "not known; the size is that of covalent bonds of this element"
+        text = constants or "not known; the size is that of covalent bonds of this element"
         about = "" if nucleus["known"] else "about "
-        rows.append([nucleus["nucleus"], f"{nucleus['spin']:g}", f"{about}{nucleus['splitting_mhz']:.3g}", said])
+        rows.append([nucleus["nucleus"], f"{nucleus['spin']:g}", f"{about}{nucleus['splitting_mhz']:.3g}", text])
     listed = [row[0] for row in rows]
-    known = top.spin_constants.values if top.spin_constants else {}
-    for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(known))):  # electrons, spins of 1/2, pairs
+    values = top.spin_constants.values if top.spin_constants else {}
+    for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(values))):  # electrons, spins of 1/2, pairs
         if spins not in listed:
             constants_of_spin = {
-                name.replace(f"({spins})", ""): value for name, value in known.items() if f"({spins})" in name
+                name.replace(f"({spins})", ""): value for name, value in values.items() if f"({spins})" in name
             }
             size = "" if "," in spins or not top.spin_constants else f"{top.spin_constants.twice[spins] / 2:g}"
             rows.append(
@@ -158,17 +164,17 @@ def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
 
 
 def _reason(source: str) -> str:
-    """Why a sum means nothing, without the temperature that stands beside it and without the remedy."""
+    """Reason why a sum has no meaning, without temperature and remedy."""
     return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
 
 
 def _q_table(content: Mapping[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
-        known = row["q"] is not None
-        last = "-" if row["jmax"] is None else f"{row['jmax']}"  # where the classical limit was as good as a sum
-        summed = [f"{row['q']:.6g}", last, f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
-        remark = "" if known else _reason(row["source"])
+        has_sum = row["q"] is not None
+        last = "-" if row["jmax"] is None else f"{row['jmax']}"  # None: the classical limit replaced the sum
+        summed = [f"{row['q']:.6g}", last, f"{row['relative_error']:.0e}"] if has_sum else ["-", "-", "-"]
+        remark = "" if has_sum else _reason(row["source"])
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
     columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
     if not any(row[-1] for row in rows):
@@ -176,8 +182,8 @@ def _q_table(content: Mapping[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"remark"}))
 
 
-def _conformers_of(records: Sequence[Mapping[str, Any]]) -> Table | None:
-    """The conformers, where they were asked for."""
+def _conformers_table(records: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Energies, constants and dipoles of the conformers, if they were requested."""
     if not records:
         return None
     columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")

@@ -1,4 +1,4 @@
-"""`rotor spectrum case.int`: what SPCAT computes from that file and the .var or .par beside it."""
+"""`rotor spectrum case.int`: the prediction of SPCAT from this file and the .var or .par beside it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
     from rotor.formats.spcat.text.egy import LevelList
 
-# what the .int and its parameter file say themselves: input of the verb -> field of the files
+# inputs of the verb that the .int or its parameter file already determines -> field of the files
 ANSWERED = {
     "conditions.temperature": "TEMP",
     "numerics.jmax": "FEND",
@@ -48,7 +48,7 @@ ANSWERED = {
 
 @dataclass(frozen=True)
 class PredictedRequest(SpectrumRequest):
-    """The request that the files of SPCAT make; prediction: its lines. source: the .int file. basis: how it was chosen."""
+    """The request of SPCAT's files. prediction: its lines. source: the .int file. basis: settings of the prediction."""
 
     prediction: Any = None
     source: str = ""
@@ -61,14 +61,14 @@ def is_int_file(source: Any) -> bool:
 
 
 def predicted(source: str, entries: Entries, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
-    """The prediction of an .int file; its notes are remarks. Inputs that the files answer themselves are refused.
+    """The prediction of an .int file. Inputs that the files determine are refused; notes are passed on.
 
-    called: the name of an input, by its identity. basis: as_spcat and full_basis.
+    called: name of an input, by its identity. basis: as_spcat and full_basis.
     """
     for identity, field in ANSWERED.items():
         if entries.values.get(identity) is not None:
             raise ValueError(
-                f"{called(identity)}: {source} says that itself ({field}); change it there{_or_its_var(source)}"
+                f"{called(identity)}: {source} determines it ({field}); change it there{_or_its_var(source)}"
             )
     from rotor.formats.spcat.predict import predict_file
 
@@ -79,7 +79,7 @@ def predicted(source: str, entries: Entries, called: Callable[[str], str], note:
 
 
 def _or_its_var(source: str) -> str:
-    """The other way out, where the constants of the parameter file have names."""
+    """A second remedy, if the constants of the parameter file have names."""
     from rotor.formats.read_write import read_spcat_top
 
     path = Path(source).with_suffix(".var")
@@ -91,7 +91,7 @@ def _or_its_var(source: str) -> str:
 
 
 def with_names(prediction: Prediction, source: Path) -> Prediction:
-    """The prediction with the named constants of its files, their spins and states, where all have names; else as it is."""
+    """The prediction with named constants, spins and states if all parameters have names; else unchanged."""
     from rotor.formats.read_write import read_spcat_top
     from rotor.quantum.effects.of_top import effects_of
 
@@ -108,7 +108,7 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
 
 
 def request_of(prediction: Prediction, source: str, shape: dict[str, Any], **basis: bool) -> PredictedRequest:
-    """The request that the files of a prediction make; shape: profile, width and layer."""
+    """The request of a prediction's files; shape: profile, width and layer of gas."""
     settings, lines = prediction.request, prediction.lines
     return PredictedRequest(
         lines.top,
@@ -130,7 +130,7 @@ def answer_of(request: PredictedRequest) -> SpectrumAnswer:
 
 
 def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
+    """Write the catalogue as SPCAT does: with its weights, its zero of energy, and K doublets as two lines."""
     from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.text.cat import write_cat
 
@@ -141,7 +141,7 @@ def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 
 def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The levels as SPCAT lists them."""
+    """Write the levels as SPCAT lists them."""
     from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.text.egy import write_egy
 
@@ -152,7 +152,7 @@ def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 
 def _levels_of(answer: SpectrumAnswer) -> LevelList:
-    """The levels as SPCAT lists them."""
+    """Levels as SPCAT lists them; solved now if the prediction did not need them."""
     request = answer.request
     assert isinstance(request, PredictedRequest)
     from rotor.formats.spcat.predict import levels_of_file

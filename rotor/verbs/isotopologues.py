@@ -1,4 +1,4 @@
-"""`isotopologues`: the family of a molecule, by abundance or by substitution."""
+"""`isotopologues`: isotopologues of a molecule, by abundance or by substitution."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Examples:
 
 
 def show(answer: IsotopologuesAnswer, report: Report) -> None:
-    """Print the isotopologues, and constants of spins where they are known."""
+    """Print the isotopologues and their spin constants if known."""
     show_table(_table(answer.request.top, answer.family))
     rows = [
         [isotopologue.label, _constants_text(isotopologue.top)]
@@ -29,7 +29,7 @@ def show(answer: IsotopologuesAnswer, report: Report) -> None:
         if isotopologue.top.spin_constants
     ]
     if rows:
-        columns = ("isotopologue", "constants of spins (MHz)")
+        columns = ("isotopologue", "spin constants (MHz)")
         print()
         show_table(Table("", columns, rows, frozenset(columns)))
     print()
@@ -37,9 +37,9 @@ def show(answer: IsotopologuesAnswer, report: Report) -> None:
 
 
 def _constants_text(top: Top) -> str:
-    """The constants of spins of a top by name, in MHz."""
-    known = top.spin_constants.values if top.spin_constants else {}
-    return ", ".join(f"{name} {value:.6g}" for name, value in known.items())
+    """The spin constants of a top, in MHz."""
+    values = top.spin_constants.values if top.spin_constants else {}
+    return ", ".join(f"{name} {value:.6g}" for name, value in values.items())
 
 
 def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
@@ -55,7 +55,7 @@ def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
 
 
 def _rigid_texts(top: Top) -> list[str]:
-    """A, B, C with the digits that their estimated error leaves, and that error in per cent."""
+    """A, B, C rounded to their estimated error, and that error in per cent."""
     errors = estimated_errors_mhz(top)
     if not errors:
         return [f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz] + [""]
@@ -80,13 +80,13 @@ def _row(isotopologue: Isotopologue) -> list[str]:
         isotopologue.axes,
         f"{isotopologue.turned_degrees:.2f}",
         *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),
-        weights or "all alike",
+        weights or "all equal",
     ]
 
 
 VERB = Verb(
     name="isotopologues",
-    about="Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each, and constants of spins if known.",
+    about="Isotopologues: abundance, constants, kind, axes, dipole, spin weights, and spin constants if known.",
     examples=EXAMPLES,
     request=IsotopologuesRequest,
     answer=lambda request, work: answer_isotopologues(request),

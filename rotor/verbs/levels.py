@@ -1,4 +1,4 @@
-"""`levels`: the energy levels of a molecule, as a table and as a term diagram."""
+"""`levels`: energy levels of a molecule as a table and a term diagram."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ Examples:
 
 @dataclass(frozen=True)
 class LevelsShown(Shown):
-    """How levels are shown."""
+    """Display options of `levels`."""
 
     unit: str = declared(
         "cm-1",
         Text(tuple(COLUMNS), "UNIT"),
-        "Of the table and the diagram: MHz, cm-1 or K",
+        "Unit of the table and the diagram: MHz, cm-1 or K",
         option="--unit",
         panel=OUTPUT,
     )
-    top_levels: int = declared(60, Whole(0), "How many of the lowest levels are shown", option="--top", panel=OUTPUT)
+    top_levels: int = declared(60, Whole(0), "Number of lowest levels shown", option="--top", panel=OUTPUT)
 
 
 def _span(name: str) -> Any:
-    """What reads `2:5` as the least and the largest value of a quantum number."""
+    """Reader of `2:5` as the range of a quantum number."""
 
     def read(text: str) -> Mapping[str, Any]:
         first, last = whole_range(text)
@@ -54,7 +54,7 @@ def _span(name: str) -> Any:
 
 
 def draw(answer: LevelsAnswer, path: Path, report: Report) -> None:
-    """The term diagram as a file."""
+    """Draw the term diagram."""
     from rotor.plots.levels import plot_levels
 
     unit = report.shown.unit
@@ -92,7 +92,7 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
     ground = f"{headings(levels.quanta_names)} = {name}, {round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
     absent = int((levels.weight[answer.table.rows] == 0).sum())
     if absent:
-        limits += f"; {absent} of spin weight 0 do not exist and are not shown"
+        limits += f"; {absent} of spin weight 0, which do not exist, are not shown"
     return [
         ("constants", top_facts.constants_text(top)),
         *top_facts.weights_facts(top, content["spin_weights"]),
@@ -104,7 +104,7 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
 
 
 def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
-    """The lowest levels that exist, in order of energy."""
+    """The lowest existing levels in order of energy."""
     import numpy as np
 
     from rotor.quantum import quanta
@@ -140,7 +140,7 @@ VERB = Verb(
     subject=OneMolecule(("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles")),
     shown=LevelsShown,
     notes=lambda answer: answer.warnings,
-    nothing=lambda answer: "" if len(answer.table) else "there is no level in this range",
+    nothing=lambda answer: "" if len(answer.table) else "no level in this range",
     scaled=False,
     extras=(
         Extra(

@@ -1,4 +1,4 @@
-"""Lists of lines that do not fit in memory: sorted on disk, written from there, and shown by their strongest lines."""
+"""Line lists too long for memory: sorted and written on disk; the strongest lines are shown."""
 
 from __future__ import annotations
 
@@ -14,30 +14,32 @@ from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectr
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines
 
-TRANSITIONS = 2_000_000  # before the cut, beyond which a list is made on disk: in memory each takes some 0.3 kB
-STRONGEST = 1_000  # lines that are in memory
-STREAMED = frozenset({"cat", "csv", "parquet"})  # outputs that are written from the disk
-SMALL = frozenset({"json", "save_scene"})  # outputs beside them: a scene has no lines, JSON has all while they are few
-JSON_LINES = 200_000  # the text of a line takes some 0.6 kB, and the whole text is in memory
+TRANSITIONS = (
+    2_000_000  # before the cut; longer lists are made on disk, since each transition takes about 0.3 kB of memory
+)
+STRONGEST = 1_000  # lines held in memory
+STREAMED = frozenset({"cat", "csv", "parquet"})  # outputs written from disk
+SMALL = frozenset({"json", "save_scene"})  # further allowed outputs: a scene has no lines, JSON only few
+JSON_LINES = 200_000  # limit of JSON, whose text takes about 0.6 kB of memory for each line
 
 
 @dataclass(frozen=True, repr=False)
 class LongAnswer(SpectrumAnswer):
-    """A list on disk. lines: the strongest of them; whole: all. span_mhz: its first and last frequency. files: still to be written."""
+    """A list on disk. lines: the strongest. whole: all lines. span_mhz: first and last frequency. files: not yet written."""
 
     whole: SortedLines
     span_mhz: tuple[float, float]
     files: list[Path]
 
     def write(self, path: Path, tag: int) -> None:
-        """Write all lines; what is on disk is removed with the last file."""
+        """Write all lines; the pieces on disk are removed after the last file."""
         self.whole.write(path, tag)
         self.files.pop()
         if not self.files:
             self.whole.remove()
 
     def facts(self) -> dict[str, Any]:
-        """As of any list, of all its lines."""
+        """The facts of a spectrum, counted over all lines."""
         plan = self.whole.plan
         return super().facts() | {
             "jmax": plan.jmax,
@@ -47,7 +49,7 @@ class LongAnswer(SpectrumAnswer):
 
 
 def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> bool:
-    """Whether a list is made on disk: so many transitions that memory may not hold them, and no output that needs it."""
+    """Whether a list is made on disk: it may exceed memory, and no output needs it there."""
     plain = request.shape == "sticks" and request.layer is None and resolution is None and not request.untrusted
     if (
         not plain
@@ -69,7 +71,7 @@ def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
 
 
 def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> None:
-    """ValueError for the JSON of a list on disk that no cut shortens: before any work."""
+    """Refuse JSON of a list on disk without range and cut, before any work."""
     if "json" in files and request.min_lgint is None and is_long(request, files, resolution):
         from rotor.formats.streamed_lines import transition_count
 
@@ -80,13 +82,13 @@ def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolut
 
 def _no_json(count: str) -> str:
     return (
-        f"--json: {count} lines are sorted on disk, and JSON has at most {JSON_LINES} of them in memory; leave --json out "
+        f"--json: {count} lines exceed the {JSON_LINES} that JSON can hold in memory; leave --json out "
         "(--parquet has every column of every line), or give --range or a higher --min-lgint"
     )
 
 
 def _highest_j(request: SpectrumRequest) -> int:
-    """The highest J that is given, or, roughly, that of the usual cut: where Q is not known yet, for Q = 1."""
+    """The requested highest J, or an estimate from the usual cut (with Q = 1e4 if Q is not known)."""
     from rotor.spectra.intensity import USUAL_CUT, jmax_for_cut
 
     dipole = request.top.dipole_abc_debye
@@ -95,20 +97,20 @@ def _highest_j(request: SpectrumRequest) -> int:
     least = USUAL_CUT if request.min_lgint is None else request.min_lgint
     try:
         return jmax_for_cut(request.top, dipole, request.temperature_k, request.q or 1e4, least)
-    except ValueError:  # the list itself says so
+    except ValueError:  # the line list raises it with the reason
         return 0
 
 
 def answer_long(
     request: SpectrumRequest, files: Mapping[str, tuple[Path, ...]], strongest: int, progress: bool
 ) -> LongAnswer:
-    """The lines of a request, sorted in a folder beside the first of its files; a run that was cut off goes on from there."""
+    """The lines of a request, sorted in a folder beside its first file; an interrupted run resumes from there."""
     paths = _streamed(files)
     with progress_bar("pieces") if progress else nullcontext() as advance:
         whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)
     if "json" in files and whole.count > JSON_LINES:
         raise ValueError(
-            f"{_no_json(str(whole.count))}; the lines are in {whole.plan.folder}, from where the same command without --json writes them"
+            f"{_no_json(str(whole.count))}; the sorted lines are in {whole.plan.folder}; the same command without --json writes them"
         )
     complete = None, whole.plan.jmax
     cut, jmax = complete if "json" in files else whole.strongest_cut(max(strongest, STRONGEST))

@@ -1,4 +1,4 @@
-"""What `fit` computes of: measured lines, and constants to start from."""
+"""Subject of `fit`: measured lines and starting constants."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 class Priors(Reader):
-    """A-priori errors in MHz by name: texts such as DeltaK=0.02, or a table."""
+    """A-priori standard errors in MHz by name: texts such as DeltaK=0.02, or a table."""
 
     metavar = "X=ERROR"
     scene_type: Any = dict[str, float | str]
     many = True
 
     def read(self, raw: Any) -> dict[str, float]:
-        """The errors by name, each named once."""
+        """The errors by name; a repeated name is refused."""
         if isinstance(raw, Mapping):
             return {name: self._number(value, f".{name}: ") for name, value in raw.items()}
         numbers: dict[str, float] = {}
@@ -54,7 +54,7 @@ class Priors(Reader):
 
 
 def _lines(raw: Any) -> Any:
-    """A file by its name, or lines or rows of numbers as they are."""
+    """A file name, or lines or rows of numbers unchanged."""
     return os.fspath(raw) if isinstance(raw, os.PathLike) else raw
 
 
@@ -69,7 +69,7 @@ class LinesInput:
     lin: str | None = declared(
         None,
         Text(metavar="FILE"),
-        "Lines of case.par, where they are not case.lin",
+        "Lines of case.par, if not case.lin",
         "lines.lin",
         panel=CONDITIONS,
         example="case.lin",
@@ -82,7 +82,7 @@ class LinesInput:
 
 @dataclass(frozen=True)
 class FitInput:
-    """What is fitted, and how; a .par file says itself what is free. The numbers are those of `rotor.fitting.fit.FitOptions`."""
+    """Free parameters and settings of a fit; a .par file states its free parameters. Numbers as in `rotor.fitting.fit.FitOptions`."""
 
     free: tuple[str, ...] | None = declared(
         None, NameList(), 'Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; by default those of the '
@@ -97,16 +97,16 @@ class FitInput:
         panel=OBSERVABLES, common=True, example={"DeltaK": "20 kHz"},
     )  # fmt: skip
     reject_above: float | None = declared(
-        None, Quantity(), "Lines more errors off than this do not count; they are reported", "numerics.reject_above", option="--reject",
+        None, Quantity(), "Exclude and report lines that deviate by more than this many errors", "numerics.reject_above", option="--reject",
         panel=NUMERICS, common=True, example=5.0,
     )  # fmt: skip
     loss: str = declared(
-        "squares", Text(metavar="NAME"), "squares, or huber or cauchy: lines far off weigh less", "numerics.loss"
+        "squares", Text(metavar="NAME"), "squares; huber or cauchy give outliers less weight", "numerics.loss"
     )
     default_error_mhz: float | None = declared(
         None,
         Quantity("MHz", above=0),
-        "Error of lines whose file gives 0 (MHz)",
+        "Error of lines for which the file states 0 (MHz)",
         "numerics.default_error",
         example="10 kHz",
     )
@@ -124,11 +124,11 @@ START = replace(
     common=True,
     help="Constants to start from: a file (.toml, .var, ...) or a name",
 )
-_START = ("constants", "spin_constants", "spins", "state_constants")  # inputs of the start that are options too
+_START = ("constants", "spin_constants", "spins", "state_constants")  # inputs of the start that are also options
 
 
 class MeasuredLines(SubjectKind):
-    """Measured lines, and the molecule whose constants the fit starts from."""
+    """Measured lines, and the molecule whose constants start the fit."""
 
     fields = {  # noqa: RUF012
         **all_fields(LinesInput), **{field.identity: field for field in FIELDS.values()}, START.identity: START,
@@ -136,35 +136,40 @@ class MeasuredLines(SubjectKind):
 
     @property
     def options(self) -> Mapping[str, Field]:
-        """Lines and start."""
+        """Inputs of the lines and of the start."""
         start = {FIELDS[name].identity: FIELDS[name] for name in _START}
         return {**all_fields(LinesInput), START.identity: START, **start}
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The key `molecule`, which a .par file needs not."""
-        return [optional_molecule("where the fit starts; a .par file says so itself")]
+        """The key `molecule`, which a .par file makes superfluous."""
+        return [optional_molecule("start of the fit; not needed with a .par file")]
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables, a name alone being the source."""
+        """The tables of a scene; a plain name of a molecule is its source."""
         return with_molecule_table(content)
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The files of the lines, and the top to start from."""
+        """The files of the lines, and the starting top."""
         lines: LinesInput = read_instance(LinesInput, entries)
         called = {name: field.called(entries.style) for name, field in LINES.items()}
         if lines.source is None:
             raise ValueError(f"{called['source']} is missing; expected measured lines: .lin, .csv, .cat or case.par")
         is_file = isinstance(lines.source, str)
-        of_spfit = is_file and lines.source.lower().endswith(".par")
-        if lines.lin is not None and not of_spfit:
-            raise ValueError(f"{called['lin']}: goes with a .par file; give the lines as the source otherwise")
+        is_par = is_file and lines.source.lower().endswith(".par")
+        if lines.lin is not None and not is_par:
+            raise ValueError(f"{called['lin']}: expected with a .par file; otherwise give the lines as the source")
         paths = {name: _path(getattr(lines, name), called[name], place) for name in LINES}
-        values: dict[str, Any] = {"paths": paths, "asked": read_instance(FitInput, entries), "top": None, "start": None}
+        values: dict[str, Any] = {
+            "paths": paths,
+            "inputs": read_instance(FitInput, entries),
+            "top": None,
+            "start": None,
+        }
         text = lines.source if is_file else f"{len(lines.source)} lines"
-        if of_spfit:
+        if is_par:
             _refuse_start(entries, verb)
             return Subject(values, (lines, None), text, place.note)
-        molecule = _start_of(entries)
+        molecule = _start(entries)
         values["top"] = top_of(Reading(molecule, entries.style, place.folder, place.note))
         if molecule.source is not None:
             file = Path(place.folder) / str(molecule.source)
@@ -172,17 +177,17 @@ class MeasuredLines(SubjectKind):
         return Subject(values, (lines, molecule), text, place.note)
 
     def saved(self, request: FitRequest, subject: Subject, folder: Path) -> dict[str, Any]:
-        """Lines, start and parameters, files counted from the folder of the scene."""
+        """Lines, start and parameters, with files relative to the folder of the scene."""
         lines, molecule = subject.molecules
         if not isinstance(lines.source, str):
-            raise ValueError("a scene holds no lines themselves; give a file")
+            raise ValueError("a scene cannot hold lines; give a file")
         content = {key: beside(value, folder) for key, value in written_fields(lines).items()}
         start = {} if molecule is None else saved_molecule(molecule, folder)
-        return {**content, **start, **written_fields(subject.values["asked"])}
+        return {**content, **start, **written_fields(subject.values["inputs"])}
 
 
 def _path(name: Any, called: str, place: Place) -> Any:
-    """A file counted from the folder of the call; lines that are no file as they are."""
+    """Path of a file relative to the folder of the call; other values unchanged."""
     if not isinstance(name, str):
         return name
     path = Path(place.folder) / name
@@ -192,23 +197,23 @@ def _path(name: Any, called: str, place: Place) -> Any:
 
 
 def _refuse_start(entries: Entries, verb: Verb) -> None:
-    """ValueError for constants and parameters beside a .par file."""
+    """Refuse constants and parameters beside a .par file."""
     others = [
         field for field in verb.fields.values() if field.table in ("molecule", "parameters") and entries.has(field)
     ]
     if others:
         names = ", ".join(field.called(entries.style) for field in others)
-        raise ValueError(f"{names}: a .par file says itself what is free and where the fit starts")
+        raise ValueError(f"{names}: a .par file states the free parameters and the start")
 
 
-def _start_of(entries: Entries) -> MoleculeInput:
-    """The molecule to start from."""
+def _start(entries: Entries) -> MoleculeInput:
+    """The molecule whose constants start the fit."""
     molecule = read_molecule(entries) if any(entries.has(field) for field in FIELDS.values()) else MoleculeInput()
     if (molecule.source is None) == (molecule.constants is None):
         if entries.style == "key" and molecule.source is None:
-            raise ValueError("molecule: expected constants from which the fit starts, as source or constants")
+            raise ValueError("molecule: expected the starting constants, as source or constants")
         names = [field.called(entries.style) for field in (START, FIELDS["constants"])]
-        raise ValueError(f"either {names[0]} or {names[1]} says where the fit starts; give one of them")
+        raise ValueError(f"expected the starting constants; give either {names[0]} or {names[1]}")
     if molecule.source is not None and str(molecule.source).lower().endswith((".csv", ".lin")):
         raise ValueError(
             f"{START.called(entries.style)} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a "
@@ -218,10 +223,10 @@ def _start_of(entries: Entries) -> MoleculeInput:
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
-    """The fit of the lines."""
+    """The request of the fit."""
     from rotor.formats.fit_request import fit_of_lines, fit_of_spfit, with_more_lines
 
-    inputs, paths = subject.values["asked"], subject.values["paths"]
+    inputs, paths = subject.values["inputs"], subject.values["paths"]
     if subject.top is None:
         request = fit_of_spfit(paths["source"], paths["lin"])
     else:

@@ -190,7 +190,9 @@ def test_a_near_symmetry_is_shown_and_can_be_taken(call, folder):
     molecule("C60").write(folder / "C60.xyz")
     code, out, err = call("info", "C60.xyz")
     assert code == 0
-    near = "Ci, rotational symmetry number 1; near Ih: nuclei are up to 0.0047 Å off it (--symmetry-tolerance takes it)"
+    near = (
+        "Ci, rotational symmetry number 1; near Ih: nuclei are up to 0.0047 Å off it (--symmetry-tolerance accepts it)"
+    )
     assert near in " ".join(out.split())
     assert "near Ih" in err
     code, out, err = call("info", "C60.xyz", "--symmetry-tolerance", "0.005", "--json", "-")

@@ -36,7 +36,7 @@ def test_options_that_the_files_answer_are_refused_and_silences_told(call, tmp_p
     for option in (("--jmax", "3"), ("--temperature", "10 K"), ("--q", "7"), ("--range", "0:9GHz"), ("--tag", "1")):
         code, _, err = call("spectrum", source, *option)
         assert code == 2
-        assert err.startswith(f"error: {option[0]}: {source} says that itself")
+        assert err.startswith(f"error: {option[0]}: {source} determines it")
     shutil.copy(SAMPLES / "so2" / "so2.int", tmp_path / "so2.int")
     text = (SAMPLES / "so2" / "so2.var").read_text()
     (tmp_path / "so2.var").write_text(text.replace("a 1 1 0 60 ", "a 1 1 0 20 "))
@@ -55,7 +55,7 @@ def test_the_other_way_is_named_only_where_it_works(call, tmp_path):
         (tmp_path / "a.var").write_text(head.format(second).replace("a 1 2", "a 1 -2" if second else "a 1 2"))
         code, _, err = call("spectrum", "a.int", "--temperature", "10 K")
         assert code == 2
-        assert err.startswith("error: --temperature: a.int says that itself (TEMP); change it there")
+        assert err.startswith("error: --temperature: a.int determines it (TEMP); change it there")
         assert ("or give a.var" in err) == other
         assert (call("spectrum", "a.var", "--dipole-abc", "1,0,0", "--temperature", "10 K")[0] == 0) == other
 

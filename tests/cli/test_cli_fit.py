@@ -105,13 +105,13 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("co.par", "--free", "B"), "--free: a .par file says itself"),
+        (("co.par", "--free", "B"), "--free: a .par file states the free"),
         (("co.csv",), "either --start or --constants"),
         (("co.csv", "--constants", "B=57000 MHz"), "--free: name the constants to fit"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,"), "names parted by commas"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,B"), "B is named twice"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--prior", "B"), "--prior 'B': name=error"),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--lin", "x.lin"), "--lin: goes with a .par file"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--lin", "x.lin"), "--lin: expected with a .par file"),
         (("co.txt", "--constants", "B=57000 MHz", "--free", "B"), "assigned lines are read from"),
         (("empty.csv", "--constants", "B=57000 MHz", "--free", "B"), "no lines in it"),
         (("co.csv", "--constants", "A=6 B=5 C=4 GHz", "--free", "B"), "no column ka_upper"),

@@ -121,21 +121,21 @@ def test_a_plan_counts_the_equilibration_of_a_box_that_is_made(call, folder):
         (("nowhere.xyz",), "nowhere.xyz: no such file"),
         (("water", "--model", "spcf", "--molecules", "8"), "--model: 'spcf' is no model of a rigid molecule"),
         (("water", "--molecules", "0"), "--molecules"),
-        (("water", "--molecules", "8", "--model", "argon"), "--model argon is no model of water"),
+        (("water", "--molecules", "8", "--model", "argon"), "--model argon is not a model of water"),
         (("benzene", "--molecules", "8"), "a box is made of one model"),
         (("water", "--density", "1"), "--density: expected with --molecules"),
         (("water", "--equilibration", "-1ps"), "--equilibration: -1ps: expected a finite number of 0 ps or more"),
         (
             ("water", "--molecules", "8", "--relaxation", "9fs", "--ensemble", "langevin"),
-            "with --ensemble nose-hoover; langevin has",
+            "with --ensemble nose-hoover; langevin does",
         ),
         (
             ("water", "--molecules", "8", "--friction", "2"),
-            "--friction: expected with --ensemble langevin; nve has no use",
+            "--friction: expected with --ensemble langevin; nve does not",
         ),
         (
             ("water", "--molecules", "8", "--ewald-tolerance", "1e-4"),
-            "expected with --electrostatics ewald; reaction-field has",
+            "expected with --electrostatics ewald; reaction-field does",
         ),
         (("tip4p", "--molecules", "8"), "write --model tip4p too"),
         (("water", "--molecules", "8", "--step", "0"), "--step: 0: expected a finite number above 0 fs"),
@@ -213,7 +213,7 @@ def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
     monkeypatch.setattr(RigidDynamics, "step", interrupted)
     code, out, err = call(*options, "--checkpoint", "a.npz", "--csv", "a.csv")
     assert (code, out) == (130, "")
-    assert err == "note: interrupted; the same command with --resume goes on from a.npz\n"
+    assert err == "note: interrupted; add --resume to continue from a.npz\n"
     monkeypatch.setattr(RigidDynamics, "step", step)
     assert call(*options, "--checkpoint", "a.npz", "--csv", "a.csv", "--resume")[0] == 0
     assert call(*options, "--checkpoint", "b.npz", "--csv", "b.csv")[0] == 0

@@ -142,7 +142,7 @@ def test_isotopologues_have_the_constants_of_spins_that_their_nuclei_have(call):
     assert computed["13C"] == pytest.approx({"chi_aa(14N)": -4.7}, rel=1e-12)  # rounding: the axis stays
     assert computed["15N"] is None
     printed = call("isotopologues", "HCN", "--each", "C=13C")[1]
-    assert "constants of spins (MHz)" in printed
+    assert "spin constants (MHz)" in printed
     assert "chi_aa(14N)" in printed
 
 

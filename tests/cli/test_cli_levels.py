@@ -196,7 +196,7 @@ def test_ammonia_counts_from_the_lowest_level_that_exists_and_says_which(call):
     assert (code, err) == (0, "")
     head, table = out.split("all levels, in order of energy")
     assert "v J K = 1 0 0, 23785.6961 MHz above the Hamiltonian's zero: energies count from this level" in head
-    assert "12: J from 0 to 2; 3 of spin weight 0 do not exist and are not shown" in head
+    assert "12: J from 0 to 2; 3 of spin weight 0, which do not exist, are not shown" in head
     rows = [line.split() for line in table.splitlines() if line[:3].strip().isdigit()]
     assert len(rows) == 9
     assert rows[0][:4] == ["1", "0", "0", "0.000000"]

@@ -79,10 +79,10 @@ def test_a_choice_of_constants_is_no_scene(call, lines):
 START = MoleculeSection(constants="B=6081 D=0.001 H=0 MHz")
 BAD = [
     (FitScene(lines=FitLines(source="none.csv"), molecule=START), "lines.source: none.csv: no such file"),
-    (FitScene(lines=FitLines(source="ocs.csv")), "molecule: expected constants from which the fit starts"),
+    (FitScene(lines=FitLines(source="ocs.csv")), "molecule: expected the starting constants"),
     (FitScene(lines=FitLines(source="ocs.csv"), molecule=START), "parameters.free: name the constants to fit"),
-    (FitScene(lines=FitLines(source="ocs.csv", lin="co.lin"), molecule=START), "lines.lin: goes with a .par file"),
-    (FitScene(lines=FitLines(source="co.par"), molecule=START), "a .par file says itself"),
+    (FitScene(lines=FitLines(source="ocs.csv", lin="co.lin"), molecule=START), "lines.lin: expected with a .par file"),
+    (FitScene(lines=FitLines(source="co.par"), molecule=START), "a .par file states the free"),
     (
         FitScene(lines=FitLines(source="ocs.csv"), molecule=START, parameters=FitParameters(free=["B"], priors={"B": "1 bar"})),
         "parameters.priors.B: '1 bar'",
