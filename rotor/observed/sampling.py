@@ -121,11 +121,16 @@ def _log_probability(values: Floats, fit: SourceFit) -> float:
 
 def plot_corner(sample: SourceSample, path: Any) -> None:
     """A corner picture of the draws (extra `sampling`)."""
+    figure = load_corner().corner(
+        sample.draws, labels=list(sample.names), quantiles=(0.1587, 0.5, 0.8413), show_titles=True, title_fmt=".3g"
+    )
+    figure.savefig(path)
+
+
+def load_corner() -> Any:
+    """The package corner; ImportError with the extra where it is not installed."""
     try:
         import corner
     except ModuleNotFoundError as error:
         raise ImportError(f"corner is not installed: {EXTRA}", name="corner") from error
-    figure = corner.corner(
-        sample.draws, labels=list(sample.names), quantiles=(0.1587, 0.5, 0.8413), show_titles=True, title_fmt=".3g"
-    )
-    figure.savefig(path)
+    return corner

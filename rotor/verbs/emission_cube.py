@@ -105,6 +105,10 @@ def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None
         raise ValueError("--mask: belongs to maps of a cube; expected with --maps FILE")
     if "corner" in outputs and not request.sample:
         raise ValueError("--corner: a picture of draws; expected with --sample N")
+    if "corner" in outputs:
+        from rotor.observed.sampling import load_corner
+
+        load_corner()  # a package that is missing shows before the fit
     if "diagram" in outputs and request.fit is None:
         raise ValueError("--diagram: rotational diagrams of a fit; expected with --fit FILE")
 

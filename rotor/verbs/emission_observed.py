@@ -67,6 +67,10 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
     """Read the spectrum, then model or fit it; with maps, fit every pixel of a cube."""
     if "maps" in work.files:
         return emission_cube.answer(request, work)
+    if work.executor is not None:
+        raise ValueError(
+            "--workers: spreads the rows of a cube; expected with --maps FILE (one spectrum is one process)"
+        )
     spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz)
     sight = sight_of(spectrum, request)
     components = components_of(spectrum, species_in(spectrum, request, work.note), sight, request)

@@ -1,10 +1,12 @@
 """`rotor emission --fit cube.fits --maps`, rotational diagrams and corner pictures of `--fit`."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import image
 
 from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.spectra.axis import ReadChoices
@@ -130,6 +132,7 @@ def test_jansky_per_beam_becomes_kelvin(folder):
         (("--maps", "m.fits", "--range", "100:101GHz"), "no channels from"),
         (("--mask", "cube.fits", "--pixel", "1,1"), "--mask: belongs to maps"),
         (("--corner", "c.png", "--pixel", "1,1"), "expected with --sample"),
+        (("--workers", "2", "--pixel", "2,2"), "--workers: spreads the rows of a cube; expected with --maps"),
         ((), "emission --maps"),
     ],
 )
@@ -169,10 +172,34 @@ def test_a_fit_without_a_diagram_is_printed(call, folder):
     assert not picture.exists()
 
 
-def test_corner_of_a_sample(call, folder):
+def test_corner_of_a_sample(call, folder, monkeypatch):
     pytest.importorskip("emcee")
-    pytest.importorskip("corner")
+    corner = pytest.importorskip("corner")
+    drawn = []
+    monkeypatch.setattr(
+        corner,
+        "corner",
+        lambda draws, plain=corner.corner, **given: drawn.append((draws, given)) or plain(draws, **given),
+    )
     picture = folder / "corner.png"
-    code, _, err = call(*command(folder, "--pixel", "2,2", "--sample", "20", "--corner", str(picture)))
+    code, out, err = call(*command(folder, "--pixel", "2,2", "--sample", "60", "--corner", str(picture), "--json", "-"))
     assert code == 0, err
-    assert picture.stat().st_size > 5000
+    assert min(image.imread(picture).shape[:2]) > 300  # pixels
+    (draws, given) = drawn[0]
+    fitted = {row["name"]: row for row in json.loads(out)["parameters"]}
+    assert given["labels"] == list(fitted)
+    assert draws.shape[1] == len(fitted) == 4
+    for name, values in zip(given["labels"], draws.T, strict=True):  # few steps: the middle within two errors
+        assert abs(np.median(values) - fitted[name]["value"]) < 2 * fitted[name]["error"], name
+
+
+def test_a_picture_of_draws_without_its_package_is_refused_before_the_fit(call, folder, monkeypatch):
+    from rotor.observed import fit
+
+    monkeypatch.setitem(sys.modules, "corner", None)
+    monkeypatch.setattr(fit, "fit_source", None)
+    picture = folder / "corner.png"
+    code, out, err = call(*command(folder, "--pixel", "2,2", "--sample", "20", "--corner", str(picture)))
+    assert (code, out, len(err.splitlines())) == (1, "", 1)  # not a mistake of the input
+    assert "corner is not installed" in err
+    assert not picture.exists()
