@@ -100,14 +100,23 @@ def ranges(catalogue: Path, count: int) -> None:
         )
 
 
-def main(kind: str, count: int, folder: Path) -> None:
-    begin = time.perf_counter()
-    source = {"exomol": exomol, "hitran": hitran}[kind](count, folder)
-    size = sum(path.stat().st_size for path in folder.glob(source.name.split(".")[0] + ".*"))
-    print(
-        f"{kind}: {count:.0e} transitions made in {time.perf_counter() - begin:.0f} s, {size / 1e9:.2f} GB", flush=True
-    )
-    catalogue, begin = folder / f"{kind}.rotorcat", time.perf_counter()
+def watched(command: list[str]) -> tuple[list[tuple[float, int, int]], resource.struct_rusage]:
+    """Seconds, anonymous and file-backed resident memory (MB) of a process until its end, and what the system counts of it."""
+    rows, begin, process = [], time.perf_counter(), subprocess.Popen(command)
+    status = Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        sizes = dict(line.split(":", 1) for line in status.read_text().splitlines() if line.startswith("Rss"))
+        if sizes:  # none of a process that has just ended
+            anonymous, mapped = (int(sizes[name].split()[0]) // 1024 for name in ("RssAnon", "RssFile"))
+            rows.append((time.perf_counter() - begin, anonymous, mapped))
+        time.sleep(0.02)
+    if process.returncode:
+        raise SystemExit(process.returncode)
+    return rows, resource.getrusage(resource.RUSAGE_CHILDREN)
+
+
+def add(source: Path, catalogue: Path) -> None:
+    """`rotor catalogue add` in a process of its own: time, and the peak of its anonymous memory in each tenth of that time."""
     command = [
         sys.executable,
         "-m",
@@ -118,13 +127,26 @@ def main(kind: str, count: int, folder: Path) -> None:
         "--catalogue",
         os.fspath(catalogue),
     ]
-    subprocess.run(command, check=True)
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    rows, usage = watched(command)
+    seconds, anonymous, mapped = np.array(rows).T
+    tenths = [int(part.max()) for part in np.array_split(anonymous, 10)]
     print(
-        f"added in {time.perf_counter() - begin:.0f} s ({usage.ru_utime + usage.ru_stime:.0f} s of processor time); "
-        f"peak of resident memory {usage.ru_maxrss / 1e3:.0f} MB; catalogue of {catalogue.stat().st_size / 1e9:.2f} GB",
+        f"added in {seconds[-1]:.0f} s ({usage.ru_utime + usage.ru_stime:.0f} s of processor time); peak of resident memory "
+        f"{usage.ru_maxrss / 1024:.0f} MB, of its anonymous part {anonymous.max():.0f} MB, of mapped files {mapped.max():.0f} MB; "
+        f"anonymous peak in each tenth of the run, MB: {tenths}; catalogue of {catalogue.stat().st_size / 1e9:.2f} GB",
         flush=True,
     )
+
+
+def main(kind: str, count: int, folder: Path) -> None:
+    begin = time.perf_counter()
+    source = {"exomol": exomol, "hitran": hitran}[kind](count, folder)
+    size = sum(path.stat().st_size for path in folder.glob(source.name.split(".")[0] + ".*"))
+    print(
+        f"{kind}: {count:.0e} transitions made in {time.perf_counter() - begin:.0f} s, {size / 1e9:.2f} GB", flush=True
+    )
+    catalogue = folder / f"{kind}.rotorcat"
+    add(source, catalogue)
     ranges(catalogue, count)
 
 

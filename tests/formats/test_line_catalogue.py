@@ -234,3 +234,26 @@ def test_a_fault_leaves_what_the_source_gave_before(tmp_path: Path, monkeypatch:
 
 def exomol_source(folder: Path, states: str, trans: str) -> str:
     return str(exomol(folder, states, trans))
+
+
+def test_pages_of_the_file_take_less_memory_while_lines_are_entered(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """DuckDB's pool of pages grows to its limit: that of the entry is lower than that of the sort."""
+    from rotor.formats.catalogue import build
+    from rotor.formats.catalogue.database import scalar
+
+    limits = {}
+
+    def noting(name, plain):
+        def noted(engine, *more):
+            number, unit = scalar(engine, "SELECT current_setting('memory_limit')").split()
+            limits[name] = float(number) * {"KiB": 2**10, "MiB": 2**20}[unit] / 1e6
+            plain(engine, *more)
+
+        return noted
+
+    for name in ("_insert", "_sort"):
+        monkeypatch.setattr(build, name, noting(name, getattr(build, name)))
+    add_sources(folder / "a.rotorcat", [str(folder / "cdms")])
+    assert limits == pytest.approx({"_insert": 128.0, "_sort": 400.0}, rel=1e-3)

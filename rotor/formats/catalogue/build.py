@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.catalogue.cat_species import read_cat_species
 from rotor.formats.catalogue.catdir import CatdirEntry, catdir_beside, is_catdir, read_catdir
-from rotor.formats.catalogue.database import connect, new_catalogue, scalar
+from rotor.formats.catalogue.database import MEMORY_MB, connect, new_catalogue, scalar
 from rotor.formats.catalogue.names import hill_formula
 from rotor.observed.species import SpeciesLines
 
@@ -32,6 +32,7 @@ LIBRARY = "library"
 _LIBRARY_K = 300.0
 _LIBRARY_CUT = -9.0  # LGINT at 300 K
 _LIBRARY_MHZ = 3e6
+_ENTRY_MB = 128  # for pages of the file while lines are entered: DuckDB fills what it is given with pages that nothing reads again
 _CHECKPOINT_LINES = 1_000_000  # after which what is in the log of the database goes into its file
 Progress = Callable[[str], None]
 
@@ -117,10 +118,12 @@ def add_sources(
             engine = connect(unfinished)
         try:
             engine.execute(f"SET temp_directory = '{unfinished.parent / 'sort'}'")
+            engine.execute(f"SET memory_limit = '{_ENTRY_MB}MB'")
             for name, read in jobs:
                 if progress:
                     progress(name)
                 report.append(_add(engine, name, read, facts or SourceFacts()))
+            engine.execute(f"SET memory_limit = '{MEMORY_MB}MB'")
             _sort(engine)
         finally:
             engine.close()

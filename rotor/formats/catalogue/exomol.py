@@ -24,7 +24,7 @@ from rotor.arrays import Floats
 from rotor.observed.partition import SUMMED_K, PartitionTable
 from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
 
-PIECE_BYTES = 1 << 24  # of text that is in memory at once
+PIECE_BYTES = 1 << 22  # of text that is in memory at once; its words as objects take ten times that
 _PACKED: dict[str, Any] = {".bz2": bz2.open, ".gz": gzip.open, ".xz": lzma.open}
 
 
