@@ -88,11 +88,13 @@ class ExchangedTops(TorsionRotation):
         """Rows of plain functions with these labels."""
         return np.asarray(self._rows[(s < 0).astype(int), self.rotation.rows({"J": j, "K": k}), t])
 
-    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
-        """Elements between functions with a sign x, transformed from those between plain functions."""
+    def elements(
+        self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False, half: bool = False
+    ) -> Elements:
+        """Elements between functions with a sign x, transformed from those between plain functions; `half` applies to ranks above 0."""
         from scipy.sparse import csr_array
 
-        plain = super().elements(terms, rank, time_odd)
+        plain = super().elements(terms, rank, time_odd, half and rank > 0)
         matrix = self._combined[0]
         pieces = []
         for i, values in enumerate(plain.values):

@@ -82,13 +82,17 @@ class TorsionRotation:
         rows[(labels["s"] < 0).astype(int), place, labels["t"]] = np.arange(len(place))
         return rows
 
-    def elements(self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False) -> Elements:
+    def elements(
+        self, terms: Sequence[Sequence[Product]], rank: int = 0, time_odd: bool = False, half: bool = False
+    ) -> Elements:
         """Reduced elements of sums of products, all tensors of one rank, on their common pattern.
 
         time_odd: whether time reversal changes the sign of the tensor, as for Σ ½{Φ_i, N_j} of rank 1; its phases are then those of the
-        next rank.
+        next rank. half: without elements that Hermiticity implies: J' < J, and for scalars K' < K where K and -K are not combined.
         """
         plain = self.rotation.elements([factor.rotation for term in terms for factor in term])
+        if half:
+            plain = self._lower(plain, rank)
         if self.folded:
             if np.iscomplexobj(plain.values):
                 raise ValueError("functions of K and -K are combined for real operators only")
@@ -98,6 +102,14 @@ class TorsionRotation:
         values = self._values(terms, plain, np.arange(len(change)), change, tables)
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
+
+    def _lower(self, plain: Elements, rank: int) -> Elements:
+        """Elements of the rotation with J' ≥ J, and of scalars with K' ≥ K where K and -K are not combined."""
+        lower = plain.rows >= plain.columns  # |J K⟩ stand by J, then K
+        if rank or self.folded:
+            j = self.rotation.labels["J"]
+            lower = j[plain.rows] >= j[plain.columns]
+        return Elements(plain.count, plain.rows[lower], plain.columns[lower], plain.values[:, lower])
 
     def symmetry_allowed(self, elements: Elements) -> Elements:
         """Elements of the full Hamiltonian without those that symmetry excludes."""

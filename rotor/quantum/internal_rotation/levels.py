@@ -63,7 +63,7 @@ class SpeciesMoments:
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
         linear = self.levels.solved.linear
         turned = _turned(np.array(components), self.model.angle)
-        elements = self.levels.functions.elements([[Product(body_tensor(turned))]], rank)
+        elements = self.levels.functions.elements([[Product(body_tensor(turned))]], rank, half=True)
         pair = linear.block[elements.rows] * (int(linear.block.max()) + 1) + linear.block[elements.columns]
         order = np.argsort(pair, kind="stable")
         starts = np.flatnonzero(np.diff(pair[order], prepend=-1))

@@ -58,7 +58,7 @@ class SpeciesBlocks:
     def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> LinearBlocks:
         """Blocks of the single term H at these coefficients, over functions whose Gershgorin discs reach below `below_mhz`."""
         merged = _merged(self.terms, np.asarray(coefficients, dtype=float))
-        elements = self.functions.symmetry_allowed(self.functions.elements([merged]))
+        elements = self.functions.symmetry_allowed(self.functions.elements([merged], half=below_mhz == math.inf))
         needed = self.needed
         if below_mhz < math.inf:
             value = np.where(elements.rows == elements.columns, elements.values[0].real, -np.abs(elements.values[0]))

@@ -62,30 +62,29 @@ def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
     diagonal = lower.diagonal()
     whole = (lower + lower.T).tocsr()
     whole.setdiag(diagonal)
-    space = np.zeros((size, count))
-    space[chosen, np.arange(count)] = 1.0
-    image = whole[:, chosen].toarray()
-    inner = image[chosen]
+    image = whole[:, chosen].toarray()  # of H on the space: the chosen functions, then `beyond`
+    inner, beyond = image[chosen], np.zeros((size, 0))
     for _ in range(STEPS):
         energies, mixing = np.linalg.eigh(inner)
-        shares = ((space[chosen] @ mixing) ** 2).sum(axis=0)
-        best = np.sort(np.argsort(-shares, kind="stable")[:count])
+        best = np.sort(np.argsort(-(mixing[:count] ** 2).sum(axis=0), kind="stable")[:count])
         energies, mixing = energies[best], mixing[:, best]
-        vectors = space @ mixing
+        vectors = beyond @ mixing[count:]
+        vectors[chosen] = mixing[:count]
         rest = image @ mixing - vectors * energies
         gaps = energies - diagonal[:, None]
-        gaps = np.where(np.abs(gaps) < SMALLEST_GAP, SMALLEST_GAP, gaps)
-        wrong = (rest**2 / np.abs(gaps)).sum(axis=0) > TOLERANCE_MHZ
+        gaps[np.abs(gaps) < SMALLEST_GAP] = SMALLEST_GAP
+        step = rest / gaps
+        wrong = np.abs(rest * step).sum(axis=0) > TOLERANCE_MHZ
         if not wrong.any():
             return energies, vectors
-        rest, gaps = rest[:, wrong], gaps[:, wrong]
-        step = rest / gaps
+        rest, step, gaps = rest[:, wrong], step[:, wrong], gaps[:, wrong]
         step += (rest - step * energies[wrong] + whole @ step) / gaps
-        more = _orthonormal(step, space)
+        step[chosen] = 0.0
+        more = _orthonormal(step, beyond)
         applied = whole @ more
-        beside = space.T @ applied
+        beside = np.vstack([applied[chosen], beyond.T @ applied])
         inner = np.block([[inner, beside], [beside.T, more.T @ applied]])
-        space, image = np.hstack([space, more]), np.hstack([image, applied])
+        beyond, image = np.hstack([beyond, more]), np.hstack([image, applied])
     return None
 
 
@@ -93,6 +92,6 @@ def _orthonormal(vectors: Floats, space: Floats) -> Floats:
     """The part of vectors outside a space as orthonormal columns; again where rounding has left some of the space."""
     outside = np.linalg.qr(vectors - space @ (space.T @ vectors))[0]
     inside = space.T @ outside
-    if np.abs(inside).max() < ORTHOGONAL:
+    if np.abs(inside).max(initial=0.0) < ORTHOGONAL:
         return np.asarray(outside)
     return np.asarray(np.linalg.qr(outside - space @ inside)[0])
