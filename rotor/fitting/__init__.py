@@ -1,1 +1,1 @@
-"""Measured lines back to constants: assignments, the fit, what it knows and what it does not, and the choice of a model."""
+"""From measured lines to constants: assignments, the least-squares fit and its statistics, and the choice of a model."""

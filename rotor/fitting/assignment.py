@@ -18,16 +18,16 @@ from rotor.table import Table, counted
 class Assignments(Table):
     """Assigned lines as columns of equal length n.
 
-    names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states; a lower one that
-    begins with a number below 0 is none, the line is an energy from the zero of the Hamiltonian
-    frequency_mhz, error_mhz (n,) : measured. A line of wavenumbers stands in MHz and marked in `wavenumber` (n,)
-    weight (n,) : share within its blend. blend (n,) : lines of one number are one measured frequency, the mean of their
-    calculated ones by weight; a line alone has a number of its own
-    source : where the lines are from. comments : by line, what was written beside it
-    widths_mhz : by the number of a blend, how far its components may lie apart (rms): a standard error about 0
-    places (n,) : of each line in its source from 0 on, where some were left out
-    halves : names of the quantum numbers that are half-integers, of which the labels have twice the value
-    excluded (n,) : lines that do not count in a fit, such as those that an earlier fit rejected; None where all count
+    names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states. A lower label that
+    begins with a negative number marks an energy above the zero of the Hamiltonian instead of a transition
+    frequency_mhz, error_mhz (n,) : measured. `wavenumber` (n,) marks lines measured in cm⁻¹; they are stored in MHz too
+    weight (n,) : share within the blend. blend (n,) : lines with the same number are one measured frequency, which is the
+    weighted mean of their calculated frequencies
+    source : origin of the lines. comments : text written beside each line
+    widths_mhz : for each blend number, the expected rms spread of its components, used as a standard error about 0
+    places (n,) : index of each line in its source (from 0), if lines were left out
+    halves : names of half-integer quantum numbers, whose labels are stored doubled
+    excluded (n,) : lines that do not count in a fit, such as those rejected by an earlier fit; None if all count
     """
 
     names: tuple[str, ...]
@@ -107,7 +107,7 @@ class Assignments(Table):
         return np.asarray(self.lower[:, 0] < 0) if self.names else np.zeros(len(self), dtype=bool)
 
     def take(self, index: NDArray[Any]) -> Assignments:
-        """The lines that a mask or an array of positions picks."""
+        """The lines selected by a mask or an array of positions."""
         picked = np.arange(len(self))[index]
         fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "blend", "wavenumber")
         changes: dict[str, Any] = {name: getattr(self, name)[picked] for name in fields}
@@ -129,7 +129,7 @@ class Assignments(Table):
         return np.asarray(counts[self.blend] > 1)
 
     def number(self, line: int) -> int:
-        """Of one line in its source, from 1 on."""
+        """The number of a line in its source, counted from 1."""
         return int(line if self.places is None else self.places[line]) + 1
 
     def text(self, line: int) -> str:
@@ -179,14 +179,14 @@ def assignments(
     weight : (n,) array
         Shares in blends.
     blend : (n,) array, optional
-        Which lines are one measured frequency; each its own where it is left out.
+        Lines with the same number are one measured frequency. Default: no blends.
     wavenumber : (n,) array of bool
         Which lines were measured in cm⁻¹.
-    source, comments : where from; what was written beside each line
+    source, comments : origin of the lines; text written beside each line
     widths_mhz : mapping, optional
-        By the number of a blend how far its components may lie apart (rms).
+        For each blend number, the expected rms spread of its components.
     halves : collection of str, optional
-        Quantum numbers that are half-integers: the labels have twice their value.
+        Half-integer quantum numbers, whose labels are doubled.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def assignments(
     Raises
     ------
     ValueError
-        For arrays that do not fit each other, and numbers that are not finite or below 0.
+        For arrays of different lengths, numbers that are not finite, and negative errors or weights.
 
     Examples
     --------
@@ -225,16 +225,17 @@ def assignments(
 
 
 def levels_in(lines: Assignments) -> tuple[Ints, Ints, Ints]:
-    """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
-    there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
-    labels, places_among = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
+    """The distinct levels (m, k), and for each line the indices of its upper and lower level; -1 is the zero of energy."""
+    is_level = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
+    labels, places_among = _distinct_rows(np.concatenate([lines.upper, lines.lower])[is_level])
     places = np.full(2 * len(lines), -1, dtype=np.int64)
-    places[there] = places_among.reshape(-1)
+    places[is_level] = places_among.reshape(-1)
     return labels, places[: len(lines)], places[len(lines) :]
 
 
 def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
-    """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
+    """The distinct rows of an array, sorted, and the index of each original row among them."""
+    # Rows of small integers are packed into one integer each: `np.unique` sorts these much faster than rows.
     spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
     if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
         return np.unique(rows, axis=0, return_inverse=True)
@@ -244,10 +245,10 @@ def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
 
 
 def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 0.0) -> tuple[Assignments, list[str]]:
-    """Two sets of assigned lines as one, and what was found in both.
+    """Merge two sets of assigned lines; also returns notes on lines that occur in both.
 
-    A line of the same labels in both stays once, as in `first`, where the frequencies agree within `same_within_mhz`; where
-    they do not both stay and a note says so. Blends stay blends. Raises ValueError for other quantum numbers.
+    If the frequencies of a line in both sets agree within `same_within_mhz`, the entry of `first` is used; otherwise both
+    entries stay, with a note. Blends stay blends. Raises ValueError if the quantum numbers of the sets differ.
     """
     if first.names != second.names:
         raise ValueError(f"lines by {', '.join(first.names)} and by {', '.join(second.names)} cannot be merged")
@@ -273,7 +274,7 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
 
 
 def appended(first: Assignments, second: Assignments) -> Assignments:
-    """The lines of both, by the same quantum numbers; blends stay blends."""
+    """The lines of both sets, which have the same quantum numbers; blends stay blends."""
     shift = int(first.blend.max(initial=-1)) + 1
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")
     joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in fields}
@@ -294,7 +295,7 @@ def _key(lines: Assignments, i: int) -> tuple[int, ...]:
 
 
 def duplicates(lines: Assignments) -> list[tuple[int, int]]:
-    """Pairs of lines with the same labels, by position; a line measured twice is no mistake, but must be known."""
+    """Index pairs of lines with the same labels. Repeated measurements are allowed, but are reported."""
     seen: dict[tuple[int, ...], int] = {}
     out = []
     for i, key in enumerate(map(tuple, np.concatenate([lines.upper, lines.lower], axis=1).tolist())):

@@ -1,15 +1,15 @@
-"""Error budgets of a fit (`rotor.requests.budget`): of its constants, in standard errors, and of the frequencies of its lines, in MHz.
+"""Error budgets of a fit (`rotor.requests.budget`): its constants, in standard errors, and the frequencies of its lines, in MHz.
 
-With δr the change of the weighted residuals, constants move by at most |δr| of their standard errors, and a prediction by as much of its
-standard error, since (JᵀJ)⁻¹ is the covariance (Cauchy and Schwarz).
+A change δr of the weighted residuals moves each constant, and each prediction, by at most |δr| times its standard error. This is the
+Cauchy-Schwarz inequality with the covariance (JᵀJ)⁻¹.
 
 | term | constants, standard errors | frequencies, MHz |
 |---|---|---|
 | rounding | √Σ (δν/σ_i)², δν of the energies | δν, and that times σ(ν) |
-| truncation | twice the step that would follow: the last ones halve it at least | that times σ(ν) |
+| truncation | twice the next step, since each step at least halves the remaining distance | that times σ(ν) |
 | model | √(χ²/f - 1) where χ²/f, f degrees of freedom, is two deviations √(2/f) above 1; else 0 | times the error of a line |
 | data | 1: the errors of the lines | σ(ν) |
-| statistics | 1/√(2f): errors from the scatter of the lines are known no better | that times σ(ν) |
+| statistics | 1/√(2f): relative uncertainty of errors derived from the scatter | that times σ(ν) |
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from rotor.fitting.fit import Fit
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.table import counted
 
-REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+REMAINING = 2.0  # times the next step: each step at least halves the distance to the minimum
 CONFIDENCE = 0.95
-SIGNIFICANT = 2.0  # standard deviations of χ²/f above 1: by chance in 2 % of fits
+SIGNIFICANT = 2.0  # standard deviations of χ²/f above 1; exceeded by chance in 2 % of fits
 CONSTANTS = "constants"
 TIGHTER, LINES = "a smaller tolerance of the search", "more lines, or more precise ones"
 UNCHECKED = "as many frequencies as constants: nothing checks the model"
@@ -36,15 +36,15 @@ def constants_budget(fit: Fit) -> ErrorBudget:
 
 
 def predictions_budget(fit: Fit) -> ErrorBudget:
-    """The errors of the calculated frequencies of the lines that counted, in MHz, the largest of each source."""
-    known = fit.calculated_errors_mhz[fit.used]
-    sigma = float(known.max(initial=0.0))
+    """The largest error from each source (MHz) among the calculated frequencies of the lines that count."""
+    calculated_errors = fit.calculated_errors_mhz[fit.used]
+    sigma = float(calculated_errors.max(initial=0.0))
     line = float(fit.line_errors_mhz[fit.used].max(initial=0.0))
     return _budget(fit, "predicted frequencies", "MHz", sigma, fit.rounding_mhz, line)
 
 
 def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: float) -> ErrorBudget:
-    """scale: one standard error. rounding: beside that which moves constants. line: what a residual of 1 is."""
+    """scale : one standard error. rounding : error added to that from shifted constants. line : size of a weighted residual of 1."""
     if not math.isfinite(scale) or (of == CONSTANTS and not np.isfinite(fit.errors).all()):
         lost = ", ".join(combination.text for combination in fit.statistics.undetermined)
         unknown = ErrorTerm(None, f"not determined by these lines: {lost}", LINES)
@@ -69,7 +69,7 @@ def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: f
 
 
 def weighted_rounding(fit: Fit) -> float:
-    """Norm of what rounding makes of the weighted residuals."""
+    """Norm of the rounding errors in the weighted residuals."""
     sigma = fit.line_errors_mhz[fit.groups]
     return fit.rounding_mhz * float(np.sqrt(np.sum(1.0 / sigma[sigma > 0] ** 2)))
 
@@ -93,7 +93,7 @@ def _misfit(fit: Fit, line: float) -> ErrorTerm:
 
 
 def confidence_text(free: int) -> str:
-    """Within how many standard errors a constant is at 95 %, by Student's distribution of errors from the scatter.
+    """The 95 % confidence interval in standard errors; Student's distribution for errors from the scatter.
 
     >>> confidence_text(10)
     'at a confidence of 0.95 within 1.96 times this, 2.23 times the error from the scatter'

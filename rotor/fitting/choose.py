@@ -1,13 +1,13 @@
-"""Which constants the lines call for, and which unmeasured line would help most.
+"""Choice of the constants that the lines determine, and of the unmeasured line that would help most.
 
-Adding one constant to a fit with χ²₀ leaves χ²₁ with f₁ degrees of freedom; F = (χ²₀ - χ²₁)/(χ²₁/f₁) follows Fisher's
-distribution with 1 and f₁ where the constant is not needed. Beside it stand Akaike's criterion with its correction for small
-samples (N. Sugiura, Commun. Stat. A7, 13 (1978)),
+Adding one constant changes χ²₀ of a fit to χ²₁ with f₁ degrees of freedom. If the constant is not needed,
+F = (χ²₀ - χ²₁)/(χ²₁/f₁) follows Fisher's distribution with 1 and f₁ degrees of freedom. The second criterion is Akaike's, with
+the correction for small samples (N. Sugiura, Commun. Stat. A7, 13 (1978)),
 
     AICc = n ln(χ²/n) + 2k + 2k(k + 1)/(n - k - 1),
 
-and the rms of the residuals that leaving each line out in turn would give, r_i/(1 - h_i), to first order in the leverages h
-(D. M. Allen, Technometrics 16, 125 (1974)). A constant is taken when all three say so.
+the third the rms of the leave-one-out residuals r_i/(1 - h_i), to first order in the leverages h
+(D. M. Allen, Technometrics 16, 125 (1974)). A constant is added when all three criteria improve.
 """
 
 from __future__ import annotations
@@ -30,20 +30,19 @@ from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import INTERRUPTED
 from rotor.table import counted
 
-CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
+CHANCE = 0.01  # highest probability of an F this large by chance for which a constant is added
 _MOST_STEPS = 40
-_TRIED = 8  # constants, or pairs, of those that promise most that are fitted at each step
-_MADE_UP = 1e-14  # of the squared length of a column of derivatives: what is left of one that the others make up
+_TRIED = 8  # most promising constants, or pairs, that are fitted at each step
+_MADE_UP = 1e-14  # relative squared length below which a column of derivatives depends linearly on the others
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A fit with one constant more or less.
+    """A fit with one constant added or removed.
 
-    name, added : which ("HK with h1" for two together), and whether it was added (else left out). fit : what came out
-    f_ratio, chance : F and the probability of one so large where the constant is not needed
-    aicc, cross_validated : of the model tried; those of the model it was tried against stand in `aicc_before` and
-    `cross_validated_before`
+    name, added : the constant ("HK with h1" for a pair), and whether it was added (True) or removed. fit : the resulting fit
+    f_ratio, chance : F and the probability of an F this large if the constant is not needed
+    aicc, cross_validated : criteria of this model; `aicc_before` and `cross_validated_before` : of the model before the change
     """
 
     name: str
@@ -58,7 +57,7 @@ class Trial:
 
     @property
     def better(self) -> bool:
-        """Whether all three signs speak for the model tried."""
+        """Whether all three criteria favour this model."""
         if self.added:
             needed = self.chance < CHANCE and self.aicc < self.aicc_before
             return self.fit.converged and needed and self.cross_validated < self.cross_validated_before
@@ -74,7 +73,7 @@ class Trial:
 
 
 def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | None = None) -> list[Trial]:
-    """The fit again with each candidate added (from 0) where it is not free, and left out (at 0) where it is.
+    """Repeat the fit with each candidate added (starting from 0) if it is not free, or removed (set to 0) if it is.
 
     Parameters
     ----------
@@ -86,14 +85,14 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     Returns
     -------
     list of Trial
-        By F, the largest of those added first; A, B, C, the E of a state, and a constant with an a-priori error (which
-        is a measurement of it) are never left out. Ties and a-priori errors stay; what is tied to a constant that is left out
-        follows it to 0.
+        Added constants first, sorted by decreasing F. A, B, C, the energy E of a state, and constants with an a-priori error
+        (a measurement in itself) are never removed. Ties and a-priori errors stay; a constant tied to a removed one
+        becomes 0 too.
 
     Raises
     ------
     ValueError
-        For a name that the kind of top or the reduction does not have, and for a constant that is tied.
+        For a name that does not belong to the kind of top or the reduction, and for a tied constant.
     """
     options = replace(options or FitOptions(), pass_interrupt=True)
     constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
@@ -101,8 +100,8 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     for name in candidates:
         full_name = constants.own_name(name)
         if full_name in fit.parameters.names:
-            known = np.isfinite(fit.parameters.prior[fit.parameters.names.index(full_name)])
-            if full_name.partition("[")[0] not in ("A", "B", "C", "E") and not known:
+            has_prior = np.isfinite(fit.parameters.prior[fit.parameters.names.index(full_name)])
+            if full_name.partition("[")[0] not in ("A", "B", "C", "E") and not has_prior:
                 out.append(_without(fit, full_name, options))
         else:
             out.append(_with(fit, constants, full_name, options))
@@ -156,40 +155,41 @@ def choose_constants(
     by_order: bool = True,
     progress: Callable[[Trial], None] | None = None,
 ) -> tuple[Fit, list[Trial]]:
-    """A model built up order by order in J, then freed of what it does not need.
+    """Build up a model order by order in J, then remove the constants that it does not need.
 
-    Of the candidates of one order that all three signs speak for, the one with the largest F is taken, until none is left; where
-    none helps alone, pairs of one order are tried, because such constants often make sense together only. Then the next order
-    follows. At the end constants that the whole model does not need are left out one by one, highest order first.
+    Within an order, the candidate with the largest F among those favoured by all three criteria is added, until none is
+    left. If no single constant helps, pairs of the same order are tried, because such constants are often significant only
+    together. Then the next order follows. At the end, constants that the model does not need are removed one by one, highest
+    order first.
 
     Parameters
     ----------
     lines : Assignments
     constants : Constants or TopConstants
-        Where the fit starts; candidates start from 0 unless they are in it.
+        Start of the fit; candidates that it lacks start from 0.
     base : sequence of str or Parameters
-        Constants that are always free; as parameters of the same constants with their ties and a-priori errors, which stay.
+        Constants that are always free; given as `Parameters`, their ties and a-priori errors stay.
     candidates : sequence of str
     options : FitOptions, optional
     by_order : bool
-        False: candidates of all orders compete from the first step on. Where some states are disturbed it finds constants of high
-        order that a search by order does not reach; compare both by `aicc`.
+        False: candidates of all orders compete from the first step on. For perturbed states this can reach high-order constants
+        that the search by order misses; compare both by `aicc`.
     progress : callable, optional
-        Called with every step taken.
+        Called after each step.
 
     Returns
     -------
     (Fit, list of Trial)
-        The last fit, and the steps that were taken. After a KeyboardInterrupt these are the model so far, which has not converged.
+        The last fit and the steps that led to it. After a KeyboardInterrupt: the model so far, marked as not converged.
     """
     start = constants if isinstance(base, Parameters) else with_names(constants, base)
     free = base if isinstance(base, Parameters) else parameters(start, base)
     fit = fit_lines(lines, start, free, _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
-    known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
-    names = dict.fromkeys(known.own_name(name) for name in candidates)
-    orders = {name: order_of(name, known) for name in names if name not in fixed}
-    free.with_free(known, list(orders))  # refuses constants that are tied
+    extended = with_names(start, [name for name in candidates if name not in start])  # refuses unknown names
+    names = dict.fromkeys(extended.own_name(name) for name in candidates)
+    orders = {name: order_of(name, extended) for name in names if name not in fixed}
+    free.with_free(extended, list(orders))  # refuses tied constants
 
     different = sorted(set(orders.values()))
     groups = [{order} for order in different] if by_order else [set(different)]
@@ -213,9 +213,9 @@ def choose_constants(
 def _steps(
     fit: Fit, fixed: Sequence[str], orders: Mapping[str, int], groups: Sequence[set[int]], options: FitOptions
 ) -> Iterator[Trial]:
-    """The steps of `choose_constants`, each a trial that is better than the model before it."""
+    """The steps of `choose_constants`; each trial is better than the model before it."""
     count, before = 0, -1
-    while count > before:  # once more while something was taken: a higher order may have made a lower one significant
+    while count > before:  # repeat while constants are added: a higher order may make a lower one significant
         before = count
         for group in groups:
             while count < _MOST_STEPS:
@@ -236,16 +236,16 @@ def _steps(
 
 
 def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | None:
-    """The constant, or where none helps alone the pair, that all three signs speak for, with the largest F.
+    """The candidate with the largest F that all three criteria favour; a pair if no single constant helps.
 
-    Fitted are those few that promise the largest decrease of χ² in the linear model; see `promised`.
+    Only the few candidates with the largest decrease of χ² in the linear model are fitted; see `promised`.
     """
     if not left:
         return None
     alone, pairs = promised(fit, left, options)
     for name in beside_zero(with_names(fit.named, left), left, fit.lines, options)[
         1
-    ]:  # of no promise in a linear model
+    ]:  # their first derivatives are 0, so the linear model cannot judge them
         i = left.index(name)
         alone[i], pairs[i], pairs[:, i] = np.inf, 0.0, 0.0
     few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
@@ -259,22 +259,22 @@ def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | N
 
 
 def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> tuple[Floats, Floats]:
-    """By how much χ² would fall, to first order, with each constant free (n,), and with each two of them (n, n).
+    """First-order decrease of χ² for each constant set free (n,), and for each pair (n, n).
 
-    What is left of the derivatives x by a new constant beside those of the fit, x - J J⁺ x, decreases χ² by (x · r)²/(x · x); two
-    of them by b A⁻¹ b with b = x · r and A their products. A constant that the others make up promises 0.
+    Let x be the derivatives by a new constant, projected off those of the fit: x - J J⁺ x. The constant decreases χ² by
+    (x · r)²/(x · x); a pair by b A⁻¹ b with b_i = x_i · r and A_ij = x_i · x_j. A linearly dependent constant gives 0.
     """
     search = search_of(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
     derivatives, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
     columns = np.vstack(
         [columns, np.zeros((len(derivatives) - len(columns), len(names)))]
-    )  # a-priori values know no other
+    )  # a-priori values do not depend on other constants
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0, size, 1.0)
     basis = np.linalg.qr(
         derivatives / np.where(np.linalg.norm(derivatives, axis=0) > 0, np.linalg.norm(derivatives, axis=0), 1.0)
     )[0]
-    for _ in range(2):  # once more for the digits that the first time cancels
+    for _ in range(2):  # project twice: the first projection loses digits by cancellation
         columns = columns - basis @ (basis.T @ columns)
     products, along = columns.T @ columns, columns.T @ fit.residuals
     own_size = np.diag(products).copy()
@@ -288,18 +288,18 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
 
 
 def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
-    """The few constants that are smallest in units of their standard errors."""
+    """The few constants that are smallest relative to their standard errors."""
     ratio = dict(zip(fit.parameters.names, np.abs(fit.values) / fit.errors, strict=True))
     return sorted(names, key=lambda name: ratio[name])[:_TRIED]
 
 
 def _patient(options: FitOptions | None) -> FitOptions:
-    """A model on its way may be far from the lines: only the last one is judged by its rms. An interrupt ends the whole choice."""
+    """Options of intermediate models: they may fit poorly, and an interrupt ends the whole choice."""
     return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
 
 
 def _pair(fit: Fit, first: str, other: str, options: FitOptions) -> Trial | None:
-    """Two constants together, judged as one step; None where the lines are too few."""
+    """Two constants added in one step; None if the lines are too few."""
     constants, _ = beside_zero(with_names(fit.named, [first, other]), [first, other], fit.lines, options)
     try:
         free = fit.parameters.moved(fit.values).with_free(constants, [first, other])
@@ -312,7 +312,7 @@ def _pair(fit: Fit, first: str, other: str, options: FitOptions) -> Trial | None
 
 @dataclass(frozen=True)
 class Suggestion:
-    """An unmeasured line: its labels, where it is predicted with which error, and the error of the constant after it, over now."""
+    """An unmeasured line: labels, predicted frequency and its error, and the ratio by which it would reduce the error of the constant."""
 
     upper: tuple[int, ...]
     lower: tuple[int, ...]
@@ -330,9 +330,9 @@ def suggest_lines(
     error_mhz: float,
     model: Callable[[Ints], LevelModel] | None = None,
 ) -> list[Suggestion]:
-    """How much each line, if it were measured, would reduce the standard error of one parameter; the best first.
+    """Lines ranked by how much their measurement would reduce the standard error of one parameter.
 
-    A line with the derivatives d by the parameters and the error σ takes (C d)_j²/(σ² + dᵀ C d) from the variance C_jj.
+    A line with derivatives d by the parameters and error σ reduces the variance C_jj by (C d)_j²/(σ² + dᵀ C d).
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def suggest_lines(
     upper, lower : (m, k) arrays
         Labels of the lines to choose from.
     error_mhz : float
-        With which it would be measured.
+        Error of the measurement.
     model : callable, optional
         As in `fit_lines`.
 
@@ -353,7 +353,7 @@ def suggest_lines(
     Raises
     ------
     ValueError
-        For an unknown parameter, or one that the lines do not determine (any line in which it counts would).
+        For an unknown parameter, or one that the lines do not determine (any line that depends on it would).
     """
     if name not in fit.parameters.names:
         raise ValueError(f"{name} is not among the free parameters {', '.join(fit.parameters.names)}")
@@ -362,8 +362,8 @@ def suggest_lines(
         raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    made = model(labels) if model else model_of(fit.named, labels)
-    energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
+    level_model = model(labels) if model else model_of(fit.named, labels)
+    energies, slopes = level_model.levels(fit.parameters.constants_of(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]
     rows = slopes[up] - slopes[low]

@@ -1,7 +1,7 @@
-"""Lines and their derivatives at given constants without a search, and where constants start of which lines know the square alone.
+"""Lines and derivatives at fixed constants, and start values for constants that act on the lines only through their square.
 
-At 0 the derivatives of all lines by a coupling of two states, or an element off the diagonal, are 0, so that no search goes
-anywhere; such a constant has to start beside it.
+At 0 all lines have zero derivatives by a coupling of two states, or by another off-diagonal element. A search cannot leave this
+point, so such a constant must start away from 0.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.fitting.top_levels import model_of
 from rotor.quantum.labelled import MissingLevelsError
 
-_STEPS = 4  # to the value that moves the lines by one error
-_EVEN = 1e-3  # errors: by so much do the lines of a value and of its negative differ, rms, where they know its square
+_STEPS = 4  # iterations to the value that shifts the lines by one error
+_EVEN = 1e-3  # rms difference (errors) of the lines for ± a value below which they depend on its square only
 
 
 def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> Floats:
-    """Derivatives of the measured frequencies over their errors, (frequencies, names), by any constants at those of a fit.
+    """Derivatives of the measured frequencies, divided by their errors, (frequencies, names), at the constants of a fit.
 
-    names : named constants, free in the fit or not, also those that it does not have (at 0). Raises ValueError for other names.
+    names : constants, free in the fit or not; those that the fit lacks are 0. Raises ValueError for unknown names.
     """
     constants = with_names(fit.named, [name for name in names if name not in fit.named])
     free = parameters(constants, names)
@@ -43,7 +43,7 @@ def search_of(
     options: FitOptions,
     used: NDArray[np.bool_] | None = None,
 ) -> Search:
-    """What evaluates lines for named constants, without a search.
+    """A `Search` to evaluate lines for named constants, without searching.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def search_of(
         Of the same constants.
     options : FitOptions
     used : (lines,) array of bool, optional
-        Which lines count; those with an error that are not excluded where it is left out.
+        Lines that count. Default: lines with an error that are not excluded.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def search_of(
     Raises
     ------
     ValueError
-        With the first line that has a level which does not exist.
+        Names the first line with a level that does not exist.
     """
     labels, upper, lower = levels_in(lines)
     left_out, sigma = errors_of(lines, options)
@@ -79,14 +79,14 @@ def search_of(
 def beside_zero(
     constants: ConstantSet, names: Sequence[str], lines: Assignments, options: FitOptions | None = None
 ) -> tuple[ConstantSet, dict[str, float]]:
-    """The constants with those of `names` that are 0, and of which the lines know the square alone, at a value that they can see.
+    """Start values for constants of `names` that are 0 and act on the lines only through their square.
 
     Parameters
     ----------
     constants : Constants or TopConstants
-        Constants of one state without spins are left as they are: their levels depend on each of them to first order.
+        Constants of a single state without spins are not changed: their levels depend on each constant to first order.
     names : sequence of str
-        Those that are to be fitted.
+        The constants to be fitted.
     lines : Assignments
     options : FitOptions, optional
 
@@ -94,7 +94,7 @@ def beside_zero(
     -------
     constants : Constants or TopConstants
     changed : dict of str to float
-        The values that were put in, MHz: with each of them alone the lines move by one of their errors (rms).
+        The new start values, MHz; each of them alone shifts the lines by one error (rms).
     """
     changed = dict[str, float]()
     if isinstance(constants, TopConstants):
@@ -106,7 +106,7 @@ def beside_zero(
 
 
 def _seen(constants: TopConstants, name: str, lines: Assignments, options: FitOptions) -> float:
-    """The value that moves the lines by one error; 0 where they depend on its sign, or not on it at all."""
+    """The value that shifts the lines by one error; 0 if they depend on its sign, or not at all on the constant."""
     search = search_of(lines, constants, parameters(constants, [name]), options)
 
     def frequencies(value: float) -> Floats:

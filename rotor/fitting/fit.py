@@ -1,10 +1,10 @@
-"""The fit: constants from assigned lines by weighted least squares, with all that is known about the result.
+"""Constants from assigned lines by weighted least squares, with the statistics of the result.
 
     χ² = Σ ((ν_obs - ν_calc)/σ)² + Σ ((p - p₀)/σ_prior)²,      ν_calc = E(upper) - E(lower), in a blend the weighted mean
 
-The fit knows levels by their labels only: a `LevelModel` gives their energies and derivatives for any constants. The search
-itself is in `rotor.fitting.search` and `rotor.fitting.strategies`. A fit has converged when the search is at a minimum and
-that minimum describes the lines: a weighted rms far above 1 is a failure and says so.
+A `LevelModel` gives the energies of the labelled levels, and their derivatives, for any constants. The search itself is in
+`rotor.fitting.search` and `rotor.fitting.strategies`. A fit has converged if the search is at a minimum and the minimum
+describes the lines; a weighted rms far above 1 is reported as a failure.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from rotor.statistics.regression import Regression, regression
 from rotor.table import counted
 from rotor.tops.covariance import Covariance
 
-NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
-CHANGED_STATE = 0.5  # overlap below which a level is another state than it was at the start
+NEARLY_THERE = 0.01  # convergence limit (standard errors of the next step) at the last allowed iteration
+CHANGED_STATE = 0.5  # overlap with the state at the start below which a level is reported as changed
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A finished fit.
 
-    lines : as given. constants : the fitted set with its standard errors, None where the parameters are not named constants (SPFIT's
-    codes with spins or several states). parameters : what was fitted, `values` (n,) at the end
-    calculated_mhz (lines,) : each line; blended_mhz (lines,) : the mean of its blend. calculated_errors_mhz (lines,) : of the
-    prediction, from the stated errors. line_errors_mhz (lines,) : the errors of the lines as they counted, the default one among them;
-    0 where there is none. used (lines,) : whether a line counted; left_out : why not, by line
-    residuals (u,), jacobian's statistics : of the measured frequencies that counted, blends as one, in order of `groups`
-    minimum : how the search ended. rounding_mhz : bound of rounding of a calculated line
-    converged, reason : whether this is a result, and the sentence that says why or why not
-    changed_states : levels that are another state than at the start, as text. notes : what must be known
+    lines : the input. constants : the fitted set with standard errors; None if the parameters are not named constants (SPFIT's
+    codes with spins or several states). parameters : the free parameters; `values` (n,) : their fitted values
+    calculated_mhz (lines,) : frequency of each line; blended_mhz (lines,) : mean of its blend. calculated_errors_mhz (lines,) :
+    standard errors of the predictions, from the stated errors. line_errors_mhz (lines,) : errors used in the fit, with the default
+    error filled in; 0 without any. used (lines,) : whether a line counted; left_out : the reason, by line, if it did not
+    residuals (u,), statistics : of the measured frequencies that counted, one per blend, in order of `groups`
+    minimum : how the search ended. rounding_mhz : bound on the rounding error of a calculated line
+    converged, reason : whether the fit is valid, and a sentence that says why or why not
+    changed_states : labels of levels that are mostly another state than at the start. notes : remarks for the user
     """
 
     lines: Assignments
@@ -72,13 +72,13 @@ class Fit:
 
     @property
     def marked_lines(self) -> Assignments:
-        """The lines, with those that were rejected marked as excluded, for the next fit; one without an error says so itself."""
+        """The lines for the next fit, with the rejected ones marked as excluded; lines without an error are not marked."""
         excluded = np.isin(np.arange(len(self.lines)), list(self.left_out)) & (self.line_errors_mhz > 0)
         return replace(self.lines, excluded=excluded)
 
     @property
     def named(self) -> ConstantSet:
-        """The fitted constants. ValueError where the parameters are not named constants."""
+        """The fitted constants. ValueError if the parameters are not named constants."""
         if self.constants is None:
             raise ValueError(
                 "the parameters of this fit are codes of SPFIT with spins or states; it has no named constants"
@@ -87,26 +87,26 @@ class Fit:
 
     @property
     def difference_mhz(self) -> Floats:
-        """Observed minus calculated (lines,), of blends against their mean."""
+        """Observed minus calculated frequency (lines,); components of a blend are compared by their mean."""
         return np.asarray(self.lines.frequency_mhz - self.blended_mhz)
 
     @property
     def weighted_rms(self) -> float:
-        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR, less the part of a-priori values.
+        """√(Σ ((obs - calc)/σ)² / number of frequencies that counted), one per blend: SPFIT's RMS ERROR without a-priori values.
 
-        Of a blend of known width its components count too.
+        For a blend of known width the spread of its components counts too.
         """
         r = self.residuals[: len(self.residuals) - int(np.isfinite(self.parameters.prior).sum())]
         return float(np.sqrt(r @ r / len(r))) if len(r) else float("nan")
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Measured frequencies that counted, and a-priori values, less the combinations that they determine."""
+        """Measured frequencies that counted plus a-priori values, minus the parameter combinations that they determine."""
         return len(self.residuals) - self.statistics.rank
 
     @property
     def reduced_chi(self) -> float:
-        """√(χ²/degrees of freedom); nan where there are none."""
+        """√(χ²/degrees of freedom); nan with 0 degrees of freedom."""
         free = self.degrees_of_freedom
         return float(np.sqrt(self.residuals @ self.residuals / free)) if free > 0 else float("nan")
 
@@ -117,23 +117,23 @@ class Fit:
 
     @property
     def scaled_errors(self) -> Floats:
-        """The same times √(χ²/degrees of freedom): from the scatter of the lines."""
+        """Standard errors (n,) in MHz from the scatter of the lines: `errors` times √(χ²/degrees of freedom)."""
         return np.asarray(self.errors * self.reduced_chi)
 
     @property
     def covariance(self) -> Covariance:
-        """Of the constants that depend on what was fitted, from the stated errors. ValueError where one is not determined."""
+        """Covariance of the constants that were fitted, from the stated errors. ValueError if one is not determined."""
         return covariance_of(self.parameters, self.statistics)
 
     def rms_mhz(self, wavenumber: bool = False) -> float:
-        """Unweighted rms of the measured frequencies, MHz (of those measured in cm⁻¹ in cm⁻¹); nan where there are none."""
+        """Unweighted rms of the frequencies measured in MHz, or of those measured in cm⁻¹ (in cm⁻¹); nan without any."""
         chosen = self.groups[self.lines.wavenumber[self.groups] == wavenumber]
         d = self.difference_mhz[chosen] / (29979.2458 if wavenumber else 1.0)
         return float(np.sqrt(d @ d / len(d))) if len(d) else float("nan")
 
 
 def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
-    """The covariance (MHz²) of the constants that follow from free parameters."""
+    """Covariance (MHz²) of the constants that depend on free parameters."""
     if not np.isfinite(statistics.errors).all():
         lost = ", ".join(combination.text for combination in statistics.undetermined)
         raise ValueError(
@@ -144,14 +144,16 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
 
 
 def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
-    """The same without the dipole and constants that follow from a free parameter that is not determined; None where no other is there."""
+    """Covariance of the determined constants only, without the dipole; None if no constant remains."""
     open_ = ~np.isfinite(statistics.errors)
     frequencies = np.array([name not in DIPOLES for name in parameters.constant_names])
     rows = np.flatnonzero(frequencies & parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
     if not len(rows):
         return None
-    known = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
-    matrix = parameters.matrix[rows] @ known @ parameters.matrix[rows].T
+    finite = np.where(
+        np.isfinite(statistics.covariance), statistics.covariance, 0.0
+    )  # undetermined parameters do not contribute
+    matrix = parameters.matrix[rows] @ finite @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
 
 
@@ -164,25 +166,25 @@ def fit_lines(
     model: Callable[[Ints], LevelModel] | None = None,
     progress: Progress | None = None,
 ) -> Fit:
-    """Constants fitted to assigned lines.
+    """Fit constants to assigned lines.
 
     Parameters
     ----------
     lines : Assignments
     constants : Constants or TopConstants
-        Where the fit starts: kind, reduction, representation and every constant that is held; None with a model of its own.
+        Start of the fit, with kind, reduction, representation and the constants that are held; None if `model` is given.
     parameters : Parameters
-        What is free, for the same constants.
+        The free parameters of these constants.
     options : FitOptions, optional
     model : callable, optional
-        Labels (levels, k) to a `LevelModel`; that of the constants where it is left out.
+        Makes a `LevelModel` from labels (levels, k). Default: the model of the constants.
     progress : callable, optional
-        Called with every `Iteration`. A KeyboardInterrupt ends the search with the best constants so far.
+        Called with each `Iteration`. A KeyboardInterrupt ends the search with the best constants so far.
 
     Returns
     -------
     Fit
-        `converged` is False where it is no result, and `reason` says why; the best point is in it all the same.
+        If the fit failed, `converged` is False and `reason` says why; the best point is returned all the same.
 
     Raises
     ------
@@ -199,32 +201,32 @@ def fit_lines(
     >>> from rotor.tops.constants import Constants
     >>> start = Constants(B=57000.0, D=0.1)
     >>> seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [115271.2018, 230538.0, 345795.9899], 0.0005)
-    >>> found = fit_lines(seen, start, free(start, ["B", "D"]))
-    >>> found.converged, round(found.constants["B"], 3), round(found.constants["D"], 4)
+    >>> fit = fit_lines(seen, start, free(start, ["B", "D"]))
+    >>> fit.converged, round(fit.constants["B"], 3), round(fit.constants["D"], 4)
     (True, 57635.968, 0.1835)
     """
     options = options or FitOptions()
     if not len(lines):
         raise ValueError("there are no lines to fit to")
-    lines, made, missing = _with_levels(lines, model or _of_constants(constants, options), options)
+    lines, level_model, missing = _with_levels(lines, model or _model_from_labels(constants, options), options)
     left_out, sigma = errors_of(lines, options)
     labels, upper, lower = levels_in(lines)
-    if made.names != parameters.constant_names:
-        raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
+    if level_model.names != parameters.constant_names:
+        raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {level_model.names}")
 
     used = np.ones(len(lines), dtype=bool)
     used[list(left_out)] = False
     if few := too_few(lines, used, parameters):
         raise ValueError(f"{lines.source or 'the lines'}: {few}")
-    search = Search(lines, made, parameters, options, upper, lower, sigma, used)
+    search = Search(lines, level_model, parameters, options, upper, lower, sigma, used)
     search, minimum, rejected = with_rejection(search, options, progress)
     left_out |= rejected
     fit = _finished(search, minimum, constants, left_out, labels)
     return replace(fit, notes=(*missing, *fit.notes))
 
 
-def _of_constants(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
-    """What makes the model of the constants, from labels."""
+def _model_from_labels(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
+    """A function from labels to the level model of the constants."""
     if constants is None:
         raise ValueError("either constants or a model of the levels is needed")
     return partial(model_of, constants, kmax=options.kmax)
@@ -233,9 +235,9 @@ def _of_constants(constants: ConstantSet | None, options: FitOptions) -> Callabl
 def _with_levels(
     lines: Assignments, model: Callable[[Ints], LevelModel], options: FitOptions
 ) -> tuple[Assignments, LevelModel, list[str]]:
-    """The lines whose two levels there are, their model, and what was left out.
+    """The lines whose two levels exist, their level model, and notes on lines left out.
 
-    A label that no level has is an error, or, with `leave_out_missing`, its lines are left out.
+    A label without a level is an error; with `leave_out_missing` its lines are left out.
     """
     labels, upper, lower = levels_in(lines)
     same = np.flatnonzero(upper == lower)
@@ -254,19 +256,19 @@ def _with_levels(
             f"{_named(lines, i)}, is left out: it has a level that does not exist"
             for i in np.flatnonzero(lost).tolist()
         ]
-    rest, made, more = _with_levels(lines.take(~lost), model, options)
-    return rest, made, notes + more
+    rest, level_model, more = _with_levels(lines.take(~lost), model, options)
+    return rest, level_model, notes + more
 
 
 def missing_level(lines: Assignments, error: MissingLevelsError) -> ValueError:
-    """The error of the first line that has the level which the error names, the first of its places."""
+    """An error that names the first line with the missing level."""
     _, upper, lower = levels_in(lines)
     lost = (upper == error.places[0]) | (lower == error.places[0])
     return ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}")
 
 
 def _named(lines: Assignments, i: int) -> str:
-    """A line by its place and labels."""
+    """A line by source, number and labels, for messages."""
     return f"{lines.source or 'the lines'}: line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
 
 
@@ -306,7 +308,7 @@ def _finished(
 def _constants(
     constants: ConstantSet | None, parameters: Parameters, values: Floats, statistics: Regression
 ) -> tuple[ConstantSet | None, str]:
-    """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
+    """The fitted set with standard errors and an empty text; if the fitted values are invalid, the start and the error text."""
     if constants is None:
         return None, ""
     new = dict(zip(parameters.constant_names, parameters.constants_of(values).tolist(), strict=True))
@@ -330,7 +332,7 @@ def _line_errors(search: Search) -> Floats:
 
 
 def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:
-    """√(d C dᵀ) of rows d (lines, n); infinite where a parameter that is not determined counts."""
+    """√(d C dᵀ) for rows d (lines, n); infinite if a line depends on an undetermined parameter."""
     open_ = ~np.isfinite(statistics.errors)
     closed = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)
     out = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, closed, jacobian, optimize=True), 0.0))
@@ -339,16 +341,18 @@ def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:
 
 
 def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
-    """Levels that are mostly another state than with the constants of the start."""
+    """Labels of levels that are mostly another state than with the start constants."""
     start = search.parameters.constants_of(search.parameters.start)
     overlap = search.model.overlaps(start, search.parameters.constants_of(values))
     return tuple(search.lines.label_text(labels[i].tolist()) for i in np.flatnonzero(overlap < CHANGED_STATE))
 
 
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
-    """Whether the fit is a result, and the sentence that says so or says why not."""
+    """Whether the fit is valid, and a sentence that says why or why not."""
     minimum = fit.minimum
-    rms = fit.weighted_rms if options.loss == "squares" else minimum.rms  # of what was made least
+    rms = (
+        fit.weighted_rms if options.loss == "squares" else minimum.rms
+    )  # for a robust loss: of the function that was minimised
     if disorder:
         return False, f"the constants that were reached are no set of constants: {disorder}"
     near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE
@@ -375,8 +379,8 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     return True, reason
 
 
-def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
-    """What is to be known of lines that stand twice."""
+def _repeated_text(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
+    """A note on lines that occur twice."""
     first, second = np.array(pairs).T
     apart = np.abs(lines.frequency_mhz[first] - lines.frequency_mhz[second])
     worst = int(np.argmax(apart))
@@ -388,13 +392,15 @@ def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
 
 
 def _unlikely(lines: Assignments) -> list[str]:
-    """Lines of one state without spins and fields that no dipole makes: J changes by more than 1, or Ka and Kc both by even numbers."""
+    """Notes on lines that break dipole selection rules (one state, no spins, no fields): ΔJ > 1, or ΔKa and ΔKc both even."""
     if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] in ("f", "field"):
         return []
-    there = ~lines.from_zero
+    is_transition = ~lines.from_zero
     change = np.abs(lines.upper - lines.lower)
-    far = there & (change[:, 0] > 1)
-    even = there & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
+    far = is_transition & (change[:, 0] > 1)
+    even = (
+        is_transition & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
+    )
     out = []
     for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
         unlikely = np.flatnonzero(rows)
@@ -407,7 +413,7 @@ def _unlikely(lines: Assignments) -> list[str]:
 
 
 def _bent(fit: Fit) -> list[str]:
-    """The parameters that the linear model would move most, in units of the lengths of their columns."""
+    """Parameters with the largest steps left in the linear model, in units of the lengths of their columns."""
     statistics = fit.statistics
     moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
     return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
@@ -426,7 +432,7 @@ def _notes(fit: Fit) -> list[str]:
         )
     twice = duplicates(lines)
     if twice:
-        notes.append(_of_twice(lines, twice))
+        notes.append(_repeated_text(lines, twice))
     notes += _unlikely(lines)
     reversed_ = np.flatnonzero(
         fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))

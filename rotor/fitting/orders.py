@@ -1,4 +1,4 @@
-"""The order of a constant, by the highest power of the angular momentum in its operator: models are built up in this order."""
+"""The order of a constant: the highest power of the angular momentum in its operator. Models are built up in this order."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ def order_of(name: str, constants: ConstantSet) -> int:
     if name in ("A", "B", "C"):
         return 2
     spelled = powers_of_spelled(name)
-    known = distortion_terms(constants.kind, constants.reduction)
-    if not spelled and name not in known:
+    terms_by_name = distortion_terms(constants.kind, constants.reduction)
+    if not spelled and name not in terms_by_name:
         raise ValueError(
-            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
+            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(terms_by_name)[:3])}"
         )
-    terms = {spelled: 1.0} if spelled else known[name]
+    terms = {spelled: 1.0} if spelled else terms_by_name[name]
     return max(2 * (p + q + n) for p, q, n in terms)
 
 
 def _order_of_named(name: str, constants: TopConstants) -> int:
-    """Of a constant of a state, of two states, or of spins: spin-rotation has one power of N, as G has."""
+    """Order of a constant of a further state, of a pair of states, or of spins; spin-rotation and G have one power of N."""
     head = name.partition("[")[0]
     if "(" not in name and "," not in name:
         return 0 if head == "E" else order_of(head, constants.top.constants)

@@ -1,7 +1,7 @@
-"""What is fitted: parameters that constants follow linearly, some free, some held, some tied, some with an a-priori error.
+"""Free parameters of a fit. Constants are linear functions of them, free, held, or tied; free ones may have an a-priori error.
 
-constants = base + matrix @ parameters. With plain names a parameter is a constant; in SPFIT's coding it is what a code
-multiplies (A - B, -D_J), and a tied parameter retains its ratio to the one before it.
+constants = base + matrix @ parameters. With plain names a parameter is a constant. In SPFIT's coding it is the factor of a
+coded operator (A - B, -D_J), and a tied parameter has a fixed ratio to the preceding one.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _FURTHER = (
 class Parameters:
     """Free parameters and how the constants follow from them.
 
-    names (n,) : of the free parameters. start (n,) : their values before the fit, MHz. prior (n,) : a-priori standard errors in
-    MHz, infinite where there are none. centre (n,) : the a-priori values, MHz, where they are not `start`
+    names (n,) : the free parameters. start (n,) : values before the fit, MHz. prior (n,) : a-priori standard errors, MHz;
+    infinite without one. centre (n,) : a-priori values, MHz, if they differ from `start`
     constant_names (c,) ; base (c,), matrix (c, n) : constants = base + matrix @ parameters
     """
 
@@ -48,7 +48,7 @@ class Parameters:
 
     @property
     def expected(self) -> Floats:
-        """A-priori values (n,), MHz, from which the errors `prior` count."""
+        """A-priori values (n,), MHz, with the standard errors `prior`."""
         return self.start if self.centre is None else self.centre
 
     def constants_of(self, parameters: Floats) -> Floats:
@@ -63,7 +63,7 @@ class Parameters:
 
     @cached_property
     def _constants(self) -> Ints | None:
-        """Which constants the parameters are; None where some are not constants, or tied to several."""
+        """Indices of the parameters among the constants; None if a parameter is not a constant, or a constant is tied to several."""
         rows = self.matrix.argmax(axis=0) if self.matrix.size else np.zeros(0, dtype=np.int64)
         plain = np.zeros(self.matrix.shape)
         plain[rows, np.arange(len(rows))] = 1.0
@@ -71,7 +71,7 @@ class Parameters:
         return rows if rising and np.array_equal(self.matrix, plain) else None
 
     def without(self, name: str) -> Parameters:
-        """The same with one parameter held at 0."""
+        """A copy with one parameter held at 0."""
         i = self.names.index(name)
         keep = [k for k in range(len(self.names)) if k != i]
         return Parameters(
@@ -80,17 +80,17 @@ class Parameters:
         )  # fmt: skip
 
     def moved(self, start: Floats) -> Parameters:
-        """The same from another start; a-priori values stay where they are."""
+        """A copy with other start values; a-priori values do not change."""
         start = np.asarray(start, dtype=np.float64)
         centre = np.where(np.isfinite(self.prior), self.expected, start)
         return replace(self, start=start, centre=centre)
 
     def with_free(self, constants: ConstantSet, added: Sequence[str]) -> Parameters:
-        """The same with more free constants, ties and a-priori errors as they are.
+        """A copy with more free constants; ties and a-priori errors do not change.
 
-        constants : the set with the added ones, which start from it. Raises ValueError for one that is free or tied already.
+        constants : gives the start values of the added ones. Raises ValueError if one is free or tied already.
         """
-        names, full_names = tuple(constants.values), [_known(name, constants, "free") for name in added]
+        names, full_names = tuple(constants.values), [_spelled_as_in_set(name, constants, "free") for name in added]
         moving = {name for name, row in zip(self.constant_names, self.matrix, strict=True) if row.any()}
         if taken := [name for name in full_names if name in moving]:
             raise ValueError(f"{taken[0]} is free or tied already; leave it out, or take the tie away")
@@ -118,18 +118,18 @@ def parameters(
     ties: Sequence[str] = (),
     priors_mhz: Mapping[str, float] | None = None,
 ) -> Parameters:
-    """Parameters that are constants by name.
+    """Free parameters from names of constants.
 
     Parameters
     ----------
     constants : Constants or TopConstants
-        The start; those not free stay as they are. A free constant that the set does not have must be added to it first.
+        Start values; constants that are not free are held. The set must contain each free constant.
     free : sequence of str
     ties : sequence of str
         Such as "DeltaK = 2.5*DeltaJ" (a fixed ratio) or "C = B - 300" (a fixed difference, MHz or with a unit): the constant on
         the left follows the one on the right and is not free itself.
     priors_mhz : mapping, optional
-        A-priori standard errors of free constants, which then are drawn to their start.
+        A-priori standard errors of free constants; their a-priori values are the start values.
 
     Returns
     -------
@@ -139,7 +139,8 @@ def parameters(
     Raises
     ------
     ValueError
-        A name given twice, unknown, free and tied at once, or tied to what is not free; no free constant; a prior not above 0.
+        A repeated or unknown name, a constant both free and tied or tied to one that is not free, no free constant, a prior not
+        above 0.
 
     Examples
     --------
@@ -149,7 +150,7 @@ def parameters(
     [9.5, 3.5, 2.5]
     """
     names, values = tuple(constants.values), np.array(list(constants.values.values()))
-    chosen = [_known(name, constants, "free") for name in free]
+    chosen = [_spelled_as_in_set(name, constants, "free") for name in free]
     twice = next((name for name in chosen if chosen.count(name) > 1), None)
     if twice:
         typed = " and ".join(dict.fromkeys(text for text, name in zip(free, chosen, strict=True) if name == twice))
@@ -176,9 +177,9 @@ def parameters(
 
 
 def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
-    """The set with those constants of `names` that it lacks added at 0, so that they can be fitted.
+    """A set with the missing constants of `names` added at 0, so that they can be fitted.
 
-    Raises ValueError for a name that the kind of top or the reduction does not have, and for a state or spin that there is not.
+    Raises ValueError for a name that does not belong to the kind of top or the reduction, and for a missing state or spin.
 
     >>> from rotor.tops.constants import Constants
     >>> with_names(Constants(B=6081.5), ["D"]).values["D"]
@@ -191,7 +192,7 @@ def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
         raise ValueError(f"{error}; {_FURTHER}") from None
 
 
-def _known(name: str, constants: ConstantSet, where: str) -> str:
+def _spelled_as_in_set(name: str, constants: ConstantSet, where: str) -> str:
     if name not in constants:
         raise ValueError(
             f"{where}: {name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
@@ -200,13 +201,13 @@ def _known(name: str, constants: ConstantSet, where: str) -> str:
 
 
 def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:
-    """Left, ratio, right, difference in MHz of `left = ratio*right + difference`."""
+    """Parse `left = ratio*right + difference`: left, ratio, right, difference in MHz."""
     match = _TIE.match(text.replace("−", "-"))
     if not match:
         raise ValueError(
             f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
         )
-    left, right = (_known(match[i], constants, f"tie {text!r}") for i in (1, 3))
+    left, right = (_spelled_as_in_set(match[i], constants, f"tie {text!r}") for i in (1, 3))
     if left == right:
         raise ValueError(f"tie {text!r}: {left} cannot follow itself")
     try:
@@ -217,11 +218,11 @@ def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:
 
 
 def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: ConstantSet) -> Floats:
-    known = {_known(name, constants, "priors_mhz"): value for name, value in priors_mhz.items()}
-    lost = [name for name in known if name not in chosen]
+    errors = {_spelled_as_in_set(name, constants, "priors_mhz"): value for name, value in priors_mhz.items()}
+    lost = [name for name in errors if name not in chosen]
     if lost:
         raise ValueError(f"priors_mhz: a-priori error of {', '.join(lost)}, which is not free")
-    for name, value in known.items():
+    for name, value in errors.items():
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; a standard error is above 0")
-    return np.array([known.get(name, np.inf) for name in chosen])
+    return np.array([errors.get(name, np.inf) for name in chosen])

@@ -1,4 +1,4 @@
-"""The table of a publication: value(σ) in a fitting unit, as text, Markdown or LaTeX."""
+"""Tables for publication: value(σ) in a suitable unit, as text, Markdown or LaTeX."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WITH_AXES = re.compile(r"(chi|eps|gamma|lambda|[CTDGFWb])_?([\w-]*)")  # of sta
 
 
 def value_text(value: float, error: float | None, digits: int = 2) -> str:
-    """A number with its standard error in brackets, in units of the last digit, the error with so many digits.
+    """A number with its standard error in brackets, in units of the last digit; `digits` significant digits of the error.
 
     >>> value_text(57635.96804, 0.000034), value_text(-0.256e-12, 0.215e-12), value_text(12.0, None)
     ('57635.968040(34)', '-0.26(22)e-12', '12.0')
@@ -48,13 +48,13 @@ def value_text(value: float, error: float | None, digits: int = 2) -> str:
 
 
 def _power_of_ten(value: float, error: float) -> int:
-    """A multiple of three to take out of numbers that are too small to print; 0 for others."""
+    """Power of ten (a multiple of 3) to factor out of very small numbers; 0 for others."""
     size = max(abs(value), error)
     return 0 if size >= 1e-4 else 3 * math.floor(math.log10(size) / 3 + 1)
 
 
 def unit_of(value: float, error: float | None) -> tuple[str, float]:
-    """The unit in which a number reads well and its size in MHz: the value above 0.1 of it, its error not above 10.
+    """A suitable unit and its size in MHz: the value is above 0.1 units and its error at most 10 units.
 
     >>> unit_of(0.0013014, 3.7e-9), unit_of(0.0, 2e-6)
     (('kHz', 0.001), ('Hz', 1e-06))
@@ -64,7 +64,7 @@ def unit_of(value: float, error: float | None) -> tuple[str, float]:
 
 
 def name_text(name: str, form: str) -> str:
-    """A constant's name as text (ΔJK), or in LaTeX; spins and states stand behind it.
+    """A constant's name as text (ΔJK) or in LaTeX, followed by its spins and states.
 
     >>> name_text("DeltaJK", "latex"), name_text("d1", "latex"), name_text("PhiJ", "text")
     ('$\\\\Delta_{JK}$', '$d_{1}$', 'ΦJ')
@@ -87,9 +87,9 @@ def name_text(name: str, form: str) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A constant of the table: name, value and standard error in MHz, what it follows where it is tied, its states.
+    """A constant of the table: name, value and standard error in MHz, the constant it is tied to, its states.
 
-    error : None of a constant that is held, infinite of one that is not determined.
+    error : None if the constant is held, infinite if it is not determined.
     """
 
     name: str
@@ -102,18 +102,18 @@ class Row:
 def publication_table(
     fit: Fit, form: str = "text", *, scaled: bool = False, digits: int = 2, rows: Sequence[Row] = ()
 ) -> str:
-    """The constants with their standard errors, then what the fit is like.
+    """A table of the constants with their standard errors, followed by the statistics of the fit.
 
     Parameters
     ----------
     fit : Fit
     form : "text", "markdown" or "latex"
     scaled : bool
-        Errors times √(χ²/degrees of freedom), from the scatter of the lines, instead of those of the stated errors.
+        Errors from the scatter of the lines, √(χ²/degrees of freedom) times those from the stated errors.
     digits : int
-        Of the errors.
+        Significant digits of the errors.
     rows : sequence of Row, optional
-        What stands in the table; the constants of the fit, or its free parameters where these are no named constants.
+        Rows of the table. Default: the constants of the fit, or its free parameters if they are not named constants.
 
     Returns
     -------
@@ -132,12 +132,12 @@ def publication_table(
     table = rows or _rows(fit)
     cells = [_cells(row, factor, digits, form, any(each.states for each in table)) for row in table]
     heads = ["constant", *(["states"] if any(each.states for each in table) else []), "unit", "value"]
-    facts = [*_facts(fit, scaled), *_of_states(table)]
+    facts = [*_facts(fit, scaled), *_note_on_states(table)]
     return {"text": _plain, "markdown": _markdown, "latex": _latex}[form](heads, cells, facts)
 
 
-def _of_states(rows: Sequence[Row]) -> list[tuple[str, str]]:
-    """How a constant of all states and one of a single state go together, where both are there."""
+def _note_on_states(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """A note that constants of all states and of a single state add up, if the table has both."""
     both = {row.name for row in rows if row.states == "all"} & {
         row.name for row in rows if row.states not in ("", "all")
     }
@@ -156,25 +156,25 @@ def _rows(fit: Fit) -> list[Row]:
 
 
 def _tied(fit: Fit) -> dict[str, str]:
-    """Constants that follow one free constant, and which."""
-    made = fit.parameters
-    if not set(made.names) <= set(made.constant_names):
+    """Each tied constant, with the free constant that it follows."""
+    parameters = fit.parameters
+    if not set(parameters.names) <= set(parameters.constant_names):
         return {}
-    free = [(row != 0).nonzero()[0].tolist() for row in made.matrix]
+    free = [(row != 0).nonzero()[0].tolist() for row in parameters.matrix]
     return {
-        name: made.names[places[0]]
-        for name, places in zip(made.constant_names, free, strict=True)
-        if places and name not in made.names
+        name: parameters.names[places[0]]
+        for name, places in zip(parameters.constant_names, free, strict=True)
+        if places and name not in parameters.names
     }
 
 
 def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -> list[str]:
     error = row.error if row.error and math.isfinite(row.error) else None
     unit, size = ("D", 1.0) if row.name in DIPOLES else unit_of(row.value, error)
-    known = row.error is not None and math.isfinite(row.error)
+    is_determined = row.error is not None and math.isfinite(row.error)
     text = (
         value_text(row.value / size, row.error * factor / size, digits)
-        if row.error and known
+        if row.error and is_determined
         else f"{row.value / size:.12g}"
     )
     remark = (
@@ -183,7 +183,7 @@ def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -
         else f"follows {name_text(row.follows, form)}"
         if row.follows
         else ""
-        if known
+        if is_determined
         else "not determined"
     )
     if form == "latex":
@@ -246,7 +246,7 @@ def _latex_number(text: str) -> str:
 
 
 def _latex_text(text: str) -> str:
-    """Plain text with the signs that LaTeX takes for commands.
+    """Plain text with LaTeX's special characters escaped.
 
     >>> _latex_text("50 % of SPFIT_1, cm-1, μHz")
     '50 \\\\% of SPFIT\\\\_1, cm$^{-1}$, $\\\\mu$Hz'

@@ -1,4 +1,4 @@
-"""The report of a fit: every line with what was calculated, every parameter with its errors, and how far to trust both."""
+"""The report of a fit: lines with calculated frequencies, parameters with errors, and diagnostics of both."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from rotor.fitting.publication import value_text
 from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
 
-FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
+FAR_OFF = 3.0  # errors beyond which a line is listed as far off
 _CORRELATED = 0.95  # correlation from which a pair is listed
-_INFLUENTIAL = 10  # lines listed that move a constant most
-_MOVED = 3  # constants listed of each
+_INFLUENTIAL = 10  # most influential lines that are listed
+_MOVED = 3  # constants listed for each of them
 _INFLUENCE = f"INFLUENCE: leverage, and what moves most without the line (DFBETAS), of {_INFLUENTIAL} lines"
 
 
 def report_text(
-    fit: Fit, title: str = "", *, notes: Sequence[str] = (), head: Sequence[str] = (), of_file: Sequence[str] = ()
+    fit: Fit, title: str = "", *, notes: Sequence[str] = (), head: Sequence[str] = (), file_lines: Sequence[str] = ()
 ) -> str:
     """The whole report, in the order of SPFIT's .fit: parameters at the start, lines, parameters at the end, statistics.
 
@@ -32,11 +32,11 @@ def report_text(
     fit : Fit
     title : str, optional
     notes : sequence of str, optional
-        What must be known of how the lines were read.
+        Remarks on how the lines were read.
     head : sequence of str, optional
-        Lines below the title, such as what was read.
-    of_file : sequence of str, optional
-        A line for each parameter of SPFIT's file, free or not.
+        Text lines below the title, such as the names of input files.
+    file_lines : sequence of str, optional
+        A text line for each parameter of SPFIT's file, free or not.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def report_text(
             *_end(fit),
             "",
         ],
-        *([["PARAMETERS OF THE FILE: code, label, value(error)", *of_file, ""]] if of_file else []),
+        *([["PARAMETERS OF THE FILE: code, label, value(error)", *file_lines, ""]] if file_lines else []),
         ["STATISTICS", *statistics_text(fit), ""],
         [
             _INFLUENCE,
@@ -68,7 +68,7 @@ def report_text(
 
 
 def fit_facts(fit: Fit) -> dict[str, Any]:
-    """What is known of a fit as a whole, by the keys of its record."""
+    """The statistics of a fit, by the keys of its record."""
     return {
         "converged": fit.converged,
         "reason": fit.reason,
@@ -95,7 +95,7 @@ def status_text(fit: Fit) -> str:
 
 
 def statistics_text(fit: Fit) -> list[str]:
-    """What there is to say about the fit as a whole, a line each."""
+    """The statistics of the fit, one text line each."""
     rms, infrared = fit.rms_mhz(), fit.rms_mhz(wavenumber=True)
     condition = fit.statistics.condition
     out = [
@@ -117,20 +117,20 @@ def statistics_text(fit: Fit) -> list[str]:
 
 
 def _blends(fit: Fit) -> str:
-    """How many of the measured frequencies are blends, and of how many lines."""
+    """A text on how many measured frequencies are blends, and of how many lines."""
     counts = blend_counts(fit)
     return f", {counts[0]} of these are blends of {counts[1]} lines" if counts[0] else ""
 
 
 def blend_counts(fit: Fit) -> tuple[int, int]:
-    """The number of measured frequencies of several lines that count, and of these lines."""
+    """The numbers of blends that count, and of lines in them."""
     lines_of_each = np.bincount(fit.lines.blend[fit.used], minlength=1)
     several = lines_of_each[lines_of_each > 1]
     return len(several), int(several.sum())
 
 
 def scatter_text(value: float, form: str) -> str:
-    """A number that follows from the scatter of the lines; undefined with 0 degrees of freedom, a dash where nothing determines it.
+    """Text of a number derived from the scatter of the lines: "undefined" for nan (0 degrees of freedom), a dash if not determined.
 
     >>> scatter_text(1.25, ".3f"), scatter_text(float("nan"), ".3f"), scatter_text(float("inf"), ".3f")
     ('1.250', 'undefined', '-')
@@ -139,22 +139,22 @@ def scatter_text(value: float, form: str) -> str:
 
 
 def error_text(error: float, form: str) -> str:
-    """An error, or a dash where there is none: the lines do not determine the constant, or it has no a-priori error."""
+    """An error, or a dash for a constant that is not determined or has no a-priori error."""
     return format(error, form) if math.isfinite(error) else "-"
 
 
 def _with_priors(fit: Fit) -> list[str]:
-    """The weighted rms as SPFIT counts it where there are a-priori values: with their part in χ², over the lines alone."""
-    known = int(np.isfinite(fit.parameters.prior).sum())
-    if not known:
+    """SPFIT's weighted rms, if there are a-priori values: they count in χ², but not in the number of lines."""
+    priors = int(np.isfinite(fit.parameters.prior).sum())
+    if not priors:
         return []
-    lines = len(fit.residuals) - known
+    lines = len(fit.residuals) - priors
     rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))
-    return [f"{known} a-priori values; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
+    return [f"{priors} a-priori values; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
 
 
 def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
-    """Lines that count and are further off than so many errors, worst first."""
+    """Lines that count with residuals above `errors` standard errors, largest first."""
     parts = np.abs(fit.residuals[: len(fit.groups)])
     order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
     return [
@@ -164,7 +164,7 @@ def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
 
 
 def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
-    """Lines without which a combination of parameters would not be determined: leverage near 1."""
+    """Lines with leverage near 1: without them a combination of parameters would not be determined."""
     leverages = fit.statistics.leverages[: len(fit.groups)]
     return [
         f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"
@@ -174,9 +174,9 @@ def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
 
 
 def dfbetas(fit: Fit) -> Floats | None:
-    """By how many standard errors each parameter moves when a measured frequency is left out (frequencies, n); see `Regression`.
+    """Shift of each parameter, in standard errors, if a measured frequency is left out (frequencies, n); see `Regression`.
 
-    None with less than two degrees of freedom: without the frequency there is no scatter to compare with.
+    None with fewer than two degrees of freedom: without the frequency there would be no scatter to compare with.
     """
     if fit.degrees_of_freedom < 2:
         return None
@@ -184,7 +184,7 @@ def dfbetas(fit: Fit) -> Floats | None:
 
 
 def influential(fit: Fit, errors: float = 1.0) -> list[str]:
-    """Lines without which a constant would move by more than so many of its standard errors, the most influential first."""
+    """Lines without which a constant would move by more than `errors` standard errors, most influential first."""
     moved, out = dfbetas(fit), list[str]()
     if moved is None:
         return out
@@ -201,7 +201,7 @@ def influential(fit: Fit, errors: float = 1.0) -> list[str]:
 
 
 def influence(fit: Fit) -> list[str]:
-    """The lines that move a constant most, with their leverages and DFBETAS, in standard errors of the scatter without them."""
+    """The most influential lines with leverages and DFBETAS (shifts in standard errors from the scatter without the line)."""
     moved = dfbetas(fit)
     if moved is None:
         return [f"undefined with {counted(fit.degrees_of_freedom, 'degree')} of freedom"]
@@ -220,7 +220,7 @@ def influence(fit: Fit) -> list[str]:
 
 
 def parameter_units(fit: Fit) -> str:
-    """MHz, and D of components of the dipole."""
+    """The units of the parameters: MHz, and D for dipole components."""
     return "MHz; mu in D" if set(fit.parameters.names) & set(DIPOLES) else "MHz"
 
 
@@ -276,7 +276,7 @@ def _lines(fit: Fit) -> list[str]:
 
 
 def _texts(lines: Assignments) -> list[str]:
-    """The labels of every line, as `Assignments.text` has them."""
+    """The labels of all lines, formatted as by `Assignments.text`."""
     if lines.halves:
         return [lines.text(i) for i in range(len(lines))]
     sides = ([" ".join(map(str, row)) for row in side.tolist()] for side in (lines.upper, lines.lower))

@@ -1,4 +1,4 @@
-"""Errors of constants by resampling: fits to lines drawn anew with replacement."""
+"""Errors of constants by the bootstrap: fits to lines drawn with replacement."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def bootstrap(
     *,
     model: Callable[[Ints], LevelModel] | None = None,
 ) -> tuple[Floats, Floats]:
-    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
+    """Parameters of fits to lines drawn with replacement, and their standard deviations.
 
-    Measured frequencies are drawn, blends as one. Samples that determine fewer constants, or whose search does not converge, are
-    drawn again, at most ten times as many.
+    Each draw is a measured frequency; a blend is one frequency. Samples that determine fewer constants, or whose search does not
+    converge, are replaced; at most ten times `samples` are drawn.
 
     Parameters
     ----------
@@ -34,26 +34,27 @@ def bootstrap(
     rng : numpy.random.Generator
         Draws the lines.
     options : FitOptions, optional
-        Of each fit; it has as many iterations as a fit has without options, or more.
+        Options of each fit; the number of iterations is at least the default.
     model : callable, optional
         As in `fit_lines`.
 
     Returns
     -------
     values : (samples, n) array
-        MHz; of fewer samples where a KeyboardInterrupt came, with two or more done.
+        MHz. A KeyboardInterrupt ends with fewer samples if at least two are done.
     deviations : (n,) array
-        Standard deviations, MHz; infinite for what the lines of the fit do not determine.
+        Standard deviations, MHz; infinite for parameters that the lines of the fit do not determine.
 
     Raises
     ------
     ValueError
-        Where ten times as many samples are not enough: how many determine fewer constants, and how many do not converge.
+        If ten times `samples` draws are not enough; the message counts the samples that determine fewer constants and those that
+        do not converge.
 
     Notes
     -----
-    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
-    out too large or infinite.
+    The bootstrap assumes only that the lines are independent. The error of a constant that few lines determine comes out too
+    large or infinite.
     """
     groups = fit.lines.blend[fit.groups]
     members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
@@ -62,7 +63,7 @@ def bootstrap(
     most = max(settings.most_iterations, FitOptions().most_iterations)
     lenient = replace(
         settings, poor_rms=1e12, most_iterations=most, pass_interrupt=True
-    )  # no sample is judged by its rms
+    )  # a poor rms does not reject a sample
     out: list[Floats] = []
     fewer = astray = 0
 

@@ -1,6 +1,6 @@
-"""The search of a fit: weighted residuals and their derivatives for any constants, blends, robust losses, far-off lines, stages.
+"""Weighted residuals and their derivatives for any constants, with blends, a-priori values and robust losses.
 
-Levels keep their label by block and rank, so that no iteration reassigns a line.
+A level is labelled by its block and rank, so that no iteration reassigns a line.
 """
 
 from __future__ import annotations
@@ -17,24 +17,27 @@ from rotor.fitting.parameters import Parameters
 from rotor.quantum.labelled import LevelModel
 
 LOSSES = ("squares", "huber", "cauchy")
-POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
-_HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for normal errors
-_CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
+POOR_RMS = 10.0  # default weighted rms above which the constants do not describe the lines
+_HUBER, _CAUCHY = (
+    1.345,
+    2.385,
+)  # residuals (in σ) beyond which a loss deviates from r²; gives 95 % efficiency for normal errors
+_CANCELLED = 1e-12  # relative to the level derivatives: smaller differences between two levels are round-off
 _NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How a fit is done.
+    """Options of a fit.
 
-    reject_above : lines with |obs - calc| above so many errors do not count; they are reported. None: every line counts
-    loss : "squares", or "huber" or "cauchy", whose weight falls for lines beyond 1.3 or 2.4 errors
-    default_error_mhz : of lines whose file gives 0; such lines are left out, and reported, where it is None
+    reject_above : lines with |obs - calc| above this many errors do not count and are reported. None: all lines count
+    loss : "squares", "huber" or "cauchy"; the last two reduce the weight of lines beyond 1.3 or 2.4 errors
+    default_error_mhz : error of lines with 0 in the file. None: such lines are left out and reported
     poor_rms : weighted rms above which the fit has failed
-    tolerance, most_iterations : of the search, see `rotor.statistics.least_squares.minimise`
-    kmax : cut of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
-    leave_out_missing : lines with a level that does not exist are left out, and named, as SPFIT does; else they are an error
-    pass_interrupt : a KeyboardInterrupt goes on to the caller, of a fit that is one of many; else the fit ends with its best point
+    tolerance, most_iterations : limits of the search, see `rotor.statistics.least_squares.minimise`
+    kmax : truncation of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
+    leave_out_missing : leave out and report lines with a level that does not exist, as SPFIT does; otherwise an error
+    pass_interrupt : raise a KeyboardInterrupt to the caller (a fit among many); otherwise the fit ends with its best point
     """
 
     reject_above: float | None = None
@@ -76,10 +79,11 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
 
 
 class Grouping(NamedTuple):
-    """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
+    """The measured frequencies that count, with the lines of each.
 
-    plain : no blend among them. each : every line counts, in its order
-    blended, members, bounds : which of them are blends, the places of their lines in `order`, and where each begins among these
+    first : index of the first line of each frequency. order : lines sorted by frequency; starts : where each frequency begins in
+    `order`; shares : weights within blends. plain : no blends. each : all lines count, in their original order
+    blended, members, bounds : indices of the blends, of their lines in `order`, and where each blend begins among `members`
     """
 
     first: Ints
@@ -112,7 +116,7 @@ class Grouping(NamedTuple):
         return cls(first, order, starts, shares, len(blended) == 0, each_line, blended, members, bounds)
 
     def mean(self, values: Floats) -> Floats:
-        """The weighted mean over each blend of values (lines, ...); these themselves where every line stands alone."""
+        """The weighted mean of values (lines, ...) over each measured frequency."""
         if self.plain and self.each:
             return values
         out = values[self.first]
@@ -122,14 +126,14 @@ class Grouping(NamedTuple):
         return out
 
     def spread_back(self, means: Floats, values: Floats) -> Floats:
-        """Values (lines,) with those of a blend replaced by its mean."""
+        """Values (lines,) with each measured frequency's mean in place of its lines."""
         out = values.copy()
         out[self.order] = np.repeat(means, np.diff(np.append(self.starts, len(self.order))))
         return out
 
 
 class LineValues(NamedTuple):
-    """Calculated lines (lines,), derivatives by the parameters (lines, n), those of the levels (levels, n), the largest |E| in MHz."""
+    """Calculated frequencies (lines,), their derivatives (lines, n), those of the levels (levels, n), the largest |E|; MHz."""
 
     calculated: Floats
     derivatives: Floats
@@ -139,7 +143,7 @@ class LineValues(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What is evaluated at each point."""
+    """The lines, level model and parameters that give residuals and derivatives at any point."""
 
     lines: Assignments
     model: LevelModel
@@ -151,9 +155,9 @@ class Search:
     used: NDArray[np.bool_]
 
     def lines_of(self, values: Floats) -> LineValues:
-        """Calculated lines, and derivatives of these and of the levels.
+        """Calculated frequencies, and the derivatives of lines and levels.
 
-        The last point is not computed a second time: the search ends where it was.
+        The last point is cached, because the search ends at a point that it has evaluated.
         """
         point = values.tobytes()
         before: tuple[bytes, LineValues] | None = self.__dict__.get("_last")
@@ -164,7 +168,7 @@ class Search:
     def _lines_of(self, values: Floats) -> LineValues:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = self.parameters.slopes_of(slopes)
-        if self.from_zero:  # the place -1 of such lower levels is the last one
+        if self.from_zero:  # their lower level has index -1, which selects the last row
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
         derivatives -= slopes[self.lower]
@@ -173,7 +177,7 @@ class Search:
 
     @property
     def from_zero(self) -> bool:
-        """Whether a line is an energy from the zero of the Hamiltonian: its lower level has the place -1."""
+        """Which lines are energies above the zero of the Hamiltonian; their lower level has index -1."""
         return bool((self.lower < 0).any())
 
     @property
@@ -181,7 +185,7 @@ class Search:
         return Grouping.of(self.lines, self.used)
 
     def evaluate(self, values: Floats) -> tuple[Floats, Floats]:
-        """Weighted residuals, those of a-priori values behind them, and the Jacobian."""
+        """Weighted residuals, followed by those of a-priori values, and the Jacobian."""
         return self.bent(*self.weighted(values))
 
     def weighted(self, values: Floats) -> tuple[Floats, Floats]:
@@ -190,34 +194,34 @@ class Search:
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
         rows = group.mean(jacobian) / sigma[:, None]
-        spread, of_spread = self._apart(calculated, jacobian)
-        known = np.flatnonzero(np.isfinite(self.parameters.prior))
-        prior = self.parameters.prior[known]
-        behind = np.zeros((len(known), len(values)))
-        behind[np.arange(len(known)), known] = 1 / prior
-        if not len(known) and not len(spread):
+        spread, spread_slopes = self._apart(calculated, jacobian)
+        with_prior = np.flatnonzero(np.isfinite(self.parameters.prior))
+        prior = self.parameters.prior[with_prior]
+        behind = np.zeros((len(with_prior), len(values)))
+        behind[np.arange(len(with_prior)), with_prior] = 1 / prior
+        if not len(with_prior) and not len(spread):
             return residuals, rows
-        held = (self.parameters.expected - values)[known] / prior
-        return np.concatenate([residuals, spread, held]), np.vstack([rows, of_spread, behind])
+        held = (self.parameters.expected - values)[with_prior] / prior
+        return np.concatenate([residuals, spread, held]), np.vstack([rows, spread_slopes, behind])
 
     def _apart(self, calculated: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
-        """√w (mean - calculated)/width of the components of blends of a known width, and the derivatives of the negative.
+        """√w (mean - calculated)/width for the components of blends of known width, and the derivatives of its negative.
 
-        With the mean's own residual they make (obs - mean)²/σ² + Σ w (calculated - mean)²/width², w of the sum 1.
+        Together with the residual of the mean, χ² contains (obs - mean)²/σ² + Σ w (calculated - mean)²/width², with Σ w = 1.
         """
         group, places = self.group, self.wide
         if not len(places):
             return np.zeros(0), np.zeros((0, jacobian.shape[1]))
         rows = group.order[places]
-        of_group = np.searchsorted(group.starts, places, side="right") - 1
+        group_numbers = np.searchsorted(group.starts, places, side="right") - 1
         widths = np.array([self.lines.widths_mhz[number] for number in self.lines.blend[rows].tolist()])
         factor = np.sqrt(group.shares[places]) / widths
-        means, of_means = group.mean(calculated)[of_group], group.mean(jacobian)[of_group]
-        return factor * (means - calculated[rows]), factor[:, None] * (jacobian[rows] - of_means)
+        means, mean_slopes = group.mean(calculated)[group_numbers], group.mean(jacobian)[group_numbers]
+        return factor * (means - calculated[rows]), factor[:, None] * (jacobian[rows] - mean_slopes)
 
     @property
     def wide(self) -> Ints:
-        """Places, in the order of the groups, of the components of blends whose width is known."""
+        """Indices in `group.order` of the components of blends with a known width."""
         numbers = self.lines.blend[self.group.order]
         return np.flatnonzero(np.isin(numbers, list(self.lines.widths_mhz))) if self.lines.widths_mhz else _NONE
 
@@ -230,7 +234,7 @@ class Search:
         return cached
 
     def bent(self, residuals: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
-        """√ρ(r²) with its sign in place of r for a robust loss, so that Σ ρ is what is made least."""
+        """For a robust loss, sign(r) √ρ(r²) in place of r, so that Σ ρ is minimised."""
         count = len(self.group.first)
         bent, slope = robust(residuals[:count], self.options.loss)
         if self.options.loss == "squares":
@@ -240,13 +244,13 @@ class Search:
 
 
 def round_off(search: Search, slopes: Floats) -> Floats:
-    """Norms (n,) of weighted columns below which they are what round-off leaves of level derivatives that cancel."""
+    """Norms (n,) below which a weighted column is round-off left by cancelling level derivatives."""
     size = (np.abs(slopes[search.upper]) + np.abs(slopes[search.lower])) / search.sigma[:, None]
     return np.asarray(_CANCELLED * np.sqrt(np.einsum("ij,ij->j", size[search.used], size[search.used])))
 
 
 def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> str:
-    """What is wrong with fewer measured frequencies than free constants; empty where they are enough."""
+    """A message if there are fewer measured frequencies than free constants; empty otherwise."""
     count = len(set(lines.blend[used].tolist())) + int(np.isfinite(parameters.prior).sum())
     if count >= len(parameters.names):
         return ""
@@ -254,7 +258,7 @@ def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters)
 
 
 def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
-    """Why lines do not count, by position: excluded ones and those without an error; and errors with the default put in."""
+    """Reasons why lines do not count (excluded, or without an error), by index; and the errors with the default filled in."""
     excluded = {int(i): "it is marked as excluded" for i in np.flatnonzero(lines.is_excluded)}
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:

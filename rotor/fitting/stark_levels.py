@@ -1,7 +1,7 @@
-"""Chosen levels in a static electric field, and their derivatives by the constants and by the dipole: what a fit of Stark shifts asks for.
+"""Labelled levels in a static electric field, with derivatives by the constants and the dipole, for fits of Stark shifts.
 
-A label is that of the free level, M, and the field; the states of one exact block are named in order of energy (adiabatic labels), as
-those of `rotor stark` are. With a state |ψ⟩ = Σ v_n |n⟩ of solved free states n (Hellmann and Feynman)
+A label consists of the free level, M, and the field. States of one exact block are labelled in order of energy (adiabatic labels),
+as in `rotor stark`. For a state |ψ⟩ = Σ v_n |n⟩ of solved free states n, the Hellmann-Feynman theorem gives
 
     ∂E/∂μ_k = -E ⟨ψ|Φ_Zk|ψ⟩,        ∂E/∂c = ⟨ψ|∂H/∂c|ψ⟩ = Σ_b ⟨V_b v_b|O_c,b|V_b v_b⟩,
 
@@ -32,11 +32,11 @@ from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, label_value
 from rotor.quantum.solve import solve_levels
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
 
-TOLERANCE_MHZ = 1e-6  # of the energies, by J max
+TOLERANCE_MHZ = 1e-6  # tolerance of the energies for the choice of J max
 
 
 class Labelled(NamedTuple):
-    """Labels whose states are in one block: their places among all, the ranks of the states, and the fields (kV/cm)."""
+    """Labels whose states are in one block: their indices among all labels, ranks of the states, and fields (kV/cm)."""
 
     block: FieldBlock
     places: Ints
@@ -46,7 +46,7 @@ class Labelled(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StarkLevels(LevelModel):
-    """Levels in fields by label, for any values of the constants and of the dipole; jmax: that of the basis at the constants `start`."""
+    """Levels in fields by label, for any constants and dipole; jmax : that of the basis at the constants `start`."""
 
     names: tuple[str, ...]
     start: TopConstants
@@ -54,7 +54,7 @@ class StarkLevels(LevelModel):
     jmax: int
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """See `LevelModel`; the dipole in D, derivatives by it in MHz/D. Raises MissingLevelsError for labels that no level has."""
+        """See `LevelModel`; dipole in D, its derivatives in MHz/D. Raises MissingLevelsError for labels without a level."""
         values = [value or AT_ZERO_MHZ for value in np.asarray(values_mhz).tolist()]
         constants = self.start.replace(**dict(zip(self.names, values, strict=True)))
         request, jmax = _request(constants, self.labels), self.jmax
@@ -72,14 +72,14 @@ class StarkLevels(LevelModel):
             jmax += 1
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1: states are named by the order of energies in their block."""
+        """Always 1: states are labelled by the order of energies in their block."""
         return np.ones(len(self.labels))
 
     def groups(self, request: MapRequest, jmax: int) -> list[Labelled]:
-        """The labels by block; MissingLevelsError for labels that no level has."""
+        """The labels grouped by block. Raises MissingLevelsError for labels without a level."""
         space = request.space(jmax + request.margin)
         rows, m = self._rows(space.levels)
-        groups, known = [], np.zeros(len(rows), dtype=bool)
+        groups, matched = [], np.zeros(len(rows), dtype=bool)
         for value in np.unique(np.abs(m)).tolist():
             for block in space.blocks(value):
                 order = basis_order(block, jmax)
@@ -87,18 +87,18 @@ class StarkLevels(LevelModel):
                 rank[block.rows[order]] = np.arange(len(order))
                 here = np.flatnonzero((rank[rows] >= 0) & (rows >= 0) & (m == block.m))
                 if len(here):
-                    known[here] = True
+                    matched[here] = True
                     fields = self.labels[here, -1] * FIELD_STEP_KV_PER_CM
                     groups.append(Labelled(block, here, rank[rows[here]], fields))
-        if not known.all():
-            places = np.flatnonzero(~known)
+        if not matched.all():
+            places = np.flatnonzero(~matched)
             label = zip(self.start.quanta, self.labels[places[0]].tolist(), strict=True)
             text = ", ".join(f"{name} = {label_value(name, value)}" for name, value in label)
             raise MissingLevelsError(f"there is no level with {text} in this model", places)
         return groups
 
     def _rows(self, levels: FreeLevels) -> tuple[Ints, Ints]:
-        """Rows of the labels among the free levels, -1 where there is none, and the M of their blocks."""
+        """Rows of the labels among the free levels (-1 without a level), and |M| of their blocks."""
         columns = dict(zip(self.start.quanta, self.labels.T.copy(), strict=True))
         columns.pop("field")
         m = columns.pop("m")
@@ -110,8 +110,8 @@ class StarkLevels(LevelModel):
             turned = (m < 0) | ((m == 0) & (columns["k"] < 0))
             columns["k"] = np.where(turned, -columns["k"], columns["k"])
         m = np.abs(m)
-        known = {"j": levels.j, **levels.quanta}
-        keys = np.column_stack([known[name] for name in columns])
+        columns_of_levels = {"j": levels.j, **levels.quanta}
+        keys = np.column_stack([columns_of_levels[name] for name in columns])
         place = {key: row for row, key in enumerate(map(tuple, keys.tolist()))}
         labels = np.column_stack(list(columns.values())).tolist()
         return np.array([place.get(tuple(key), -1) for key in labels]), m
@@ -128,14 +128,14 @@ class StarkLevels(LevelModel):
                 cosine = block.dense(dipole_derivative(top, DIPOLES.index(name), constants.effects))
                 mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
                 slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
-        slopes[:, columns] = self._of_constants(constants, block, vectors, [self.names[i] for i in columns])
+        slopes[:, columns] = self._slopes_of_constants(constants, block, vectors, [self.names[i] for i in columns])
         return slopes
 
-    def _of_constants(
+    def _slopes_of_constants(
         self, constants: TopConstants, block: FieldBlock, vectors: Floats, names: Sequence[str]
     ) -> Floats:
         top = constants.top
-        if not isinstance(block, SolvedFieldBlock):  # closed forms: free states have no constants in common
+        if not isinstance(block, SolvedFieldBlock):  # free levels in closed form: no constant mixes them
             levels = solve_levels(top, int(block.j.max()), effects=constants.effects)
             quanta = {"k": np.abs(block.levels.quanta["k"][block.rows])} if "k" in levels.quanta else {}
             rows = levels.rows_of(j=block.j, **quanta)
@@ -150,13 +150,13 @@ class StarkLevels(LevelModel):
 
 
 def _request(constants: TopConstants, labels: Ints) -> MapRequest:
-    """A map at the fields of the labels, which follows all of them."""
+    """A Stark map at the fields of the labels."""
     fields = np.unique(labels[:, -1]) * FIELD_STEP_KV_PER_CM
     return map_request(constants.top, fields, int(labels[:, 0].max()), None, 0.0, tolerance_mhz=TOLERANCE_MHZ)
 
 
 def _expectation(block: LinearBlock, states: Floats) -> Floats:
-    """Σ O_i(r, c) v_r* v_c (states, parameters) of columns over the functions of a block, (states, functions)."""
+    """Expectation values Σ O_i(r, c) v_r* v_c (states, parameters) of a block's operators in states (states, functions)."""
     density = (states[:, block.rows].conj() * states[:, block.columns]).real
     density = np.where(block.rows != block.columns, 2.0, 1.0) * density
     return np.asarray(density @ block.factors @ block.mix)
@@ -165,8 +165,8 @@ def _expectation(block: LinearBlock, states: Floats) -> Floats:
 def stark_levels(constants: TopConstants, labels: Ints) -> StarkLevels:
     """The model for labels (levels, k) by `constants.quanta`.
 
-    Raises MissingLevelsError for labels that no level has, and ValueError for spins and internal rotation, of which lines in a field are
-    not fitted.
+    Raises MissingLevelsError for labels without a level, and ValueError for spins and internal rotation: their lines in a field
+    cannot be fitted.
     """
     if constants.top.internal_rotation is not None or constants.hyperfine:
         what = "internal rotation" if constants.top.internal_rotation is not None else "spins"

@@ -1,7 +1,7 @@
-"""The ways of a search: directly; with most of the lines first; by rising J; with other signs; without lines that are far off.
+"""Search strategies: direct; most of the lines first; by rising J; with a sign reversed; without lines that are far off.
 
-A direct search finds the minimum from most starts. Where it makes no way or ends far from the lines, others are tried, and the best point
-counts.
+A direct search finds the minimum from most starts. If it stalls or ends far from the lines, the other strategies are tried, and the
+best point is used.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iter
 from rotor.statistics.regression import regression
 
 _REJECTIONS = 20
-_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
-_STAGE_ITERATIONS = 4  # of each
-_FAR = 15.0  # times the median of the residuals, some ten standard deviations: lines beyond it may be those of other levels
-_ROUNDS = 8  # of searches with the lines that are not far off
-_ROUND_ITERATIONS = 12  # of each
-_NEARLY = 0.1  # standard errors within which one has converged
-_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
-_WAY = 0.01  # of the weighted rms at the start, below which it has
-_LATELY = 6  # iterations in which it must halve the weighted rms after these
+_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # stages of a search by rising J: shares of the lines in order of J
+_STAGE_ITERATIONS = 4  # per stage
+_FAR = 15.0  # times the median residual, about ten standard deviations: lines beyond it may belong to other levels
+_ROUNDS = 8  # searches with the lines that are not far off
+_ROUND_ITERATIONS = 12  # per such search
+_NEARLY = 0.1  # standard errors: a round has converged when its next step is smaller
+_FIRST_ITERATIONS = 12  # of a direct search, before its progress is judged
+_WAY = 0.01  # of the weighted rms at the start: below it the search makes progress
+_LATELY = 6  # later iterations in which the weighted rms must halve
 _TURNED = 5  # parameters whose other sign is tried
-_TURNED_ITERATIONS = 8  # after which it must have made way
-_BETTER = 0.99  # of the weighted rms, below which the other sign is taken
+_TURNED_ITERATIONS = 8  # of such a search, before its progress is judged
+_BETTER = 0.99  # of the weighted rms: below it the other sign is taken
 _FURTHER, _MANY_ERRORS = (
     0.5,
     20.0,
-)  # of its size at the start, and standard errors: who went further may have gone to another minimum
-_PUT_BACK = 3  # parameters that are put back
-_LOWER = 1.0  # by which χ² must be lower there: a standard error of one parameter
+)  # times its size at the start, and standard errors: a parameter that moved further may be in another minimum
+_PUT_BACK = 3  # parameters that are reset to their start
+_LOWER = 1.0  # required decrease of χ² after a reset: one standard error of one parameter
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
 def with_rejection(
     search: Search, options: FitOptions, progress: Progress | None
 ) -> tuple[Search, Minimum, dict[int, str]]:
-    """The search, repeated without the lines that are too far off until the same ones stay out.
+    """Search, then repeat without the lines that are too far off until the rejected lines no longer change.
 
-    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
-    the start describes half of the lines and more, see `_from_near_lines`.
+    If no minimum is reached, or too few lines would be left, all lines count: then the constants are wrong, not the lines. The
+    exception is a start that describes at least half of the lines, see `_from_near_lines`.
     """
     minimum, may = _passed_on(_searched(search, progress), options), search.used
     if options.reject_above is None or minimum.status == INTERRUPTED:
@@ -71,14 +71,14 @@ def with_rejection(
 
 
 def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
-    """The same; KeyboardInterrupt for a search that was interrupted, where the caller asked for it."""
+    """Return the minimum; raise KeyboardInterrupt for an interrupted search if `pass_interrupt` is set."""
     if minimum.status == INTERRUPTED and options.pass_interrupt:
         raise KeyboardInterrupt
     return minimum
 
 
 def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
-    """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
+    """Which lines are at most `reject_above` errors off; blends are judged by their means."""
     calculated = search.lines_of(values).calculated
     group = Grouping.of(search.lines, may)
     means = group.spread_back(group.mean(calculated), calculated)
@@ -87,10 +87,10 @@ def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.
 
 
 def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) -> tuple[Search, Minimum]:
-    """The minimum of the lines that the start describes, where these are half of them and more and all together led nowhere.
+    """Search with the lines that the start describes, if these are at least half and the search with all lines failed.
 
-    SPFIT leaves lines out at the start always. Then lines that constants a little off put far away never come back, so that all
-    lines are tried first here.
+    SPFIT always rejects lines at the start. With slightly wrong constants, lines that start far away then never return; so here
+    all lines are tried first.
     """
     start, limit = search.parameters.start, search.options.most_iterations
     near = search.used & _near(search, search.used, start)
@@ -104,8 +104,10 @@ def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) 
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, two by rising
-    J, and other signs. What iterations are left then go on from the best point."""
+    """A direct search; if it stalls or ends far from the lines, one with most of the lines, two by rising J, and reversed signs.
+
+    The remaining iterations continue from the best point.
+    """
     limit = search.options.most_iterations
     first = _minimised(search, search.parameters.start, progress, limit, _makes_no_way(search.options))
     for further in (
@@ -125,7 +127,7 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
 
 
 def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
-    """Whether the iterations of a search so far make further ones a waste, while there are other ways."""
+    """A test whether a direct search has stalled, so that other strategies should use the remaining iterations."""
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
         if len(taken) < _FIRST_ITERATIONS:
@@ -138,14 +140,14 @@ def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
 
 
 def _is_open(search: Search, minimum: Minimum) -> bool:
-    """Whether another way may lead further: the lines are not described, or the search has stalled, and iterations are left."""
+    """Whether other strategies should be tried: iterations are left, and the lines are not described or the search stalled."""
     if minimum.status == INTERRUPTED or len(minimum.iterations) >= search.options.most_iterations:
         return False
     return minimum.status == STALLED or _is_poor(search, minimum)
 
 
 def _is_poor(search: Search, minimum: Minimum) -> bool:
-    """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
+    """Whether the lines are not described: all of them, or those left after rejection if these are at least half."""
     limit, size = search.options.reject_above, np.abs(minimum.residuals[: len(search.group.first)])
     if limit is not None and minimum.converged and 2 * int((size <= limit).sum()) >= len(size):
         size = size[size <= limit]
@@ -154,10 +156,10 @@ def _is_poor(search: Search, minimum: Minimum) -> bool:
 
 
 def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of a minimum that does not describe the lines and those that are reached from it with the sign of one parameter turned.
+    """Restart from a poor minimum with the sign of one parameter reversed; return the best minimum.
 
-    The sign of a coupling between states counts only in products with others, so that a search may end with one of them turned.
-    Tried are the few that went furthest from their start, counted in its size.
+    The sign of a coupling between states matters only in products with other couplings, so a search may end with a wrong sign.
+    The few parameters with the largest relative change from their start are tried.
     """
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
@@ -176,7 +178,7 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
             second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
         except ValueError:  # out of the bounds of the model
             continue
-        # where it is not much better the lines do not know the sign
+        # without a clear improvement the lines do not determine the sign
         first = _better(first, second, replaced=second.rms < _BETTER * first.rms)
         if first.status == INTERRUPTED or first.rms <= search.options.poor_rms:
             break
@@ -184,10 +186,10 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
 
 
 def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of a minimum and those that are reached from it with one parameter put back to its start.
+    """Restart from a minimum with one parameter reset to its start; return the better minimum.
 
-    Two couplings of the same states act together as a square, (G + F)², so that χ² has two minima along one of them, which differ
-    little. Tried are the few that went further than half their size and many standard errors.
+    Two couplings of the same states act through a square, (G + F)², so that χ² has two similar minima along one of them. The few
+    parameters that changed by more than half their size and by many standard errors are tried.
     """
     start, moved = search.parameters.start, first.parameters - search.parameters.start
     floor = round_off(search, search.lines_of(first.parameters).slopes)
@@ -210,7 +212,7 @@ def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress
 
 
 def _better(first: Minimum, second: Minimum, *, replaced: bool) -> Minimum:
-    """The second search in place of the first or not, with the iterations of both; an interrupt of the second ends all."""
+    """The better of two searches with the iterations of both; an interrupt of the second ends the whole search."""
     best = second if replaced else replace(first, iterations=second.iterations)
     return replace(best, status=INTERRUPTED) if second.status == INTERRUPTED else best
 
@@ -221,24 +223,24 @@ def _continued(first: Minimum, second: Minimum) -> Minimum:
 
 
 def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of the minimum found and the one that is reached from the start when lines far off those of the rest come in last.
+    """Restart with far-off lines added last; return the better minimum.
 
-    Where two levels share their functions nearly by halves, a small error of the constants exchanges their names. Such lines are off by
-    the distance of the levels, a hundred times as far as all others, and they alone decide where a direct search goes. With the others
-    in their places the names are right, and they come back.
+    If two levels are mixed nearly half and half, a small error of the constants exchanges their labels. The residuals of such lines
+    equal the level spacing, a hundred times those of the others, and they dominate a direct search. Once the other lines fit, the
+    labels are right and these lines are included again.
     """
     last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
     rough = replace(search.options, tolerance=_NEARLY)
     for number in range(_ROUNDS):
         part = replace(search, options=rough, used=_not_far_off(search, last.parameters))
         if (part.used == search.used).all() and not number:
-            return first  # that was the direct search
+            return first  # all lines: this repeats the direct search
         if (part.used == search.used).all() or too_few(search.lines, part.used, search.parameters):
             break
         before = part.evaluate(last.parameters)[0]
         left = min(max(limit - len(last.iterations), 0), _ROUND_ITERATIONS)
         last = _continued(last, _minimised(part, last.parameters, progress, left))
-        if last.status == INTERRUPTED:  # the best point of all lines is the one before
+        if last.status == INTERRUPTED:  # `first` remains the best point with all lines
             return _better(first, last, replaced=False)
         if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
             return replace(first, iterations=last.iterations)
@@ -248,7 +250,7 @@ def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) 
 
 
 def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
-    """The lines (lines,) that count and whose residual is not many times the median of all."""
+    """Which lines (lines,) count and have a residual that is not many times the median."""
     group = search.group
     size = np.abs(search.weighted(values)[0][: len(group.first)])
     near = size <= max(_FAR * float(np.median(size)), search.options.poor_rms)
@@ -257,11 +259,11 @@ def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
 
 
 def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough: float) -> Minimum:
-    """The better of the minimum found and the one that a search by rising J ends in.
+    """Search by rising J; return the better minimum.
 
-    Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
-    lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
-    starts at 0 stays there. rough : standard errors within which a stage has converged
+    Lines of low J depend almost linearly on the constants even if these are 10 % off, and the constants that they determine predict
+    the next lines. Lines are added by J, a tenth of them first. Until all lines are in, a constant may change by about its own
+    size, and one that starts at 0 stays there. rough : standard errors within which a stage has converged
     """
     j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
     last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
@@ -275,7 +277,9 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough:
             )
             left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
             last = _continued(last, _minimised(stage, last.parameters, progress, left))
-            if last.status == INTERRUPTED:  # of a part of the lines; the best point of all of them is the one before
+            if (
+                last.status == INTERRUPTED
+            ):  # this minimum has only part of the lines; `first` remains the best point with all lines
                 return _better(first, last, replaced=False)
         left = max(limit - len(last.iterations), 0)
         second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))

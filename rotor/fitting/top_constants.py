@@ -1,9 +1,9 @@
-"""All constants of a top with further states and with spins, under one set of names, as a fit takes them.
+"""All constants of a top with further states and spins, in one set of names for the fit.
 
-    A, DeltaJ              of the top's own state, as in `rotor.tops.constants`
+    A, DeltaJ              of state 0, as in `rotor.tops.constants`
     E[1], A[1], DeltaJ[1]  of state 1
     G_c[0,1], W[0,1]       between states 0 and 1, see `rotor.quantum.effects.interactions`
-    chi_aa(14N)            of spins, in every state; chi_aa(14N)[1] what state 1 has more of it
+    chi_aa(14N)            of spins, in all states; chi_aa(14N)[1] is the difference of state 1
 
     mu_a, mu_b, mu_c       the dipole in debye, of lines in an electric field
 
@@ -35,10 +35,10 @@ DIPOLES = ("mu_a", "mu_b", "mu_c")
 
 @dataclass(frozen=True, eq=False)
 class TopConstants:
-    """The constants of a top by name; those of spins where `hyperfine` says so, and of levels in a field the dipole (D).
+    """The constants of a top by name; with `hyperfine` those of spins, and for levels in a field the dipole (D).
 
-    dipole : the components that levels in a field depend on, such as ("mu_a",). dipole_errors : one standard deviation of these, D.
-    values, uncertainties : in MHz, by names as above. Raises ValueError, as the effects do, for names that are none.
+    dipole : components that levels in a field depend on, such as ("mu_a",). dipole_errors : their standard deviations, D.
+    values, uncertainties : in MHz, by the names above. Raises ValueError for unknown names.
 
     >>> from rotor.tops.spins.spin_constants import SpinConstants
     >>> top = Top.from_constants("A=9 B=3 C=2 GHz", spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz"))
@@ -55,11 +55,11 @@ class TopConstants:
     dipole_errors: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.effects  # noqa: B018  every name is checked when the set is made
+        self.effects  # noqa: B018  checks all names when the set is made
 
     @property
     def kind(self) -> str:
-        """Of the top."""
+        """Kind of the top."""
         return self.top.kind
 
     @property
@@ -74,24 +74,24 @@ class TopConstants:
 
     @cached_property
     def effects(self) -> tuple[QuantumEffect, ...]:
-        """What the Hamiltonian consists of."""
+        """The effects in the Hamiltonian."""
         return effects_of(self.top, self.hyperfine)
 
     @cached_property
     def values(self) -> Mapping[str, float]:
-        """Every constant in MHz."""
+        """All constants in MHz, dipole components in D."""
         named = {self.own_name(name): value for part in self._parts for name, value in part.values.items()}
         return MappingProxyType(named | self._dipole)
 
     @property
     def _dipole(self) -> dict[str, float]:
-        """Components of the dipole in D, where levels are in a field."""
+        """Dipole components in D for levels in a field; empty otherwise."""
         values = self.top.dipole_abc_debye or (0.0, 0.0, 0.0)
         return {name: values[DIPOLES.index(name)] for name in self.dipole}
 
     @property
     def in_field(self) -> bool:
-        """Whether the levels are those in an electric field."""
+        """Whether the levels are in an electric field."""
         return bool(self.dipole)
 
     @cached_property
@@ -122,7 +122,7 @@ class TopConstants:
 
     @property
     def halves(self) -> frozenset[str]:
-        """Those of them that are half-integers, and stored as twice their value."""
+        """The quantum numbers that are half-integers, stored doubled."""
         return self._first_levels.halves
 
     def __getitem__(self, name: str) -> float:
@@ -132,7 +132,7 @@ class TopConstants:
         return self.own_name(name) in self.values
 
     def own_name(self, name: str) -> str:
-        """How this set spells a name; ValueError for one that is written as none is.
+        """The spelling of a name in this set; ValueError for a name of no constant.
 
         >>> TopConstants(Top.from_constants("A=9 B=3 C=2 GHz")).own_name("G_c[1,0]")
         'G_c[0,1]'
@@ -149,30 +149,30 @@ class TopConstants:
         return parse_name(name).text if len(states) == 2 else f"{self.top.constants.own_name(head)}[{states[0]}]"
 
     def replace(self, **changes: Any) -> TopConstants:
-        """A changed set: constants that it lacks are added, those set to None left out.
+        """A changed set: missing constants are added, those set to None removed.
 
-        A changed constant loses its uncertainty, unless `uncertainties` has the whole table of them. Raises ValueError for a state or a
-        spin that the top has not, and for names that states or spins do not have.
+        A changed constant loses its uncertainty, unless `uncertainties` gives the whole table. Raises ValueError for a state or spin
+        that the top does not have, and for unknown names.
         """
         uncertainties: Mapping[str, float] | None = changes.pop("uncertainties", None)
         new = {self.own_name(name): value for name, value in changes.items()}
         for name in new:
             self._refuse_unknown(name)
         values = {name: value for name, value in {**self.values, **new}.items() if value is not None}
-        known = (
+        old_errors = (
             self.uncertainties
             if uncertainties is None
             else {self.own_name(name): error for name, error in uncertainties.items()}
         )
         errors = {
             name: error
-            for name, error in known.items()
+            for name, error in old_errors.items()
             if name in values and (uncertainties is not None or name not in new)
         }
         return self._of(values, errors)
 
     def _of(self, values: Mapping[str, float], errors: Mapping[str, float]) -> TopConstants:
-        """A set with these values and uncertainties, and all else of this one."""
+        """A copy with these values and uncertainties."""
         top = self.top
         dipole_errors = {name: error for name, error in errors.items() if name in DIPOLES}
         dipole = tuple(name for name in DIPOLES if name in values)
@@ -188,10 +188,10 @@ class TopConstants:
         constants = top.constants.replace(**_plain(values), **gone, uncertainties=_plain(errors))
         states, spins = top.states, top.spin_constants
         if states is not None:
-            states = replace(states, values=_of_states(values), uncertainties=_of_states(errors))
+            states = replace(states, values=_state_constants(values), uncertainties=_state_constants(errors))
         if spins is not None and self.hyperfine:
-            spins = replace(spins, values=_of_spins(values), uncertainties=_of_spins(errors))
-        made = replace(
+            spins = replace(spins, values=_spin_constants(values), uncertainties=_spin_constants(errors))
+        top_with_values = replace(
             top,
             constants=constants,
             states=states,
@@ -200,10 +200,10 @@ class TopConstants:
             covariance=None,
             level_table=None,
         )
-        return TopConstants(made, self.hyperfine, dipole, dipole_errors)
+        return TopConstants(top_with_values, self.hyperfine, dipole, dipole_errors)
 
     def _refuse_unknown(self, name: str) -> None:
-        """ValueError for a state or a spin that the set has not."""
+        """Raise ValueError for a state or spin that the set does not have."""
         states = parse_name(name).states if "(" in name else states_of_name(name) if "[" in name else None
         count = 1 if self.top.states is None else self.top.states.count
         if states and max(states) >= count:
@@ -211,11 +211,11 @@ class TopConstants:
                 f"{name}: there is no state {max(states)}; the constants to start from have {count}, counted from 0"
             )
         if "(" in name:
-            known = self.top.spin_constants.twice if self.top.spin_constants is not None and self.hyperfine else {}
-            lost = [spin for spin in spins_of(name) if spin not in known]
+            spins = self.top.spin_constants.twice if self.top.spin_constants is not None and self.hyperfine else {}
+            lost = [spin for spin in spins_of(name) if spin not in spins]
             if lost:
                 raise ValueError(
-                    f"{name}: there is no spin {lost[0]}; the constants to start from have {', '.join(known) or 'none'}"
+                    f"{name}: there is no spin {lost[0]}; the constants to start from have {', '.join(spins) or 'none'}"
                 )
 
     def text(self, unit: str = "MHz") -> str:
@@ -231,14 +231,14 @@ ConstantSet = Constants | TopConstants
 
 
 def _plain(table: Mapping[str, float]) -> dict[str, float]:
-    """What belongs to the top's own state alone."""
+    """The constants of state 0, without spins."""
     return {name: value for name, value in table.items() if "[" not in name and "(" not in name}
 
 
-def _of_states(table: Mapping[str, float]) -> dict[str, float]:
-    """What belongs to further states and pairs of states, without spins."""
+def _state_constants(table: Mapping[str, float]) -> dict[str, float]:
+    """The constants of further states and of pairs of states, without spins."""
     return {name: value for name, value in table.items() if "[" in name and "(" not in name}
 
 
-def _of_spins(table: Mapping[str, float]) -> dict[str, float]:
+def _spin_constants(table: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in table.items() if "(" in name}

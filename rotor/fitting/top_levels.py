@@ -1,8 +1,8 @@
-"""Chosen levels of a top with further states or with spins, and their derivatives by its named constants.
+"""Labelled levels of a top with further states or spins, and their derivatives by its named constants.
 
-The Hamiltonian is that of `rotor.quantum.effects.of_top`, the same that predictions have. Only the J or F are solved in which a line
-has a level: connected Wang blocks of states (`labelled_states`), blocks of an F (`labelled_spins`), or, where nothing connects the states
-of a symmetric top, E = Σ c ∂E/∂c, which is exact.
+The Hamiltonian is that of `rotor.quantum.effects.of_top`, as in predictions. Only the J or F with a level of a line are solved:
+connected Wang blocks of states (`labelled_states`), blocks of one F (`labelled_spins`), or, for uncoupled states of a symmetric top,
+the exact sum E = Σ c ∂E/∂c.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TopLevels(LevelModel):
-    """Levels in blocks that are solved for any values of the constants.
+    """Levels in blocks that can be solved for any constants.
 
-    parts : places of labels among all, and the blocks in which they lie
+    parts : indices of labels among all labels, and the blocks that contain their levels
     """
 
     names: tuple[str, ...]
@@ -46,14 +46,14 @@ class TopLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1: levels are called by what they mostly are, whatever the constants are."""
+        """Always 1: levels are labelled by their dominant basis state at any constants."""
         return np.ones(self.count)
 
 
 def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     """The model for labels (levels, k) by `constants.quanta`, half-integers doubled.
 
-    Raises MissingLevelsError for labels that no level has, with the first of them.
+    Raises MissingLevelsError for labels without a level; its message names the first.
     """
     names, form = tuple(constants.values), constants.quanta
     if labels.shape[1] != len(form):
@@ -71,14 +71,14 @@ def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
 
         return torsion_levels(begin, labels)
     if constants.hyperfine:
-        return _of_spins(begin, columns, labels, names)
+        return _levels_with_spins(begin, columns, labels, names)
     if "kc" in form:
-        return _of_states(begin, columns, labels, names)
+        return _levels_of_states(begin, columns, labels, names)
     return _in_closed_form(begin, columns, labels, names)
 
 
 def model_of(constants: ConstantSet, labels: Ints, kmax: int | None = None) -> LevelModel:
-    """The model of named constants for labels (levels, k); `kmax` cuts the basis of an asymmetric top of one state without spins."""
+    """The level model of named constants for labels (levels, k); `kmax` truncates the basis of a single asymmetric top."""
     if isinstance(constants, TopConstants):
         return top_levels(constants, labels)
     return level_model(constants, labels, kmax=kmax)
@@ -98,7 +98,9 @@ def _text(constants: TopConstants, label: Ints) -> str:
     return " ".join(value_text(value, name in constants.halves) for name, value in pairs)
 
 
-def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+def _levels_of_states(
+    begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
+) -> LevelModel:
     labels_by_row = np.column_stack(
         [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
     )
@@ -110,7 +112,9 @@ def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, name
     return TopLevels(names, len(labels), ((np.arange(len(labels)), blocks),))
 
 
-def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+def _levels_with_spins(
+    begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
+) -> LevelModel:
     from rotor.quantum.estimates.labelled_spins import found_with_spins  # with all that spins need
 
     total = begin.quanta[-1]
@@ -140,7 +144,7 @@ def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
-    """Tops whose levels are sums of constants times numbers."""
+    """The model of tops whose energies are linear in the constants."""
     quanta = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
     levels = solve_levels(begin.top, int(quanta["j"].max()), effects=begin.effects)
     rows = levels.rows_of(**quanta)

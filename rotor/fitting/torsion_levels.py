@@ -1,10 +1,10 @@
-"""Chosen levels of a molecule with internal rotors, with or without nuclear spins, and their derivatives by its constants.
+"""Labelled levels of a molecule with internal rotors, with or without nuclear spins, and their derivatives by its constants.
 
-Blocks are those of `rotor.quantum.internal_rotation`, for the J (N with spins) that a label needs. Of one top in the rho-axis frame they
-are made once; each iteration solves them at other values. F and ρ enter the coefficients F, -2Fρ and Fρ² of linear blocks, so that ∂E/∂F
-and ∂E/∂ρ follow by the chain rule. The torsional functions that are the basis belong to the constants of the start; they are made anew
-where F, ρ or V3 move by more than a hundredth. Constants of principal axes, of one top and of two, move the axes of ρ: their blocks are
-made anew at each point (`rotor.quantum.internal_rotation.chain_rule`).
+Blocks are those of `rotor.quantum.internal_rotation`, for the J (N with spins) of the labels. For one top in the rho-axis frame the
+blocks are built once and solved at each iteration. F and ρ enter through the coefficients F, -2Fρ and Fρ² of linear blocks, so that
+∂E/∂F and ∂E/∂ρ follow by the chain rule. The torsional basis functions are those of the start; they are rebuilt when F, ρ or V3
+change by more than 1 %. Constants of principal axes, for one top or two, rotate the axis of ρ: their blocks are rebuilt at each
+point (`rotor.quantum.internal_rotation.chain_rule`).
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 
-MOVED = 0.01  # relative change of a torsional constant from which the torsional functions are made anew
+MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt
 TORSIONAL = ("F", "rho", "V3", "V6")
 SPECIES = {1: ("A", "E"), 2: ("AA", "AE", "EA", "EE", "EE*")}  # by the number of tops
 
 
 @dataclass(frozen=True)
 class LabelledSpecies:
-    """The labels of one species: their places among all, columns J (or N), v_t, Ka, Kc, and with spins the sums F1 ... F, doubled."""
+    """The labels of one species: indices among all labels, columns J (or N), v_t, Ka, Kc, and with spins the doubled sums F1 ... F."""
 
     name: str
     places: Ints
@@ -44,7 +44,7 @@ class LabelledSpecies:
 
     @property
     def vt_max(self) -> int:
-        """The highest v_t of a label."""
+        """The highest v_t of the labels."""
         return int(self.keys[:, 1].max())
 
     @property
@@ -53,7 +53,7 @@ class LabelledSpecies:
         return np.unique(self.sums[:, -1])
 
     def rotations(self, twice_spins: int) -> Ints:
-        """The J (N) of the levels that labels are made of: |F - I| to F + I with spins."""
+        """The J (or N) that the labels need; with spins, N from |F - I| to F + I."""
         if not self.sums.size:
             return np.unique(self.keys[:, 0])
         ranges = [range(abs(f - twice_spins), f + twice_spins + 1, 2) for f in self.twice_f.tolist()]
@@ -72,7 +72,7 @@ class TorsionLevels(LevelModel):
     _blocks: dict[str, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """See `LevelModel`. Raises MissingLevelsError for labels that no level has."""
+        """See `LevelModel`. Raises MissingLevelsError for labels without a level."""
         named = dict(zip(self.names, np.asarray(values_mhz).tolist(), strict=True))
         rotation = {name: value for name, value in named.items() if not is_torsional(name) and "(" not in name}
         internal = {name: value for name, value in named.items() if is_torsional(name)}
@@ -81,10 +81,10 @@ class TorsionLevels(LevelModel):
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
         for part in self.species:
             name = part.name if part.name in model.species else "AE"  # EA of equivalent tops
-            energies[part.places], slopes[part.places] = self._of_species(part, name, model, chain, named)
+            energies[part.places], slopes[part.places] = self._species_levels(part, name, model, chain, named)
         return energies, slopes
 
-    def _of_species(
+    def _species_levels(
         self, part: LabelledSpecies, name: str, model: TurningTops, chain: ChainRule, named: Mapping[str, float]
     ) -> tuple[Floats, Floats]:
         """Energies and derivatives of the labels of one species."""
@@ -94,26 +94,26 @@ class TorsionLevels(LevelModel):
         if self.nuclei is None:
             rows = _rows_of(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
             values, direct = levels.energies[rows], _slopes_of_rotation(levels, levels.rows[rows], elements)
-            of_spins: dict[str, Floats] = {}
+            spin_slopes: dict[str, Floats] = {}
         else:
             coupled = self._with_spins(part, levels, model, chain, named)
             names = ("n", "vt", "ka", "kc", *self.nuclei.sums)
             rows = _rows_of(coupled.quanta, names, part, np.hstack([part.keys, part.sums]))
             values, (direct, spins) = coupled.energies[rows], coupled.slopes(rows, elements)
-            of_spins = {constant.name: spins[:, i] for i, constant in enumerate(coupled.nuclei.constants)}
+            spin_slopes = {constant.name: spins[:, i] for i, constant in enumerate(coupled.nuclei.constants)}
         count = len(model.coefficients)
         slopes = dict(zip(model.values, (direct[:, :count] @ model.jacobian).T, strict=True))
-        slopes |= dict(zip(further, direct[:, count:].T, strict=True)) | of_spins
-        for by_angle in (value for key, value in of_spins.items() if key.startswith(BY_ANGLE.format(""))):
+        slopes |= dict(zip(further, direct[:, count:].T, strict=True)) | spin_slopes
+        for by_angle in (value for key, value in spin_slopes.items() if key.startswith(BY_ANGLE.format(""))):
             slopes[ANGLE] = slopes[ANGLE] + by_angle
         return values, chain.slopes(self.names, slopes, len(rows))
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1: levels are called by what they mostly are, whatever the constants are."""
+        """Always 1: levels are labelled by their dominant basis state at any constants."""
         return np.ones(self.count)
 
     def _solved(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesLevels:
-        """The torsion-rotation levels of a species; with spins those up to the v_t of predictions, which are their basis."""
+        """The torsion-rotation levels of a species; with spins up to the v_t of predictions, as basis of the hyperfine levels."""
         vt_max = max(part.vt_max, self.constants.vt_max if self.nuclei else 0)
         by_energy = self.constants.names == "energy"
         if isinstance(model, RamModel) and not model.angle:
@@ -128,7 +128,7 @@ class TorsionLevels(LevelModel):
         chain: ChainRule,
         named: Mapping[str, float],
     ) -> CoupledLevels:
-        """The levels coupled to the nuclei, whose constants have these values."""
+        """The levels coupled to nuclei with these values of their constants."""
         assert self.nuclei is not None
         nuclei = self.nuclei.with_values(named)
         if ANGLE in chain.quantities:
@@ -136,15 +136,15 @@ class TorsionLevels(LevelModel):
         return coupled_levels(levels, nuclei, model.angle, model.has_plane, part.twice_f)
 
     def _blocks_of(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
-        """The blocks of a species, made anew where the torsion has moved."""
+        """The blocks of a species, rebuilt if the torsional constants have changed."""
         torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
-        known = self._blocks.get(part.name)
-        if known is None or (np.abs(torsion - known[0]) > MOVED * np.abs(known[0])).any():
+        cached = self._blocks.get(part.name)
+        if cached is None or (np.abs(torsion - cached[0]) > MOVED * np.abs(cached[0])).any():
             self._blocks[part.name] = torsion, self._new_blocks(part, part.name, model)
         return self._blocks[part.name][1]
 
     def _new_blocks(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesBlocks:
-        """The blocks of the J that labels need."""
+        """New blocks for the J that the labels need."""
         j = part.rotations(self.nuclei.twice_total if self.nuclei else 0)
         return species_blocks(model, name, int(j.min()), int(j.max()), self.constants.functions, j)
 
@@ -156,9 +156,9 @@ def _slopes_of_rotation(levels: SpeciesLevels, rows: Ints, further: Elements | N
 
 
 def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
-    """The model for labels (levels, k) by `constants.quanta`, species standing as `rotor.quantum.quanta.SPECIES_NUMBERS`.
+    """The model for labels (levels, k) by `constants.quanta`; species are numbered by `rotor.quantum.quanta.SPECIES_NUMBERS`.
 
-    Raises MissingLevelsError for labels that no level has.
+    Raises MissingLevelsError for labels without a level.
     """
     internal = constants.top.internal_rotation
     assert internal is not None
@@ -192,7 +192,7 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
 
 
 def _coupled(n: Ints, sums: Ints, nuclei: Nuclei | None) -> NDArray[np.bool_]:
-    """Whether twice each sum (labels, sums) follows from the sum before, first from N, and its spin."""
+    """Whether each doubled sum (labels, sums) can be coupled from the preceding sum (first N) and its spin."""
     right, before = np.ones(len(n), dtype=bool), 2 * n
     for spin, total in zip(nuclei.spins if nuclei else (), sums.T, strict=True):
         right &= (
@@ -205,14 +205,14 @@ def _coupled(n: Ints, sums: Ints, nuclei: Nuclei | None) -> NDArray[np.bool_]:
 
 
 def _doubled_sums(columns: Mapping[str, Ints], nuclei: Nuclei | None, halves: frozenset[str]) -> Ints:
-    """Twice the sums F1 ... F (labels, sums) of labels whose half-integers are doubled; none without spins."""
+    """The doubled sums F1 ... F (labels, sums); empty without spins."""
     if nuclei is None:
         return np.zeros((len(columns["species"]), 0), dtype=np.int64)
     return np.column_stack([columns[name] if name in halves else 2 * columns[name] for name in nuclei.sums])
 
 
 def _rows_of(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:
-    """Places of the labelled levels among those of a species; MissingLevelsError for labels that no level has."""
+    """Indices of the labelled levels among those of a species; MissingLevelsError for labels without a level."""
     rows = _rows(np.column_stack([quanta[name] for name in names]), keys)
     if (rows < 0).any():
         missing = np.flatnonzero(rows < 0)
@@ -224,13 +224,13 @@ def _rows_of(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpe
 
 
 def _exist(keys: Ints) -> NDArray[np.bool_]:
-    """Whether (J, v_t, Ka, Kc) is a label: Ka + Kc is J or J + 1."""
+    """Whether (J, v_t, Ka, Kc) is a valid label: Ka + Kc is J or J + 1."""
     j, vt, ka, kc = keys.T
     return np.asarray((keys >= 0).all(axis=1) & (ka <= j) & (kc <= j) & np.isin(ka + kc - j, (0, 1)) & (vt >= 0))
 
 
 def _rows(table: Ints, keys: Ints) -> Ints:
-    """Rows of a table (n, k) of whole numbers of at least 0 that equal keys (m, k), -1 where none does."""
+    """Indices of keys (m, k) among the rows of a table (n, k) of non-negative integers; -1 if missing."""
     spans = np.maximum(table.max(axis=0), keys.max(axis=0)) + 1
     codes, needed = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
     order = np.argsort(codes)

@@ -1,4 +1,4 @@
-"""Lines that a fit in named constants has not, of the kinds that were measured: for advice on what to measure next."""
+"""Unmeasured lines of the same kinds as the measured ones: candidates for the next measurement."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top
 
-_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
-_WIDER = 0.01  # of the lowest and highest frequency: how far beyond them a line may lie
+_WORTH_MEASURING = 1e-2  # smallest S μ² (D², for μ = 1 D) of a suggested line
+_WIDER = 0.01  # fraction by which a line may lie beyond the lowest and highest measured frequency
 
 
 def unmeasured(fit: Fit) -> tuple[Ints, Ints]:
-    """Labels (n, k) of both states of lines of the kinds, frequencies and J that were measured, without those that are measured."""
+    """Labels (n, k) of both states of unmeasured lines, within the kinds, frequencies and J of the measured ones."""
     measured, named = fit.lines, fit.named
     jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
     seen_mhz = (
@@ -34,13 +34,15 @@ def unmeasured(fit: Fit) -> tuple[Ints, Ints]:
     strong = lines.strength_debye2 > _WORTH_MEASURING
     labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
     upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
-    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
-    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
+    measured_labels = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
+    new = np.array(
+        [(*u, *low) not in measured_labels for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool
+    )
     return upper[new], lower[new]
 
 
 def _bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, float, float]) -> Top:
-    """The top with that dipole in every state, and 1 D along each axis between states where a line was measured."""
+    """The top with this dipole in all states, and 1 D along each axis between states with measured lines."""
     states = top.states
     if states is not None and "v" in lines.names:
         v = lines.names.index("v")
@@ -53,7 +55,7 @@ def _bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, flo
 
 
 def _components(fit: Fit) -> tuple[float, float, float]:
-    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
+    """A dipole of 1 D along each axis with measured lines, judged by the parities of ΔKa and ΔKc."""
     kind = fit.named.kind
     if kind != "asymmetric":
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)

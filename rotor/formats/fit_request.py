@@ -302,7 +302,7 @@ def report_of(answer: FitAnswer) -> str:
     if loss != "squares":
         head.append(f"robust loss {loss}: lines that are far off weigh less")
     of_file = parameter_section(request.spfit, answer.fit) if request.spfit else ()
-    return report_text(answer.fit, request.title, notes=request.notes, head=head, of_file=of_file)
+    return report_text(answer.fit, request.title, notes=request.notes, head=head, file_lines=of_file)
 
 
 def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:

@@ -241,10 +241,10 @@ def test_a_sum_of_cosines_at_even_times_is_the_plain_sum_without_its_exponential
 
 def test_lines_that_stand_twice_are_named_with_how_far_they_are_apart():
     from rotor.fitting.assignment import assignments
-    from rotor.fitting.fit import _of_twice
+    from rotor.fitting.fit import _repeated_text
 
     lines = assignments(("j",), [[1], [2], [1], [2]], [[0], [1], [0], [1]], [100.0, 200.0, 100.25, 200.5], 0.1)
-    assert "the largest difference is 0.5 MHz, of 2 - 1" in _of_twice(lines, [(0, 2), (1, 3)])
+    assert "the largest difference is 0.5 MHz, of 2 - 1" in _repeated_text(lines, [(0, 2), (1, 3)])
 
 
 def test_bodies_that_rotate_freely_are_written_in_a_line():
