@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -32,8 +32,8 @@ def write_exomol(lines: Lines, path: str | os.PathLike[str], settings: Mapping[s
     quanta, target = lines.levels.quanta, Path(path)
     if "n" in quanta or "j" not in quanta:
         raise ValueError(
-            f"{target}: lines split by spins (labels {' '.join(quanta)}); ExoMol's states have J and labels: leave the hyperfine structure "
-            "out, or write a .cat file, which holds F"
+            f"{target.name}: lines split by spins (labels {' '.join(quanta)}); ExoMol's states have J and labels: leave the hyperfine "
+            "structure out, or write a .cat file, which holds F"
         )
     base = target.name.removesuffix(SUFFIX)
     used = np.unique(np.concatenate([lines.upper, lines.lower]))
@@ -51,6 +51,14 @@ def write_exomol(lines: Lines, path: str | os.PathLike[str], settings: Mapping[s
     with open_atomic(target) as handle:
         handle.write(_states(lines, used))
     write_beside(target, record_of(lines, settings or {}))
+
+
+def refuse_exomol(path: Path) -> NoReturn:
+    """ValueError that says what the file holds and what reads it."""
+    raise ValueError(
+        f"{path}: a line list of ExoMol (levels and transitions), which has neither constants nor a dipole to make a top of; enter it in a "
+        f"local catalogue (rotor catalogue add X.states --catalogue lines.rotorcat), whose species emission and identify read"
+    )
 
 
 def _states(lines: Lines, used: np.ndarray) -> bytes:

@@ -64,7 +64,17 @@ FORMATS = (
         "rotor.formats.hitran:read_hitran",
         recognises="rotor.formats.hitran:is_hitran_file",
     ),
-    Format("lines of ExoMol", (".states",), writers={LINES: "rotor.formats.exomol_writer:write_exomol"}),
+    Format(
+        "lines of ExoMol",
+        (".states",),
+        "rotor.formats.exomol_writer:refuse_exomol",
+        {LINES: "rotor.formats.exomol_writer:write_exomol"},
+    ),
+    Format(
+        "packed lines of ExoMol",
+        (".states.bz2", ".trans", ".trans.bz2"),
+        "rotor.formats.exomol_writer:refuse_exomol",
+    ),
     Format("input of SPFIT and SPCAT", (".par", ".var", ".int"), "rotor.formats.read_write:read_spcat_top"),
     Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.text.lin:read_lin"),
     Format("levels of SPCAT", (".egy.gz",), "rotor.formats.spcat.text.egy:read_egy"),

@@ -35,6 +35,7 @@ Examples:
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20
   rotor spectrum case.int --cat case.cat
+  rotor spectrum CO --exomol CO.states && rotor catalogue add CO.states --catalogue lines.rotorcat
   rotor spectrum --constants "A=2237 B=1368.5 C=884.2" --dipole-abc 1,1,1 --temperature 2 --over peaks.csv --plot over.png"""
 
 
@@ -297,6 +298,13 @@ VERB = Verb(
         ),
         Output(
             "hitran", (".hitran",), "Write HITRAN records of 160 characters; with --hitran-id", write_table, scene=False
+        ),
+        Output(
+            "exomol",
+            (".states",),
+            "Write levels in ExoMol's form (.states), transitions and Q(T) beside (.trans, .pf)",
+            write_table,
+            scene=False,
         ),
         Output(
             "egy",

@@ -90,10 +90,12 @@ def _plain_columns(text: str) -> tuple[list[str], NDArray[np.float64]] | None:
             break
         heading += [body[len(mark or "") :].strip()] if body else []
         start = end + 1 if end >= 0 else len(text)
+    if start >= len(text):  # nothing but a heading: numpy warns of it
+        return None
     try:
         delimiter = "," if "," in text[start : text.find("\n", start)] else None
         rows = np.loadtxt(io.StringIO(text[start:]), delimiter=delimiter, comments=None, ndmin=2)
-    except (ValueError, UserWarning):  # ragged, empty or marked lines: those are read, or refused, line by line
+    except ValueError:  # ragged or marked lines: those are read, or refused, line by line
         return None
     return (heading, rows) if len(rows) >= 2 and rows.shape[1] >= 2 else None
 
