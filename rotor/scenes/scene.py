@@ -20,7 +20,7 @@ from rotor.scenes.choice import Accuracy
 from rotor.scenes.sections import MoleculeSection
 from rotor.scenes.verbs import VERBS
 from rotor.verbs.scene_tables import entries_before, tables_of
-from rotor.verbs.tables import said
+from rotor.verbs.tables import described
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
 if TYPE_CHECKING:
@@ -34,11 +34,13 @@ SCHEMA = 1
 class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind"):
     """Fields of all kinds of scene. schema: version of the format."""
 
-    schema: Annotated[int, said("version of this format")] = SCHEMA
-    title: Annotated[str, said("a line for reports", "Water in the microwave region")] = ""
+    schema: Annotated[int, described("version of this format")] = SCHEMA
+    title: Annotated[str, described("a line for reports", "Water in the microwave region")] = ""
     sweep: Annotated[
         dict[str, list[Any]],
-        said("values by dotted name; every combination is run", {"conditions.temperature": ["10 K", "100 K", "300 K"]}),
+        described(
+            "values by dotted name; every combination is run", {"conditions.temperature": ["10 K", "100 K", "300 K"]}
+        ),
     ] = field(default_factory=dict)
 
     @property
@@ -89,7 +91,7 @@ def _scene_class(kind: str) -> Any:
     verb = verb_of(kind)
     entries = entries_before(verb)
     if verb.accuracy:
-        meta = said(verb.accuracy, verb.accuracy_example)
+        meta = described(verb.accuracy, verb.accuracy_example)
         entries.append(("accuracy", Annotated[Accuracy, meta], None))
     entries += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
     scene = msgspec.defstruct(

@@ -32,7 +32,7 @@ from rotor.verbs.molecule import (
 )
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.subjects import beside, saved_molecule
-from rotor.verbs.tables import Section, entries_of, said
+from rotor.verbs.tables import Section, described, entries_of
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, tables
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class SeveralMolecules(SubjectKind):
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The list of molecules."""
         structure: Any = emitting_molecule()
-        return [("molecules", Annotated[list[structure], said("one or more")], msgspec.NODEFAULT)]
+        return [("molecules", Annotated[list[structure], described("one or more")], msgspec.NODEFAULT)]
 
     def saved(self, request: EmissionRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The tables of the molecules."""
@@ -190,7 +190,7 @@ def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
 
 def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
     """A top with a dipole, or the lines of a .cat file with Q(T)."""
-    source = reading.given.source
+    source = reading.inputs.source
     if not is_catalogue(source):
         if partition is not None:
             raise ValueError("partition: needs a .cat file as source; it gives its Q(T)")
@@ -253,7 +253,7 @@ def show(answer: EmissionAnswer, report: Report) -> None:
     if not len(answer.lines):
         print(
             "\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth"
-            + range_without_unit(report.given)
+            + range_without_unit(report.entries)
         )
     elif report.shown.top_lines:
         print()

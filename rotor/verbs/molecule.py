@@ -1,4 +1,4 @@
-"""The molecule of a verb: one declaration for the command line, scenes and Python, and the top that it means."""
+"""The molecule of a verb: its inputs on the command line, in scenes and in Python, and the top that they describe."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 T = TypeVar("T")
-USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
+USUAL_LEAST_MHZ = 100.0  # largest constant below which a missing unit gives a note
 STATES = ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
 _GEOMETRY = {
     "isotopes": "bare constants have no atoms; give the constants of the isotopologue itself",
     "calculator": "bare constants have no geometry to refine; give a molecule",
     "symmetry_tolerance": "bare constants have no nuclei; give a geometry",
     "hessian": "bare constants have no geometry that it belongs to; give a molecule",
-}  # inputs that need a geometry, and what is said without one
+}  # inputs that need a geometry, and the error without one
 
 
 @dataclass(frozen=True)
 class MoleculeInput:
-    """Which molecule; either `source` or `constants`."""
+    """Inputs of a molecule; either `source` or `constants` is given."""
 
     source: Any = declared(
         None,
@@ -45,7 +45,7 @@ class MoleculeInput:
         common=True, example="A=9.2 B=3 C=2.5 GHz",
     )  # fmt: skip
     isotopes: tuple[str, ...] = declared(
-        (), Names(metavar="1=2H"), "Another isotope, by atom number or element; repeatable", "molecule.isotopes", option="--isotope",
+        (), Names(metavar="1=2H"), "Isotope of an atom, by atom number or element; repeatable", "molecule.isotopes", option="--isotope",
         common=True, example=["1=2H"],
     )  # fmt: skip
     dipole: tuple[float, ...] | None = declared(
@@ -58,7 +58,7 @@ class MoleculeInput:
     )  # fmt: skip
     polarizability: tuple[float, ...] | None = declared(
         None, Numbers("Å3", (), "aa,bb,cc or parallel,perpendicular"),
-        "In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)", "molecule.polarizability",
+        "Polarizability in principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)", "molecule.polarizability",
         common=True, example=[8.0, 4.0],
     )  # fmt: skip
     anisotropy: float | None = declared(
@@ -70,7 +70,7 @@ class MoleculeInput:
         example={"ee": 1, "eo": 3, "oe": 3, "oo": 1},
     )  # fmt: skip
     spin_constants: str | None = declared(
-        None, Text(), 'Constants of spins: "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" (MHz)', "molecule.spin_constants",
+        None, Text(), 'Spin constants: "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" (MHz)', "molecule.spin_constants",
         panel=SPINS, example="chi_aa(14N)=-4.22 MHz",
     )  # fmt: skip
     spins: str | None = declared(
@@ -86,24 +86,24 @@ class MoleculeInput:
         panel=SPINS, example="[1] 0,0,1.3 [0,1] 0,0,1.47",
     )  # fmt: skip
     state_weights: str | None = declared(
-        None, Text(), 'Spin weights of states: "[0] even=1,odd=3 [1] none"; none: all its levels alike', "molecule.state_weights",
+        None, Text(), 'Spin weights of states: "[0] even=1,odd=3 [1] none"; none: all levels equal', "molecule.state_weights",
         panel=SPINS, example="[0] even=1,odd=3 [1] even=3,odd=1",
     )  # fmt: skip
     state_symmetry: str | None = declared(
-        None, Text(metavar="GROUP"), "Group of the states, whose couplings are checked by it: C2v, Cs(ab), C2(c), ...",
+        None, Text(metavar="GROUP"), "Symmetry group of the states, which checks their couplings: C2v, Cs(ab), C2(c), ...",
         "molecule.state_symmetry", panel=SPINS, example="C2v",
     )  # fmt: skip
     state_names: str | None = declared(
         None,
         Text(metavar="LIST"),
-        "Names of all states, from 0 on: 0+,0-",
+        "Names of all states, starting with v = 0: 0+,0-",
         "molecule.state_names",
         panel=SPINS,
         example="0+,0-",
     )
     internal_rotation: str | None = declared(
         None, Text(),
-        'A methyl group that turns: "geometry" (barrier of a similar molecule), "scan" (--calculator, or MMFF94), or '
+        'Internal rotation of a methyl group: "geometry" (barrier of a similar molecule), "scan" (--calculator, or MMFF94), or '
         '"RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
         "molecule.internal_rotation", panel=SPINS, example="RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.1227cm-1",
     )  # fmt: skip
@@ -113,12 +113,12 @@ class MoleculeInput:
     )  # fmt: skip
     hessian: str | None = declared(
         None, Text(metavar="FILE"),
-        "Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the word "
-        "'calculator', from one that the calculator makes",
+        "Hessian for the quartic distortion (hartree/bohr², rows or lower triangle), or, with the word "
+        "'calculator', the Hessian of the calculator",
         "molecule.hessian", example="hessian.txt",
     )  # fmt: skip
     symmetry_tolerance: float | None = declared(
-        None, Quantity("Å", above=0, metavar="DISTANCE"), "How far nuclei may be off the symmetry that is taken, such as 0.005 (Å)",
+        None, Quantity("Å", above=0, metavar="DISTANCE"), "Displacement of nuclei within which a symmetry is accepted, such as 0.005 (Å)",
         "molecule.symmetry_tolerance", panel=MOLECULE, example="0.005 Å",
     )  # fmt: skip
 
@@ -128,36 +128,36 @@ FIELDS = {field.name: field for field in all_fields(MoleculeInput).values()}
 
 @dataclass(frozen=True)
 class Reading:
-    """A molecule being read. style: how errors call its inputs. folder: from which files are counted. note: takes remarks."""
+    """A molecule being read. style: how errors name its inputs. folder: of the files that it names. note: takes remarks."""
 
-    given: MoleculeInput
+    inputs: MoleculeInput
     style: str = "name"
     folder: str | os.PathLike[str] = "."
     note: Callable[[str], None] = lambda _: None
 
     def named(self, name: str) -> str:
-        """How errors call an input."""
+        """The name of an input in errors."""
         return FIELDS[name].called(self.style)
 
     def source(self, name: str, how: str = "") -> str:
-        """Where a number is from that was given by hand."""
+        """The source of a number that the user gave, for provenance."""
         return f"given{how} ({self.named(name)})" if self.style != "name" else f"given{how}"
 
     def within(self, name: str, make: Callable[[], T]) -> T:
-        """What `make` makes; a ValueError says which input it is about."""
+        """The result of `make`; a ValueError names the input."""
         try:
             return make()
         except ValueError as error:
             raise ValueError(f"{self.named(name)}: {error}") from None
 
     def path(self, name: str) -> str:
-        """A file beside the scene, other words as they are."""
+        """Path of a file relative to the scene; other words unchanged."""
         beside = str(Path(self.folder) / name)
         return beside if self.style == "key" and not name.startswith("SMILES:") and is_file(beside) else name
 
 
 def is_file(name: str) -> bool:
-    """Whether a text is the name of a file; one that no path can be, too long or with a zero byte, is none."""
+    """Whether a text names a file; False for text that no path can be, too long or with a zero byte."""
     try:
         return Path(name).is_file()
     except (OSError, ValueError):
@@ -165,20 +165,20 @@ def is_file(name: str) -> bool:
 
 
 def read_molecule(entries: Entries) -> MoleculeInput:
-    """The inputs that were given."""
+    """The inputs of a molecule."""
     inputs: MoleculeInput = read_instance(MoleculeInput, entries)
     return inputs
 
 
 def top_of(reading: Reading) -> Top:
-    """The top that the inputs mean.
+    """The top that the inputs describe.
 
-    Raises ValueError, with the input, for contradictions and for what no top can have.
+    Raises ValueError, with the name of the input, for contradictions and impossible values.
 
     >>> top_of(Reading(MoleculeInput(constants="B=57.6 GHz", dipole_abc=(0.1, 0.0, 0.0)))).kind
     'linear'
     """
-    inputs = reading.given
+    inputs = reading.inputs
     _refuse_contradictions(reading)
     top = _from_source(reading) if inputs.constants is None else _from_constants(reading)
     if inputs.dipole_abc is not None:
@@ -203,9 +203,9 @@ def top_of(reading: Reading) -> Top:
 
 
 def _refuse_contradictions(reading: Reading) -> None:
-    inputs, named = reading.given, reading.named
+    inputs, named = reading.inputs, reading.named
     if (inputs.source is None) == (inputs.constants is None):
-        both = "both were given" if inputs.source is not None else "neither was given"
+        both = "both are given" if inputs.source is not None else "neither is"
         if reading.style == "key":
             raise ValueError("molecule: give either source or constants")
         source = "a source" if reading.style == "option" else named("source")
@@ -226,17 +226,17 @@ def _refuse_contradictions(reading: Reading) -> None:
 def _from_constants(reading: Reading) -> Top:
     from rotor.tops.top import Top
 
-    text = reading.given.constants or ""
+    text = reading.inputs.constants or ""
     top = reading.within("constants", lambda: Top.from_constants(text, source=reading.source("constants")))
     if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
         reading.note(
-            f"{reading.named('constants')}: no unit is given, so the numbers are MHz; for GHz write '{text} GHz'"
+            f"{reading.named('constants')}: no unit is given: the numbers are taken as MHz; for GHz write '{text} GHz'"
         )
     return top
 
 
 def has_unit(text: str) -> bool:
-    """Whether the text of an option has a unit of frequency somewhere.
+    """Whether the text of an option contains a unit of frequency.
 
     >>> has_unit("A=9.2 B=3 C=2.5 GHz"), has_unit("A=9.2(1) B=3"), has_unit("2:18"), has_unit("2GHz:18")
     (True, False, False, True)
@@ -245,23 +245,23 @@ def has_unit(text: str) -> bool:
 
 
 def range_without_unit(entries: Entries) -> str:
-    """The end of a sentence on why there are no lines: what a range that was typed without a unit was read as."""
+    """End of a sentence on missing lines: how a range without a unit was read."""
     text = entries.values.get("conditions.range")
     if entries.style != "option" or text is None or has_unit(text):
         return ""
-    return f"; --range {text} has no unit, so it is MHz: write {text}GHz for GHz"
+    return f"; --range {text} has no unit and is taken as MHz: write {text}GHz for GHz"
 
 
 def _from_source(reading: Reading) -> Top:
     from rotor.formats import read
     from rotor.tops.top import Top
 
-    inputs = reading.given
+    inputs = reading.inputs
     if isinstance(inputs.source, Top):
         return inputs.source
     source = reading.path(inputs.source) if isinstance(inputs.source, str) else inputs.source
     if source == "-" and reading.style == "key":
-        raise ValueError(f"{reading.named('source')}: '-': a scene reads no standard input; give a file")
+        raise ValueError(f"{reading.named('source')}: '-': a scene cannot read standard input; give a file")
     top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(inputs.isotopes) or None))
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
@@ -283,7 +283,7 @@ def _named_in_scenes(reading: Reading, make: Callable[[], T]) -> T:
 
 def _geometry(top: Top) -> Molecule:
     if top.molecule is None:
-        raise ValueError(f"{top.name or 'the source'} has constants alone; expected a geometry")
+        raise ValueError(f"{top.name or 'the source'} has constants only; expected a geometry")
     return top.molecule
 
 
@@ -295,16 +295,16 @@ def _refined(top: Top, name: str) -> Top:
 
 
 def _semirigid(top: Top, reading: Reading) -> Top:
-    """The top with the distortion that a Hessian gives, of a file or, by the word "calculator", of the calculator."""
+    """The top with quartic distortion from a Hessian: of a file or, by the word "calculator", of the calculator."""
     from rotor.molecules.force_field import force_field_from_calculator, read_hessian
     from rotor.molecules.optimise import calculator_by_name
     from rotor.tops.distortion import semirigid_top
 
-    inputs = reading.given
+    inputs = reading.inputs
     if inputs.hessian != "calculator":
         return semirigid_top(read_hessian(reading.path(str(inputs.hessian)), _geometry(top)))
     if inputs.calculator is None:
-        raise ValueError(f"the word 'calculator' needs {reading.named('calculator')}; else give a file")
+        raise ValueError(f"the word 'calculator' needs {reading.named('calculator')}; otherwise give a file")
     return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(inputs.calculator)))
 
 
@@ -312,15 +312,13 @@ def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
     import numpy as np
 
     if top.frame is None:
-        raise ValueError(
-            f"this is in the frame of a geometry, and there is none here; use {reading.named('dipole_abc')}"
-        )
-    vector = (top.frame.axes @ np.array(reading.given.dipole)).tolist()
+        raise ValueError(f"needs the frame of a geometry; with constants use {reading.named('dipole_abc')}")
+    vector = (top.frame.axes @ np.array(reading.inputs.dipole)).tolist()
     return top.with_dipole(vector, reading.source("dipole", " in the frame of the input"))
 
 
 def _with_polarizability(top: Top, reading: Reading) -> Top:
-    inputs = reading.given
+    inputs = reading.inputs
     if inputs.anisotropy is not None:
         anisotropy = inputs.anisotropy
         return reading.within("anisotropy", lambda: _with_anisotropy(top, anisotropy, reading))
@@ -330,14 +328,14 @@ def _with_polarizability(top: Top, reading: Reading) -> Top:
 
 
 def with_tensor(top: Top, numbers: tuple[float, ...], source: str) -> Top:
-    """The top with a polarizability: 2 numbers along and across its axis, 3 of the diagonal, or 6 with ab, ac, bc."""
+    """The top with a polarizability (Å³): 2 numbers along and across the axis, 3 on the diagonal, or 6 with ab, ac, bc."""
     text = ",".join(f"{x:g}" for x in numbers)
     if len(numbers) == 2 and top.kind in ("linear", "prolate", "oblate"):
         along, across = numbers
         numbers = (across, across, along) if top.kind == "oblate" else (along, across, across)
     if len(numbers) not in (3, 6):
         raise ValueError(
-            f"{text!r}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc, or parallel,perpendicular of a linear or symmetric top"
+            f"{text!r}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc, or parallel,perpendicular for a linear or symmetric top"
         )
     aa, bb, cc, ab, ac, bc = [*numbers, 0.0, 0.0, 0.0][:6]
     return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
@@ -353,17 +351,17 @@ def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
     tensor = np.zeros((3, 3))
     axis = 2 if top.kind == "oblate" else 0
     tensor[axis, axis] = anisotropy
-    how = f"the anisotropy {reading.source('anisotropy')}; the mean, which turns nothing, is left out"
+    how = f"the anisotropy {reading.source('anisotropy')}; the mean, which exerts no torque, is left out"
     return top.with_polarizability(tensor, how)
 
 
 def _with_spins(top: Top, reading: Reading) -> Top:
-    inputs = reading.given
+    inputs = reading.inputs
     if inputs.spin_constants is None:
         if inputs.spins is not None:
             named = reading.named
             raise ValueError(
-                f"{named('spins')}: says how large the spins of {named('spin_constants')} are; give those too"
+                f"{named('spins')}: states the sizes of the spins in {named('spin_constants')}; give those too"
             )
         return top
     from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
@@ -381,14 +379,14 @@ def _with_spins(top: Top, reading: Reading) -> Top:
 
 
 def _with_internal_rotation(top: Top, reading: Reading) -> Top:
-    """The top with a methyl group that turns, by its geometry or by constants."""
-    text = reading.given.internal_rotation
+    """The top with internal rotation of a methyl group, from its geometry or from constants."""
+    text = reading.inputs.internal_rotation
     if text is None:
         return top
     if text.strip() in ("geometry", "scan"):
         from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 
-        engine = (reading.given.calculator or "mmff") if text.strip() == "scan" else None
+        engine = (reading.inputs.calculator or "mmff") if text.strip() == "scan" else None
         return reading.within("internal_rotation", lambda: with_internal_rotation(top, engine))
     from rotor.tops.internal_rotation import InternalRotationConstants
 
@@ -397,8 +395,8 @@ def _with_internal_rotation(top: Top, reading: Reading) -> Top:
 
 
 def _with_states(top: Top, reading: Reading) -> Top:
-    """The top with the states that are given, and what is to be said of their couplings among its notes."""
-    texts = {name: text for name in STATES if (text := getattr(reading.given, name)) is not None}
+    """The top with vibrational states; notes on their couplings are added to its notes."""
+    texts = {name: text for name in STATES if (text := getattr(reading.inputs, name)) is not None}
     if texts:
         from rotor.tops.states.state_texts import with_state_texts
 
@@ -412,31 +410,31 @@ def _with_states(top: Top, reading: Reading) -> Top:
 
 
 def refuse_weights_of_another_kind(top: Top) -> None:
-    """ValueError where the levels of lowest J show spin weights of another kind of top, or a coupling of unlike weights."""
+    """Raise ValueError if spin weights belong to another kind of top, or a coupling joins levels of different weight."""
     from rotor.quantum.solve import solve_levels
 
     solve_levels(top, 1, vectors=False)
 
 
 def with_some_dipole(top: Top, reading: Reading) -> Top:
-    """The top with an estimated dipole, noted as such, where none is known; ValueError where it cannot be estimated either."""
+    """The top, with an estimated dipole and a note if none is known; ValueError if none can be estimated."""
     from rotor.tops.estimated_dipole import with_dipole_estimate
 
     try:
         estimated = with_dipole_estimate(top)
     except ValueError as error:
-        of_input = f"{reading.named('dipole')} x,y,z (frame of the input) or " if top.frame is not None else ""
-        raise ValueError(f"{error}: give {of_input}{reading.named('dipole_abc')} a,b,c (principal axes)") from None
+        in_frame = f"{reading.named('dipole')} x,y,z (frame of the input) or " if top.frame is not None else ""
+        raise ValueError(f"{error}: give {in_frame}{reading.named('dipole_abc')} a,b,c (principal axes)") from None
     for text in estimated.notes[len(top.notes) :]:
         reading.note(text)
     return estimated
 
 
 def with_known_polarizability(top: Top, reading: Reading) -> Top:
-    """The top, whose polarizability is known; ValueError, with what to give, where it is not."""
+    """The top; ValueError, with the remedy, if its polarizability is not known."""
     if top.polarizability_abc_angstrom3 is None and top.kind != "spherical":
         raise ValueError(
             f"the polarizability is not known: give {reading.named('polarizability')} aa,bb,cc (principal axes, Å³), or "
-            "parallel,perpendicular of a linear or symmetric top"
+            "parallel,perpendicular for a linear or symmetric top"
         )
     return top

@@ -1,4 +1,4 @@
-"""`rotor molecules`: what the library holds, the user's own molecules among it."""
+"""`rotor molecules`: the molecules known by name, in the library and in the user's folders."""
 
 from __future__ import annotations
 
@@ -29,38 +29,38 @@ Examples:
 
 @dataclass(frozen=True)
 class MoleculesRequest:
-    """Which molecules are listed."""
+    """The molecules to list."""
 
-    name: str | None = declared(None, Text(), "Only this one, with all its sources", option="NAME")
+    name: str | None = declared(None, Text(), "Show this molecule only, with all its sources", option="NAME")
 
 
 @dataclass(frozen=True)
 class Molecules:
-    """A record for each molecule. alone: one that was named."""
+    """A record for each molecule. alone: whether a single molecule was named."""
 
     records: list[dict[str, Any]]
     alone: bool
 
     def facts(self) -> dict[str, Any]:
-        """Nothing beside the records."""
+        """Empty: the JSON is the list of records."""
         return {}
 
 
 def answer(request: MoleculesRequest, work: Work) -> Molecules:
-    """The records, with the symmetry of the geometries where it is shown."""
+    """The records; point groups are determined only if they are shown."""
     alone = request.name is not None
     whole = alone or "json" in work.files
     return Molecules([record(path, symmetry=whole) for path in _paths(request.name)], alone)
 
 
 def json_of(answer: Molecules, _: Any) -> str:
-    """A list with a record a line."""
+    """A list with one record on each line."""
     lines = (dumps(record, ensure_ascii=False, allow_nan=False) for record in answer.records)
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
 def show(answer: Molecules, _: Any) -> None:
-    """Print the table, or everything about one."""
+    """Print the table, or all facts of a single molecule."""
     if answer.alone:
         show_facts(_facts(answer.records[0]))
         return
@@ -69,7 +69,7 @@ def show(answer: Molecules, _: Any) -> None:
 
 
 def _paths(name: str | None) -> list[Path]:
-    """The file of one name, or every file that a name leads to, the user's own first."""
+    """The file of one name, or all files with a name, the user's first."""
     from rotor.formats.molecules.library import folders, molecule_path, names
 
     if name is not None:
@@ -79,7 +79,7 @@ def _paths(name: str | None) -> list[Path]:
 
 
 def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
-    """What a molecule file says, by the keys of docs/verbs. symmetry: whether the point group of the geometry is looked for."""
+    """The content of a molecule file, by the keys of docs/verbs. symmetry: whether to determine the point group."""
     from rotor.formats.molecules.molecule_file import read_molecule_file
 
     file = read_molecule_file(path, listed=not symmetry)
@@ -114,7 +114,7 @@ def _top_of(file: MoleculeFile) -> Top:
 
 
 def _top_of_constants(file: MoleculeFile) -> Top:
-    """The top without its geometry, whose symmetry takes longer than all else."""
+    """The top without its geometry: finding the symmetry would take most of the time."""
     from dataclasses import replace
 
     from rotor.tops.top import Top
@@ -134,7 +134,7 @@ _COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "J ≤", "K ≤",
 
 
 def _row(record: dict[str, Any]) -> list[str]:
-    """One molecule: which lines it serves and how well, what is unverified, and where its constants are from."""
+    """One molecule: the lines it serves and their error, unverified data, and the source of the constants."""
     dipole = record["dipole_abc_debye"] or [None] * 3
     serves = record["serves"] or {"j_max": None, "k_max": None, "error_mhz": None}
     source = ("own: " if record["own"] else "") + record["sources"].get(
@@ -153,7 +153,7 @@ def _row(record: dict[str, Any]) -> list[str]:
 
 
 def _tables_first(unverified: list[str]) -> list[str]:
-    """Names of tables, and of constants alone where their table is not unverified as a whole."""
+    """Names of unverified tables; single constants only where their table as a whole is verified."""
     return [name for name in unverified if name.partition(".")[0] == name or name.partition(".")[0] not in unverified]
 
 
@@ -178,7 +178,7 @@ def _facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     if (serves := record["serves"]) is not None:
         facts.append(("serves", _serves_text(serves)))
     if record["levels"]:
-        facts.append(("level table", f"{record['levels']} energies, which count instead of those of the constants"))
+        facts.append(("level table", f"{record['levels']} energies, which replace those of the constants"))
     if record["unverified"]:
         facts.append(("unverified", ", ".join(record["unverified"])))
     marks = dict.fromkeys(record["unverified"], "unverified: ")
@@ -191,17 +191,17 @@ def _serves_text(serves: dict[str, Any]) -> str:
     limits += [f"K ≤ {serves['k_max']}"] if serves["k_max"] is not None else []
     limits += [f"up to {serves['max_ghz']:g} GHz"] if serves["max_ghz"] is not None else []
     error = serves["error_mhz"]
-    known = (
+    accuracy = (
         "no catalogue was compared"
         if error is None
         else f"measured lines within {error:g} MHz and three of their errors"
     )
-    return f"{', '.join(limits)}: {known}"
+    return f"{', '.join(limits)}: {accuracy}"
 
 
 VERB = Tool(
     name="molecules",
-    about="Molecules known by name: kind, κ, dipole, and where the numbers are from.",
+    about="Molecules known by name: kind, κ, dipole, and sources of the numbers.",
     examples=EXAMPLES,
     request=MoleculesRequest,
     answer=answer,

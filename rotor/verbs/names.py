@@ -1,4 +1,4 @@
-"""Which verbs there are: the files of this folder that declare one. Nothing else is imported here."""
+"""Names of all verbs: the files of this folder that declare one. Nothing else is imported here."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 _ORDER = (
     "spectrum", "levels", "raman", "thermo", "tumble", "gas", "fluid", "stark", "zeeman", "align", "fit", "emission",
-)  # fmt: skip  # in which kinds are listed; others follow by name
+)  # fmt: skip  # order of lists; other kinds follow by name
 
 
 @cache
 def declared_verbs() -> tuple[str, ...]:
-    """The verbs that a file of this folder declares."""
+    """The verbs that files of this folder declare."""
     files = Path(__file__).parent.glob("*.py")
     names = {file.stem for file in files if "\nVERB = Verb(" in file.read_text(encoding="utf-8")}
     return tuple(sorted(names, key=lambda name: (_ORDER.index(name) if name in _ORDER else len(_ORDER), name)))
@@ -24,5 +24,5 @@ SCENE_VERBS = tuple(dict.fromkeys((*_ORDER, *declared_verbs())))  # kinds of sce
 
 
 def verb_of(name: str) -> Any:
-    """The `rotor.verbs.verb.Verb` of a name; only its module is imported."""
+    """The `rotor.verbs.verb.Verb` of this name; only its module is imported."""
     return import_module(f"rotor.verbs.{name}").VERB

@@ -1,4 +1,4 @@
-"""Options of verbs that read an observed spectrum, and what they make of them."""
+"""Options of verbs that read an observed spectrum, and the spectrum, species and sight that they describe."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PANEL = "Observed spectrum"
 
 @dataclass(frozen=True)
 class SeveralInput:
-    """Which molecules, on the command line."""
+    """The molecules on the command line."""
 
     names: tuple[str, ...] = declared(
         (), Names(), "Molecules: names, files, SMILES:..., .cat files of JPL and CDMS", option="SOURCE"
@@ -36,7 +36,7 @@ class SeveralInput:
 
 @dataclass(frozen=True)
 class SpectrumFile:
-    """What the file of a spectrum does not state, and what is done before it is used."""
+    """Facts that the file of a spectrum does not state, and corrections before its use."""
 
     rest_mhz: float | None = declared(
         None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
@@ -51,7 +51,7 @@ class SpectrumFile:
         None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE", panel=PANEL
     )
     noise: float | None = declared(
-        None, Quantity(), "Noise of a channel; estimated from line-free channels", panel=PANEL
+        None, Quantity(), "Noise of a channel; by default estimated from line-free channels", panel=PANEL
     )
     beam_arcsec: tuple[float, ...] | None = declared(
         None,
@@ -65,19 +65,22 @@ class SpectrumFile:
         panel=PANEL,
     )  # fmt: skip
     baseline: int | None = declared(None, Whole(0), "Subtract a baseline of this order", panel=PANEL)
-    row: int | None = declared(None, Whole(), "Which spectrum of a table, from 1", panel=PANEL)
+    row: int | None = declared(None, Whole(), "Number of the spectrum in a table, from 1", panel=PANEL)
     pixel: tuple[float, ...] | None = declared(
-        None, Numbers(counts=(2,), example="32,40", metavar="X,Y"), "Which spectrum of a cube, from 1", panel=PANEL
+        None,
+        Numbers(counts=(2,), example="32,40", metavar="X,Y"),
+        "Pixel of the spectrum in a cube, from 1",
+        panel=PANEL,
     )
 
     @property
     def beam(self) -> tuple[float, float] | None:
-        """Both widths of the beam."""
+        """Widths of the beam on both axes (arcsec)."""
         return None if self.beam_arcsec is None else (self.beam_arcsec[0], self.beam_arcsec[-1])
 
     @property
     def choices(self) -> Any:
-        """The settings with which a file of spectra is read."""
+        """Settings for reading a file of spectra."""
         from rotor.formats.spectra.axis import ReadChoices
 
         pixel = None if self.pixel is None else (int(self.pixel[0]), int(self.pixel[1]))
@@ -85,7 +88,7 @@ class SpectrumFile:
         return ReadChoices(**{name: getattr(self, name) for name in names}, beam_arcsec=self.beam, pixel=pixel)
 
     def read(self, file: str, range_mhz: tuple[float, float] = INFINITE) -> ObservedSpectrum:
-        """The spectrum in K, its baseline subtracted, and cut to a range."""
+        """The spectrum in K, without its baseline, cut to a range."""
         from rotor.formats.spectra.read import read_spectrum
         from rotor.observed.spectrum import in_kelvin, without_baseline
 
@@ -95,7 +98,7 @@ class SpectrumFile:
         return spectrum if self.baseline is None else without_baseline(spectrum, self.baseline)
 
     def sight(self, spectrum: ObservedSpectrum, background_k: float, redshift: float) -> Sight:
-        """What is between the source and the spectrum."""
+        """Beam, background and redshift of the line of sight."""
         from rotor.observed.model import Sight
 
         beam = spectrum.beam_arcsec or self.beam
@@ -109,9 +112,9 @@ def species_of(
     partition: str | None = None,
     note: Note = silent,
 ) -> list[SpeciesLines]:
-    """Species by words: .cat files, names of a local catalogue where one is given, else molecules of the library; one each.
+    """One species for each word: a .cat file, a name in a local catalogue if one is given, else a molecule of the library.
 
-    Raises ValueError for a word that means several species of the catalogue.
+    Raises ValueError for a word that matches several species of the catalogue, or none.
     """
     if catalogue is None:
         return [_species_of_word(word, range_mhz, partition, note) for word in words]
@@ -137,7 +140,7 @@ def species_of(
 
 
 def is_catalogue(source: Any) -> bool:
-    """Whether a source is a catalogue of lines."""
+    """Whether a source is a line catalogue (.cat)."""
     return isinstance(source, str) and source.lower().endswith((".cat", ".cat.gz"))
 
 
@@ -157,14 +160,14 @@ def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str |
 
 
 def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.0) -> tuple[float, float]:
-    """Rest frequencies whose lines may be in a spectrum: its range and what velocities may move into it."""
+    """Range of rest frequencies (MHz) whose lines may fall into a spectrum: widened by velocities up to `km_s`."""
     factor = km_s / 299792.458
     first, last = (float(spectrum.frequency_mhz[i]) * (1 + redshift) for i in (0, -1))
     return first * (1 - factor), last * (1 + factor)
 
 
 def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
-    """The spectrum as lines of a report."""
+    """The spectrum as rows of a report."""
     import numpy as np
 
     first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]

@@ -1,4 +1,4 @@
-"""The inputs of `rotor emission --over` and `--fit`, and the start of a model or a fit."""
+"""Inputs of `rotor emission --over` and `--fit`, and the start of a model or a fit."""
 
 from __future__ import annotations
 
@@ -27,43 +27,39 @@ FREE = {
 }
 
 
-OF_FIT = ("free", "shared", "sample", "calibration", "reject")
+FIT_OPTIONS = ("free", "shared", "sample", "calibration", "reject")
 
 
 def layer_field(name: str) -> Any:
-    """A field of the gas of a source, None where it is not typed: a fit estimates it."""
+    """A field of the emitting gas, None if not typed: a fit then estimates it."""
     field = declared_fields(LayerInput)[name]
     return declared(None, field.reader, field.help, field.key, option=field.option, panel=field.panel)
 
 
 @dataclass(frozen=True)
 class ObservedRequest:
-    """What is laid over a spectrum or fitted to it."""
+    """Inputs of a model over a spectrum, or of its fit."""
 
     sources: SeveralInput = part(SeveralInput, identical, identical, SeveralInput())
     over: str | None = declared(
-        None, Text(metavar="FILE"), "Observed spectrum (FITS, text) under the model", panel=PANEL
+        None, Text(metavar="FILE"), "Observed spectrum (FITS, text) to compare with the model", panel=PANEL
     )
-    fit: str | None = declared(
-        None, Text(metavar="FILE"), "Observed spectrum to which the source is fitted", panel=PANEL
-    )
+    fit: str | None = declared(None, Text(metavar="FILE"), "Observed spectrum to fit", panel=PANEL)
     catalogue: str | None = declared(
-        None, Text(metavar="FILE"), "Local catalogue that SOURCE names species of", panel=PANEL
+        None, Text(metavar="FILE"), "Local catalogue with the species that SOURCE names", panel=PANEL
     )
     free: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Fitted of column, excitation, velocity, width, size", panel=PANEL
+        (), NameList(tuple(FREE)), "Fitted parameters: column, excitation, velocity, width, size", panel=PANEL
     )
     shared: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Fitted alike for all species: velocity,width", panel=PANEL
+        (), NameList(tuple(FREE)), "Parameters with one value for all species: velocity,width", panel=PANEL
     )
-    calibration: float = declared(
-        0.0, Quantity(least=0, most=1), "Error of the intensity scale, a fraction", panel=PANEL
-    )
+    calibration: float = declared(0.0, Quantity(least=0, most=1), "Relative error of the intensity scale", panel=PANEL)
     reject: float | None = declared(
         None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL
     )
     mask: str | None = declared(
-        None, Text(metavar="FILE"), "Pixels of --maps: FITS, not 0; without, those with a channel above 5 standard deviations",
+        None, Text(metavar="FILE"), "Pixels of --maps: FITS, nonzero where fitted; by default those above 5 standard deviations",
         panel=PANEL,
     )  # fmt: skip
     sample: int = declared(0, Whole(0), "Steps of emcee after the fit (extra sampling)", panel=PANEL)
@@ -81,17 +77,15 @@ class ObservedRequest:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The molecules, as they are named."""
+        """The molecules as the user named them."""
         return self.sources.names
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.over is not None and self.fit is not None:
-            raise ValueError(
-                "--over, --fit: both name a spectrum; expected one of them (a fit is laid over its spectrum)"
-            )
+            raise ValueError("--over, --fit: both name a spectrum; give one of them (a fit also shows the model)")
         declared_here, file = declared_fields(ObservedRequest), all_fields(SpectrumFile).values()
-        named = [declared_here[name].flag for name in OF_FIT if getattr(self, name) != declared_here[name].default]
+        named = [declared_here[name].flag for name in FIT_OPTIONS if getattr(self, name) != declared_here[name].default]
         if named and self.fit is None:
             raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
         named = [field.flag for field in file if getattr(self.spectrum, field.name) != field.default]
@@ -104,7 +98,7 @@ class ObservedRequest:
 
 
 def sight_of(spectrum: ObservedSpectrum, request: ObservedRequest) -> Sight:
-    """Beam, background and redshift."""
+    """Beam, background and redshift of the request."""
     background = request.background_k
     if background is None:
         background = declared_fields(LayerInput)["background_k"].default
@@ -112,19 +106,19 @@ def sight_of(spectrum: ObservedSpectrum, request: ObservedRequest) -> Sight:
 
 
 def species_in(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -> list[SpeciesLines]:
-    """The species that are named, with their lines in a range."""
+    """The named species, with their lines in the range of the spectrum."""
     reach = padded(spectrum, request.redshift or 0.0)
     species = species_of(request.names, request.catalogue, reach, request.sources.partition, note)
-    for each in species:
-        if "note" in each.identity:
-            note(f"{each.name}: {each.identity['note']}")
+    for lines in species:
+        if "note" in lines.identity:
+            note(f"{lines.name}: {lines.identity['note']}")
     return species
 
 
 def components_of(
     spectrum: ObservedSpectrum, species: Sequence[SpeciesLines], sight: Sight, request: ObservedRequest
 ) -> list[Component]:
-    """Of the options, where they were typed; of a fit the rest is estimated from the spectrum."""
+    """Components from the typed options; for a fit, the rest is estimated from the spectrum."""
     from dataclasses import replace
 
     from rotor.observed.model import Component
@@ -134,9 +128,9 @@ def components_of(
     typed = {name: _each(name, request, count) for name in FREE.values() if name != "size_arcsec"}
     if request.fit is None:
         defaults = {name: declared_fields(LayerInput)[name].default * count for name in typed}
-        values = {name: each or defaults[name] for name, each in typed.items()}
-        rows: list[dict[str, Any]] = [{name: each[k] for name, each in values.items()} for k in range(count)]
-        return [Component(each, **row, size_arcsec=size) for each, row in zip(species, rows, strict=True)]
+        values = {name: numbers or defaults[name] for name, numbers in typed.items()}
+        rows: list[dict[str, Any]] = [{name: numbers[k] for name, numbers in values.items()} for k in range(count)]
+        return [Component(lines, **row, size_arcsec=size) for lines, row in zip(species, rows, strict=True)]
     first = {name: (values[0] if values else None) for name, values in typed.items()}
     del first["column_per_cm2"]
     start = start_components(spectrum, species, sight, **first, size_arcsec=size)
@@ -154,7 +148,7 @@ def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] 
 
 
 def fit_choices(request: ObservedRequest) -> FitChoices:
-    """What is fitted."""
+    """Free and shared parameters, and the calibration error, of a fit."""
     from rotor.observed.fit import FitChoices
     from rotor.observed.variables import DEFAULT_FREE
 

@@ -1,4 +1,4 @@
-"""`rotor spectrum --over FILE`: lines of known constants over a measured spectrum, and what its intensities tell."""
+"""`rotor spectrum --over FILE`: predicted lines over a measured spectrum, and a fit of their intensities."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
     from rotor.verbs.verb import Report
 
-MADE = "over"
+CACHE_KEY = "over"
 
 
 class Comparison:
-    """The lines inside the band of a spectrum, its peaks, and the fit of their intensities; `why` says why there is none."""
+    """Lines inside the band of a spectrum, its peaks, and the fit of intensities; `why` is the reason if there is no fit."""
 
     def __init__(self, lines: Lines, path: str) -> None:
         from rotor.assignment.intensities import fit_intensities
@@ -37,24 +37,24 @@ class Comparison:
 
     @property
     def heights(self) -> Any:
-        """Heights of the lines in the units of the peaks: those fitted, else the strongest as high as the highest peak."""
+        """Heights of the lines in units of the peaks: from the fit, else scaled to the highest peak."""
         if self.fit is not None:
             return self.fit.heights(self.lines)
         intensity = self.lines.intensity_nm2_mhz
         return intensity / intensity.max() * self.peaks.intensity.max()
 
     def facts(self) -> dict[str, Any]:
-        """For the JSON."""
+        """Counts and fit, by the keys of docs/verbs."""
         low, high = self.peaks.band_mhz
         out: dict[str, Any] = {"peaks": len(self.peaks), "band_mhz": [low, high], "lines": len(self.lines)}
         if self.fit is None:
             return out | {"fit": None, "reason": self.why}
-        known = math.isfinite(self.fit.temperature_k)
+        determined = math.isfinite(self.fit.temperature_k)
         return out | {
             "fit": {
                 "lines": len(self.fit.line),
-                "temperature_k": self.fit.temperature_k if known else None,
-                "temperature_error_k": self.fit.temperature_error_k if known else None,
+                "temperature_k": self.fit.temperature_k if determined else None,
+                "temperature_error_k": self.fit.temperature_error_k if determined else None,
                 "dipole_ratio": self.fit.dipole_ratio.tolist(),
                 "scatter": self.fit.scatter,
             }
@@ -62,7 +62,7 @@ class Comparison:
 
 
 def over_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Rows of the report."""
+    """Rows of the report on a comparison."""
     band = " to ".join(f"{end:g}" for end in record["band_mhz"])
     rows = [("over", f"{record['peaks']} peaks from {band} MHz; {record['lines']} lines in this band")]
     fit = record["fit"]
@@ -70,7 +70,7 @@ def over_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         return [*rows, ("intensities", record["reason"])]
     a, b, c = fit["dipole_ratio"]
     temperature = (
-        "they tell no temperature"
+        "no temperature determined"
         if fit["temperature_k"] is None
         else f"{fit['temperature_k']:.2f} ± {fit['temperature_error_k']:.2f} K"
     )
@@ -80,14 +80,14 @@ def over_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def compared(answer: Any, report: Report) -> Comparison:
     """The comparison, made once for all files of a report."""
-    if MADE not in report.made:
-        report.made[MADE] = Comparison(answer.lines, report.shown.over)
-    made: Comparison = report.made[MADE]
-    return made
+    if CACHE_KEY not in report.cache:
+        report.cache[CACHE_KEY] = Comparison(answer.lines, report.shown.over)
+    comparison: Comparison = report.cache[CACHE_KEY]
+    return comparison
 
 
 def drawing(name: str) -> Callable[[Any, Path, Report], None]:
-    """The writer of a picture of `rotor.plots.over`."""
+    """Function that draws a picture of `rotor.plots.over`."""
 
     def draw(answer: Any, path: Path, report: Report) -> None:
         from rotor.plots import over

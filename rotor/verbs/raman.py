@@ -1,4 +1,4 @@
-"""`raman`: rotational Raman lines of a molecule."""
+"""`raman`: rotational Raman lines."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ Examples:
 
 @dataclass(frozen=True)
 class RamanShown(Shown):
-    """How much is shown."""
+    """Display options of `raman`."""
 
-    top_lines: int = declared(20, Whole(0), "How many of the strongest lines are shown", option="--top", panel=OUTPUT)
+    top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
 
 
 def draw(answer: RamanAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw the lines."""
     from rotor.plots.raman import plot_raman
 
     plot_raman(answer.lines, path, view=report.view, provenance=report.command)
 
 
 def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
-    """The rows of the strongest lines."""
+    """Rows of the strongest lines, for the JSON."""
     return {"strongest": answer.strongest(shown.top_lines)}
 
 
@@ -90,7 +90,7 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     selected = lines.where(rows)
     names = quanta.headings(lines.quanta_names)
     columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
-    wavenumber = "{:.6f}" if "f" in lines.quanta_names else "{:.4f}"  # spins move levels by some 1e-5 cm⁻¹
+    wavenumber = "{:.6f}" if "f" in lines.quanta_names else "{:.4f}"  # hyperfine shifts are about 1e-5 cm⁻¹
     formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, selected.columns.values(), strict=False)]
     labels = [selected.levels.labels(states) for states in (selected.initial, selected.final)]

@@ -1,4 +1,4 @@
-"""The tables of a verb's scene, from its declaration."""
+"""Tables of a verb's scene, made from its declaration."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ ORDER = (
     "observables",
     "vibration",
     "numerics",
-)  # of tables
+)  # order of the tables
 
 
 def keyed(verb: Verb) -> dict[str, Field]:
-    """The inputs of a verb that stand in a scene, by dotted key."""
+    """The inputs of a verb that a scene may hold, by dotted key."""
     return {field.key: field for field in verb.fields.values() if field.key}
 
 
 def entries_before(verb: Verb) -> list[Any]:
-    """Name, type and default of the keys of a scene that stand in no table: what is computed of, and lists of tables."""
+    """Name, type and default of scene keys outside tables: the subject, and lists of tables."""
     entries: list[Any] = []
     for name, type_, default in verb.subject.scene_fields():
         entries.append((name, type_) if default is NODEFAULT else (name, type_, default))

@@ -1,4 +1,4 @@
-"""`spectrum`: the rotational lines of a molecule."""
+"""`spectrum`: rotational lines of a molecule."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, o
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
 
-MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
+MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
 _FILE_ALONE = {"as_spcat": "--as-spcat", "full_basis": "--full-basis"}
 
@@ -48,20 +48,20 @@ def _hitran_numbers(raw: Any) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class SpectrumShown(Shown):
-    """What is shown of the lines, and how files are written."""
+    """Display options of `spectrum`, and options of its files."""
 
     resolution: float | None = declared(
-        None, Quantity("MHz", above=0, metavar="D"), "Show components of one rotational line that are closer (MHz) as one line",
+        None, Quantity("MHz", above=0, metavar="D"), "Show components of a rotational line closer than this (MHz) as one line",
         option="--resolution", panel=OBSERVABLES,
     )  # fmt: skip
     as_spcat: bool = declared(
-        False, Flag(), "Of an .int file: SPCAT's own numbers also where the program errs (notes say where)", option="--as-spcat",
+        False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)", option="--as-spcat",
         panel=OBSERVABLES,
     )  # fmt: skip
     full_basis: bool = declared(
         False,
         Flag(),
-        "Of an .int file: every K is in the basis, whatever KNMIN and KNMAX say",
+        "For an .int file: every K in the basis, ignoring KNMIN and KNMAX",
         option="--full-basis",
         panel=OBSERVABLES,
     )
@@ -69,7 +69,7 @@ class SpectrumShown(Shown):
         None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (.csv, .npy, FITS): --plot draws both",
         option="--over", panel=OBSERVABLES,
     )  # fmt: skip
-    top_lines: int = declared(20, Whole(0), "How many of the strongest lines are shown", option="--top", panel=OUTPUT)
+    top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
     hitran_id: tuple[int, int] | None = declared(
         None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1", option="--hitran-id",
@@ -78,10 +78,10 @@ class SpectrumShown(Shown):
 
 
 class MoleculeOrFile(OneMolecule):
-    """A molecule with its dipole, or an .int file, which makes the request itself."""
+    """A molecule with its dipole, or an .int file, which states the request itself."""
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The top of the molecule, or the prediction of the file."""
+        """The top of a molecule, or the prediction of an .int file."""
         shown, source = read_instance(SpectrumShown, entries), entries.values.get("molecule.source")
         basis = {name: getattr(shown, name) for name in _FILE_ALONE}
         if not int_files.is_int_file(source):
@@ -99,16 +99,16 @@ class MoleculeOrFile(OneMolecule):
         return Subject({"prediction": prediction, "source": path, **basis}, (), str(source), place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The inputs of the molecule; an .int file is refused."""
+        """The inputs of the molecule; an .int file cannot be saved in a scene."""
         if not subject.molecules:
             raise ValueError(
-                "--save-scene: an .int file and the constants beside it say all themselves; a scene holds none"
+                "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
             )
         return super().saved(request, subject, folder)
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> SpectrumRequest:
-    """The request: of the inputs, or of the files of SPCAT with a shape of the lines."""
+    """The request from the inputs, or from SPCAT's files and a line shape."""
     values = read_fields(SpectrumRequest, entries, subject)
     if subject.molecules:
         return SpectrumRequest(**subject.values, **values)
@@ -118,20 +118,20 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> SpectrumRequest:
 
 
 def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Entries) -> SpectrumRequest:
-    """HITRAN's temperature where its records are asked for and none is given."""
+    """Use HITRAN's temperature for HITRAN records if none is given."""
     if "hitran" in outputs and entries.values.get("conditions.temperature") is None:
         return replace(request, temperature_k=HITRAN_K)
     return request
 
 
 def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumShown) -> None:
-    """ValueError for a profile without a file, a file without a profile, and what belongs to other files."""
+    """Refuse files whose inputs are missing, and inputs whose files are missing, before anything is computed."""
     if ("hitran" in outputs) != (shown.hitran_id is not None):
         raise ValueError(
             "--hitran and --hitran-id: give both; the second has HITRAN's number of the molecule, such as 5 or 5:1 of CO"
         )
     if "hitran" in outputs and request.temperature_k != HITRAN_K:
-        raise ValueError("--hitran: its intensities are those at 296 K; leave --temperature out, or give 296")
+        raise ValueError("--hitran: its intensities are at 296 K; leave --temperature out, or give 296")
     if "egy" in outputs and not isinstance(request, int_files.PredictedRequest):
         raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
     if "loomis_wood" in outputs and shown.over is None:
@@ -139,7 +139,7 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
     if shown.over is not None:
         from rotor.formats.peak_files import read_peaks
 
-        read_peaks(shown.over)  # a mistake in it shows before anything is computed
+        read_peaks(shown.over)  # raises errors in the file before anything is computed
     shaped = request.profile not in (None, "sticks") or request.fwhm_mhz is not None
     if "profile_csv" in outputs and not (shaped or request.layer):
         raise ValueError(
@@ -147,21 +147,21 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
         )
     if shaped and not (request.layer or {"profile_csv", "plot"} & outputs.keys()):
         what = request.profile or "gaussian"
-        raise ValueError(f"a {what} profile was asked for, but no file for it; add --plot or --profile-csv")
+        raise ValueError(f"a {what} profile needs a file; add --plot or --profile-csv")
     if not isinstance(request, int_files.PredictedRequest):
         refuse_long_json(request, outputs, shown.resolution)
 
 
 def content(answer: SpectrumAnswer, shown: SpectrumShown) -> Mapping[str, Any]:
-    """Rows of the strongest lines, and patterns at a resolution."""
+    """Rows of the strongest lines, patterns at a resolution and the comparison with a spectrum, for the JSON."""
     resolution = shown.resolution
     patterns = None if resolution is None else pattern_records(answer.lines, resolution, shown.top_lines)
-    known = {"strongest": answer.strongest(shown.top_lines), "patterns": patterns}
-    return known if shown.over is None else known | {"over": Comparison(answer.lines, shown.over).facts()}
+    record = {"strongest": answer.strongest(shown.top_lines), "patterns": patterns}
+    return record if shown.over is None else record | {"over": Comparison(answer.lines, shown.over).facts()}
 
 
 def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The lines in the format of the suffix, with the numbers that it asks for."""
+    """Write the lines in the format of the file's suffix."""
     from rotor.formats import write
 
     if isinstance(answer, LongAnswer):
@@ -174,26 +174,26 @@ def write_table(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 
 def tag_of(answer: SpectrumAnswer, shown: SpectrumShown) -> int:
-    """The tag of the species: of the .int file, or as given."""
+    """The tag of the species: from the .int file, or as given."""
     request = answer.request
     return int(request.prediction.request.tag) if isinstance(request, int_files.PredictedRequest) else shown.tag
 
 
 def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The catalogue, as SPCAT lists it where its files were read."""
+    """Write the catalogue; a prediction of SPCAT's files is written as SPCAT lists it."""
     predicted = isinstance(answer.request, int_files.PredictedRequest)
     (int_files.write_catalogue if predicted else write_table)(answer, path, report)
 
 
 def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw the lines or their profile."""
     if report.shown.over is not None:
         draw_over(answer, path, report)
         return
     from rotor.plots.spectrum import plot_spectrum
 
-    thing = answer.lines if answer.request.shape == "sticks" else answer.spectrum
-    plot_spectrum(thing, path, provenance=report.command, **report.view)
+    drawn = answer.lines if answer.request.shape == "sticks" else answer.spectrum
+    plot_spectrum(drawn, path, provenance=report.command, **report.view)
 
 
 def show(answer: SpectrumAnswer, report: Report) -> None:
@@ -206,7 +206,7 @@ def show(answer: SpectrumAnswer, report: Report) -> None:
     )
     show_facts(_facts(answer, record))
     if len(lines) == 0:
-        print(f"\nno lines: {_why_none(answer, report.given)}")
+        print(f"\nno lines: {_why_none(answer, report.entries)}")
     elif record["patterns"] is not None:
         from rotor.quantum.quanta import headings, of_rotation
 
@@ -272,7 +272,7 @@ def _count_text(answer: SpectrumAnswer, count: int) -> str:
 
 
 def answer_of(request: SpectrumRequest, work: Work) -> SpectrumAnswer:
-    """The lines of a request, or of the prediction that made it; on disk where memory may not hold them."""
+    """The lines of a request or of SPCAT's files; long lists are sorted on disk."""
     predicted, executor = isinstance(request, int_files.PredictedRequest), work.executor
     if not predicted and is_long(request, work.files, getattr(work.shown, "resolution", None)):
         return answer_long(request, work.files, getattr(work.shown, "top_lines", 0), work.progress)
@@ -285,7 +285,7 @@ def answer_of(request: SpectrumRequest, work: Work) -> SpectrumAnswer:
 
 VERB = Verb(
     name="spectrum",
-    about="Rotational lines of a molecule: frequencies, intensities, and what they were made from.",
+    about="Rotational lines of a molecule: frequencies, intensities, and the data behind them.",
     examples=EXAMPLES,
     request=SpectrumRequest,
     answer=answer_of,
@@ -309,7 +309,7 @@ VERB = Verb(
         Output(
             "egy",
             (".egy",),
-            "Of an .int file: write its levels as SPCAT's list (.egy)",
+            "For an .int file: write its levels as SPCAT's list (.egy)",
             int_files.write_levels,
             scene=False,
         ),

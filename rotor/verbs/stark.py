@@ -39,7 +39,7 @@ Examples:
 
 _LINES = frozenset({"lines", "lobes", "coefficients"})
 _POPULATED = frozenset({"lines", "lobes", "spectrum", "mixture"})
-# which files each field of a sample changes
+# files that each field of a sample changes
 OUTPUTS_OF_SAMPLE = {
     "light": frozenset({"lines", "lobes", "spectrum"}),
     "line": _LINES,
@@ -50,48 +50,48 @@ OUTPUTS_OF_SAMPLE = {
 
 @dataclass(frozen=True)
 class StarkShown(FieldSample, Shown):
-    """What lines, spectra and mixtures are of."""
+    """Sample for lines, spectra and mixtures, and display options of `stark`."""
 
 
 def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
-    """The top with its dipole and, where light acts, its polarizability."""
+    """The top with its dipole and, for laser light, its polarizability."""
     top = with_some_dipole(top, reading)
     return with_known_polarizability(top, reading) if entries.values.get("conditions.intensity") else top
 
 
 def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
-    """ValueError for a picture of a single field, and for what nothing that is written depends on."""
+    """Refuse a picture of a single field, and inputs that no requested file depends on."""
     if "plot" in outputs and len(request.fields_kv_per_cm) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
     for name, field in declared_fields(FieldSample).items():
         files = OUTPUTS_OF_SAMPLE[name]
         if getattr(shown, name) != field.default and not files & set(outputs):
             names = " or ".join(f"--{file}" for file in sorted(files))
-            raise ValueError(f"{field.option}: changes nothing of the map itself; give {names} beside it")
+            raise ValueError(f"{field.option}: does not change the map itself; expected with {names}")
 
 
 def _further(name: str) -> Writer:
-    """What writes a table that is made from the map."""
+    """Function that writes a table derived from the map."""
 
     def write_table(answer: StarkAnswer, path: Path, report: Report) -> None:
-        """The table as a file."""
+        """Write the table."""
         from rotor.formats import write
 
-        write(_made(name, answer, report), path, settings=dict(report.provenance))
+        write(_derived_table(name, answer, report), path, settings=dict(report.provenance))
 
     return write_table
 
 
-def _made(name: str, answer: StarkAnswer, report: Report) -> Any:
-    """A further table, made once for all files that need it."""
-    if name not in report.made:
+def _derived_table(name: str, answer: StarkAnswer, report: Report) -> Any:
+    """A table derived from the map, computed once for all files that need it."""
+    if name not in report.cache:
         sample = {field.name: getattr(report.shown, field.name) for field in fields(FieldSample)}
-        report.made[name] = MAKERS[name](FieldRequest(answer.request, **sample), answer.states, report.executor)
-    return report.made[name]
+        report.cache[name] = MAKERS[name](FieldRequest(answer.request, **sample), answer.states, report.executor)
+    return report.cache[name]
 
 
 def draw(answer: StarkAnswer, path: Path, report: Report) -> None:
-    """The picture of the map as a file."""
+    """Draw the map."""
     from rotor.plots.picture import name_of_top
     from rotor.plots.stark import plot_stark
 
@@ -100,11 +100,14 @@ def draw(answer: StarkAnswer, path: Path, report: Report) -> None:
 
 
 def draw_lines(answer: StarkAnswer, path: Path, report: Report) -> None:
-    """The picture of the lines against the field as a file."""
+    """Draw the lines against the field."""
     from rotor.plots.stark import plot_lobes
 
     plot_lobes(
-        _made("lines", answer, report), path, title=report.content["name"] or "", provenance=dict(report.provenance)
+        _derived_table("lines", answer, report),
+        path,
+        title=report.content["name"] or "",
+        provenance=dict(report.provenance),
     )
 
 
@@ -119,7 +122,7 @@ def show(answer: StarkAnswer, report: Report) -> None:
 
 
 def _table(states: FieldMap, mixed: bool) -> Table:
-    """The first states, by M and block; M has a sign where three components of the dipole act."""
+    """The first states, by M and block; M is signed if all three components of the dipole act."""
     first, last = states.fields[0], states.fields[-1]
 
     def row(rows: slice) -> list[str]:
@@ -162,7 +165,7 @@ def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
 _CSV = (".csv",)
 VERB = Verb(
     name="stark",
-    about="Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures.",
+    about="Levels in a static electric field: energies, labels, effective dipoles and cosines for all M; lines and mixtures.",
     examples=EXAMPLES,
     request=StarkRequest,
     answer=lambda request, work: answer_stark(request, work.executor),

@@ -1,4 +1,4 @@
-"""`structure`: bond lengths and angles from the constants, or the measured lines, of isotopologues."""
+"""`structure`: bond lengths and angles from constants or measured lines of isotopologues."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ Examples:
   rotor structure h2co.toml --method rs,r0 --leave-out c --plot h2co.png
   rotor structure water.toml --method re --xyz water_re.xyz"""
 
-ROUND_OFF = 1e-9  # of a value: an error below it means that symmetry fixes the value
+ROUND_OFF = 1e-9  # relative error below which symmetry fixes a value
 
 
 @dataclass(frozen=True)
 class FamilyInput:
-    """Which family."""
+    """The family of isotopologues."""
 
     source: Any = declared(
         None,
@@ -61,12 +61,12 @@ class FamilyInput:
 
 
 class Isotopologues(SubjectKind):
-    """The isotopologues of a file."""
+    """A family of isotopologues from a file."""
 
     fields = all_fields(FamilyInput)
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The family that the file has."""
+        """Read the family."""
         inputs: FamilyInput = read_instance(FamilyInput, entries)
         if inputs.source is None:
             raise ValueError("FAMILY is missing; expected a family of isotopologues (.toml)")
@@ -74,16 +74,16 @@ class Isotopologues(SubjectKind):
             return Subject({"file": FamilyFile(inputs.source, (), (), {})}, (inputs,), inputs.source.name, place.note)
         if not os.fspath(inputs.source).lower().endswith(".toml"):
             raise ValueError(
-                f"{inputs.source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
+                f"{inputs.source}: a family of isotopologues is a .toml file; docs/structure.md describes it"
             )
         return Subject(
             {"file": read_family(str(Path(place.folder) / inputs.source))}, (inputs,), str(inputs.source), place.note
         )
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The file, counted from the folder of the scene."""
+        """The file, relative to the folder of the scene."""
         if isinstance(subject.molecules[0].source, Family):
-            raise ValueError("a scene holds no family itself; give a file")
+            raise ValueError("a scene cannot hold a family; give a file")
         return {key: beside(value, folder) for key, value in written_fields(subject.molecules[0]).items()}
 
 
@@ -95,7 +95,7 @@ def _geometry(answer: StructureAnswer) -> Any:
 
 
 def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
-    """The geometry as a file."""
+    """Write the geometry as .xyz."""
     molecule, _, method = _geometry(answer)
     positions = (molecule.positions_angstrom.round(8) + 0.0).tolist()
     rows = [f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}" for s, (x, y, z) in zip(molecule.symbols, positions, strict=True)]
@@ -104,7 +104,7 @@ def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
 
 
 def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw the molecule with its bonds."""
     from rotor.plots.picture import name_text
     from rotor.plots.structure import plot_structure
 
@@ -114,13 +114,13 @@ def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
 
 
 def failure(answer: StructureAnswer) -> str:
-    """Which method has not converged."""
-    bad = [fit for fit in answer.fitted if not fit.minimum.converged]
-    return f"{bad[0].method} has not converged: {bad[0].minimum.reason}" if bad else ""
+    """Reason why a method has no result; empty if all converged."""
+    unconverged = [fit for fit in answer.fitted if not fit.minimum.converged]
+    return f"{unconverged[0].method} has not converged: {unconverged[0].minimum.reason}" if unconverged else ""
 
 
 def show(answer: StructureAnswer, report: Report) -> None:
-    """Print the values of each method."""
+    """Print planar moments, coordinates and the values of each method."""
     family = answer.request.file.family
     print(f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top")
     if answer.planar:
@@ -181,7 +181,7 @@ def _coordinates_table(structure: SubstitutionStructure) -> Table:
 
 
 def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry: bool) -> str:
-    """A coordinate with its error in the last digits; imaginary ones as i·|r|, 0 where symmetry makes it so."""
+    """A coordinate with its error in the last digits; i·|r| if it is imaginary, 0 if symmetry requires it."""
     if zero_by_symmetry:
         return "0"
     return f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{value:.5f}({round(error * 1e5)})"
@@ -202,7 +202,7 @@ def _value_text(value: float, error: float) -> str:
 
 VERB = Verb(
     name="structure",
-    about="Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re).",
+    about="Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), at equilibrium (re).",
     examples=EXAMPLES,
     request=StructureRequest,
     answer=lambda request, work: answer_structure(request),

@@ -1,4 +1,4 @@
-"""What verbs compute of: a molecule that is read from its inputs."""
+"""Subjects of verbs: a molecule read from its inputs."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ FILES = ("source", "hessian")  # inputs of a molecule that may name a file
 
 
 def unprepared(top: Top, reading: Reading, entries: Entries) -> Top:
-    """The top as it was read."""
+    """The top unchanged."""
     return top
 
 
 @dataclass(frozen=True)
 class OneMolecule(SubjectKind):
-    """A molecule. without: inputs that the verb has no option for. prepare: what the verb needs of the top."""
+    """A molecule. without: inputs for which the verb has no option. prepare: adds to the top what the verb needs."""
 
     without: tuple[str, ...] = ()
     prepare: Callable[[Top, Reading, Entries], Top] = unprepared
 
-    fields = {one.identity: one for one in FIELDS.values()}  # noqa: RUF012
+    fields = {field.identity: field for field in FIELDS.values()}  # noqa: RUF012
 
     @property
     def options(self) -> Mapping[str, Field]:
-        """The inputs of a molecule that the verb has options for."""
+        """The inputs of a molecule for which the verb has options."""
         return {field.identity: field for name, field in FIELDS.items() if name not in self.without}
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The top of the molecule that was given."""
+        """Read the molecule and prepare its top."""
         molecule = read_molecule(entries)
         reading = Reading(molecule, entries.style, place.folder, place.note)
         top = self.prepare(top_of(reading), reading, entries)
@@ -53,11 +53,11 @@ class OneMolecule(SubjectKind):
         return [("molecule", _molecule_type(), NODEFAULT)]
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables, a name alone being the source."""
+        """The tables of a scene; a plain name of a molecule is its source."""
         return with_molecule_table(content)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The inputs of the molecule, files counted from the folder of the scene."""
+        """The inputs of the molecule, with files relative to the folder of the scene."""
         return saved_molecule(subject.molecules[0], folder)
 
 
@@ -67,52 +67,52 @@ def top_of_word(
     isotopes: Sequence[str] = (),
     prepare: Callable[[Top, Reading], Top] = lambda top, reading: top,
 ) -> Top:
-    """The top of a source on the command line; note: takes remarks."""
+    """The top of a source on the command line. note: takes remarks."""
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
     reading = Reading(read_molecule(Entries(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
 
 
 def with_molecule_table(content: dict[str, Any]) -> dict[str, Any]:
-    """The tables of a scene, a molecule that is a name alone being the source of its table."""
+    """The tables of a scene; a plain name of a molecule becomes the source of its table."""
     molecule = content.get("molecule")
     return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
 
 
 def _molecule_type() -> Any:
-    from rotor.verbs.tables import said
+    from rotor.verbs.tables import described
 
-    return Annotated[str | molecule_section(), said("a name, a file, SMILES:..., or a table")]
+    return Annotated[str | molecule_section(), described("a name, a file, SMILES:..., or a table")]
 
 
 def optional_molecule(about: str) -> tuple[str, Any, Any]:
-    """Name, type and default of the key `molecule` of scenes that may have none."""
-    from rotor.verbs.tables import said
+    """Name, type and default of the key `molecule` in scenes that need none."""
+    from rotor.verbs.tables import described
 
-    return "molecule", Annotated[str | molecule_section() | None, said(about, "water")], None
+    return "molecule", Annotated[str | molecule_section() | None, described(about, "water")], None
 
 
 def molecule_section() -> Any:
-    """The structure of a table of a molecule."""
+    """The structure of the table [molecule]."""
     from rotor.verbs.tables import section_class
 
     return section_class("molecule", tuple(FIELDS.values()))
 
 
 def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
-    """The inputs of a molecule by dotted key, files counted from a folder.
+    """The inputs of a molecule by dotted key, with files relative to the folder.
 
-    Raises ValueError for what no scene holds.
+    Raises ValueError for sources that a scene cannot hold.
     """
     if molecule.source == "-":
-        raise ValueError("--save-scene: the molecule came from standard input, which a scene has not; give a file")
+        raise ValueError("--save-scene: the molecule came from standard input, which a scene cannot read; give a file")
     if molecule.source is not None and not isinstance(molecule.source, str):
         raise ValueError(
-            f"a scene holds no {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
+            f"a scene cannot hold a {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
         )
     if molecule.source is not None and molecule.source.endswith(".int"):
         raise ValueError(
-            "--save-scene: an .int file and the constants beside it say all themselves; a scene holds none"
+            "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
         )
     content = written_fields(molecule)
     for name in FILES:
@@ -125,5 +125,5 @@ def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
 
 
 def beside(name: str, folder: Path) -> str:
-    """A file as it is counted from a folder; other words stay."""
+    """Path of a file relative to a folder; other words unchanged."""
     return os.path.relpath(name, folder) if Path(name).is_file() else name

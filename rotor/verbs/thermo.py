@@ -1,4 +1,4 @@
-"""`thermo`: partition function, energy, entropy and heat capacity of rotation, and of the ideal gas."""
+"""`thermo`: partition function, energy, entropy and heat capacity of rotation and of the ideal gas."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ Examples:
 
 
 def answer(request: ThermoRequest, work: Work) -> ThermoAnswer:
-    """The functions, with a line on a terminal while levels are summed."""
+    """The functions, with a progress line on a terminal while levels are summed."""
     return answer_thermo(request, sum_progress() if work.progress else None)
 
 
 def draw(answer: ThermoAnswer, path: Path, report: Report) -> None:
-    """The picture of the heat capacity as a file."""
+    """Draw the heat capacity."""
     from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
     from rotor.plots.picture import name_of_top
 
@@ -50,7 +50,7 @@ def draw(answer: ThermoAnswer, path: Path, report: Report) -> None:
 
 
 def show(answer: ThermoAnswer, report: Report) -> None:
-    """Print constants, conditions, and the functions by temperature."""
+    """Print constants, conditions and the functions by temperature."""
     functions, content = answer.functions, report.content
     print(top_facts.heading(functions.top))
     show_facts(_facts(functions, content))
@@ -87,7 +87,7 @@ def _facts(functions: ThermoFunctions, content: Mapping[str, Any]) -> list[tuple
 
 
 def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
-    """How many functions of spins Q counts, and where their splittings are in it."""
+    """Number of spin functions in Q, and the temperature up to which their splittings are summed."""
     if used is None:
         return []
     up_to, size = used["summed_up_to_k"], f"splittings of {used['splitting_mhz']:.2g} MHz"
@@ -97,7 +97,7 @@ def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
 
 def _onset_text(tolerance: float, above_k: float | None) -> str:
     if above_k is None:
-        return f"where it is good to {tolerance:.0%} of C_v is not known: no sum over levels reaches so far"
+        return f"the temperature above which it is good to {tolerance:.0%} of C_v is not known: no sum over levels reaches it"
     return f"good to {tolerance:.0%} of C_v above {above_k:.4g} K (rigid top, equilibrium)"
 
 
@@ -110,12 +110,12 @@ def _species_text(functions: ThermoFunctions, content: Mapping[str, Any]) -> str
     if functions.fractions:
         text += ", frozen: " + ", ".join(f"{name} {x:.4g}" for name, x in functions.fractions.items())
     others = [name for name in content["species_known"] if name != functions.species]
-    return text + (f"; there are {', '.join(others)} too" if others else "; all levels are of one species")
+    return text + (f"; also available: {', '.join(others)}" if others else "; all levels are of one species")
 
 
 def _theta_text(theta: Sequence[float]) -> str:
-    known = [f"{name} {value:.6g}" for name, value in zip("ABC", theta, strict=True) if math.isfinite(value)]
-    return ", ".join(known) + " K"
+    finite = [f"{name} {value:.6g}" for name, value in zip("ABC", theta, strict=True) if math.isfinite(value)]
+    return ", ".join(finite) + " K"
 
 
 def _rotation_table(functions: ThermoFunctions) -> Table:
@@ -132,7 +132,7 @@ def _rotation_table(functions: ThermoFunctions) -> Table:
 
 def _gas_table(functions: ThermoFunctions) -> Table:
     gas = functions.gas
-    assert gas is not None  # asked for by the caller
+    assert gas is not None  # the caller checks it
     data = (gas.cp_j_per_mol_k, gas.entropy_j_per_mol_k, gas.enthalpy_j_per_mol, gas.gibbs_j_per_mol_k)
     columns = ("T (K)", "Cp (J/mol K)", "S (J/mol K)", "H-H(0) (J/mol)", "-(G-H(0))/T (J/mol K)")
     cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in evenly(len(functions), SHOWN)]
@@ -163,7 +163,7 @@ VERB = Verb(
         Extra(
             "--gas",
             "",
-            "Functions of the ideal gas too, with translation; at 1 bar unless --pressure says otherwise",
+            "Also functions of the ideal gas, with translation; at 1 bar unless --pressure is given",
             lambda _: {"conditions.pressure": "1 bar"},
             (),
             CONDITIONS,

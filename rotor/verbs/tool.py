@@ -1,4 +1,4 @@
-"""Verbs without scenes: on files, lists, or in a browser."""
+"""Verbs without scenes: they work on files or lists, or in a browser."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from rotor.verbs.verb import NOTHING, Output, Place, Subject, SubjectKind, Verb
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Unshown:
-    """No options of printing."""
+class NoDisplayOptions:
+    """For verbs without display options."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Tool(Verb):
-    """A verb that works on files, lists or a browser: no scene says it, and what its report shows is a part of its request.
+    """A verb without scenes; its display options are fields of its request.
 
-    of: the field that is the input of the JSON and of files. text: the JSON, where it is not the facts; None: there is none.
+    of: the field that names the input, for JSON and provenance. text: JSON text if it is not the facts; None: the verb has no JSON.
     """
 
     table: Callable[[Any], Any] = lambda answer: None
     rows: str = ""
     outputs: tuple[Output, ...] = ()
     subject: SubjectKind = NOTHING
-    shown: type = Unshown
+    shown: type = NoDisplayOptions
     drawn: str | None = None
     scaled: bool = False
     sound: bool = False
@@ -37,15 +37,15 @@ class Tool(Verb):
 
     @property
     def has_json(self) -> bool:
-        """Whether there is anything for programs."""
+        """Whether the verb has JSON."""
         return self.text is not None
 
     def read(self, entries: Entries, place: Place) -> tuple[Any, Subject]:
-        """The request; its own field is the subject."""
+        """The request; its field `of` is the subject."""
         request = read_instance(self.request, entries)
         source = getattr(request, self.of, "")
         return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
 
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
-        """The facts, or what stands for them."""
+        """The JSON text."""
         return "" if self.text is None else self.text(answer, content)

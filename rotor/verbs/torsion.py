@@ -1,4 +1,4 @@
-"""`torsion`: rotation about a bond: potential, reduced moment, levels, tunnelling splittings, hindered-rotor thermodynamics."""
+"""`torsion`: rotation about a bond: potential, reduced moment, levels, tunnelling splittings, thermodynamics."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ Examples:
   rotor torsion C2H6 --bond 1-2 --potential "V3=1013 cm-1" --classical 300K
   rotor torsion butane.xyz --bond 2-3 --potential xtb --csv levels.csv --thermo-csv heat.csv"""
 
-SHOWN = 30  # levels of the report
+SHOWN = 30  # levels in the report
 
 
 def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
-    """The torsion, with a bar on a terminal while the scan is made."""
+    """The torsion, with a bar on a terminal during the scan."""
     if not work.progress:
         return answer_torsion(request)
     with progress_bar("angles of the scan") as show:
@@ -40,19 +40,19 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
 
 
 def draw(answer: TorsionAnswer, path: Path, report: Report) -> None:
-    """The picture as a file."""
+    """Draw potential, levels and wave functions."""
     from rotor.plots.torsion import plot_torsion
 
     plot_torsion(answer, path, view=report.view, provenance=report.command)
 
 
 def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
-    """The thermodynamic functions of every method."""
+    """The thermodynamic functions of all methods, for the JSON."""
     return {"functions": rows_of(answer.functions)}
 
 
 def show(answer: TorsionAnswer, report: Report) -> None:
-    """Print the potential, the reduced moment, levels, and functions by temperature."""
+    """Print potential, reduced moment, levels and functions by temperature."""
     print(top_facts.heading(answer.request.top))
     show_facts(_facts(answer, report.content))
     print()
@@ -105,9 +105,9 @@ def _classical_facts(gas: ClassicalTorsion) -> list[tuple[str, str]]:
 
 
 def write_motion(answer: TorsionAnswer, path: Path, report: Report) -> None:
-    """The classical gas at times as a file."""
+    """Write the classical gas against time."""
     if answer.classical is None:
-        raise ValueError("classical_csv: there is no classical gas; give its temperature, such as --classical 300K")
+        raise ValueError("classical_csv: expected with a classical gas: give its temperature, such as --classical 300K")
     write(answer.classical, path, settings=dict(report.provenance))
 
 
@@ -117,7 +117,7 @@ def _bond_text(answer: TorsionAnswer) -> str:
 
 
 def _terms_text(record: Mapping[str, Any]) -> str:
-    """V_n and W_n of the largest terms, cm⁻¹."""
+    """The largest terms V_n and W_n of the potential, in cm⁻¹."""
     terms = [(f"V{n}", -2 * value) for n, value in record["potential_cosines_cm"].items()]
     terms += [(f"W{n}", 2 * value) for n, value in record["potential_sines_cm"].items()]
     largest = max((abs(value) for _, value in terms), default=0.0)
@@ -168,9 +168,9 @@ VERB = Verb(
     show=show,
     outputs=(
         Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
-        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of every method as CSV", example="thermo.csv",
+        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of all methods as CSV", example="thermo.csv",
                of=lambda answer: answer.functions),
-        Output("classical_csv", (".csv",), "Write the classical gas at times as CSV", write_motion, "gas.csv"),
+        Output("classical_csv", (".csv",), "Write the classical gas against time as CSV", write_motion, "gas.csv"),
         Output("plot", PICTURES, "Draw potential, levels and wave functions (.png, .pdf, .svg)", draw, "torsion.png"),
     ),
     subject=OneMolecule(
@@ -182,7 +182,7 @@ VERB = Verb(
     notes=lambda answer: answer.warnings,
     numerics="rotor.thermodynamics.numerics:TORSION",
     accuracy="of the levels",
-    sound=False,  # a potential is read, and a scan fails, where it is made
+    sound=False,  # errors of potentials and scans arise during the calculation
     drawn="",
     start={"molecule": "C2H6", "observables.bond": "1-2"},
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`tumble`: the rotation of a molecule or of any rigid body, free or under torques, drag, drives, fields."""
+"""`tumble`: rotation of a molecule or a rigid body, free or under torques, drag, drives and fields."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rotor.arrays import Floats
 
 SHOWN = 11  # rows of the motion in the report
-SMALL = 1e-4  # of the components of a column
-FEW_TIMES = 10_000  # half a second of plain Python, as long as loading the compiler takes
+SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
+FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
 EXAMPLES = """\b
 Examples:
   rotor tumble water --plot water.png --gif water.gif
@@ -35,20 +35,20 @@ Examples:
 
 
 def answer(request: TumbleRequest | DrivenRequest) -> TumbleAnswer | DrivenAnswer:
-    """The motion: exact where it is free, else stepped."""
+    """The motion: exact if free, else integrated in steps."""
     return answer_tumble(request) if isinstance(request, TumbleRequest) else answer_driven(request)
 
 
 def is_short(request: TumbleRequest | DrivenRequest) -> bool:
-    """Whether plain Python computes the motion before the compiler of the kernels would be loaded."""
+    """Whether plain Python computes the motion faster than the compiler for the kernels can be loaded."""
     return isinstance(request, TumbleRequest) and (request.times is None or len(request.times) <= FEW_TIMES)
 
 
 def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Any) -> None:
-    """ValueError for a picture of a motion under effects, and for a film that cannot be."""
+    """Refuse pictures of a motion under effects, and a film without two times or without its program."""
     for name in ("plot", "gif"):
         if name in outputs and not isinstance(request, TumbleRequest):
-            raise ValueError(f"--{name}: shows a free motion; leave it out with --effect (--csv writes the motion)")
+            raise ValueError(f"--{name}: needs a free motion; leave it out with --effect (--csv writes the motion)")
     if "gif" not in outputs:
         return
     from rotor.plots.animation import check_film
@@ -59,15 +59,15 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
     except ValueError as error:
         raise ValueError(f"--gif: {error}") from None
     if times is not None and min(times) == max(times):
-        raise ValueError(f"--gif {path}: a film needs two different times, a first and a last; give more --times")
+        raise ValueError(f"--gif {path}: a film needs at least two different times; give more --times")
 
 
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
-    """The polhodes as a file."""
+    """Draw the polhodes."""
     from rotor.plots.polhodes import plot_polhodes
 
     if not isinstance(answer, TumbleAnswer):
-        raise ValueError("outputs.plot: there is a picture of a free motion alone; leave it out")
+        raise ValueError("outputs.plot: needs a free motion; leave it out")
     request, units = answer.request, answer.request.units
     label = f"Time ({units.time})" if units.time else "Time"
     plot_polhodes(
@@ -77,11 +77,11 @@ def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
 
 
 def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
-    """The animation as a file."""
+    """Write the animation."""
     from rotor.plots.animation import animate
 
     if not isinstance(answer, TumbleAnswer):
-        raise ValueError("outputs.gif: there is a film of a free motion alone; leave it out")
+        raise ValueError("outputs.gif: needs a free motion; leave it out")
     request, units = answer.request, answer.request.units
     animate(
         answer.motion, answer.table.times / units.time_factor, path, atoms=_atoms(request), axis_names=request.axes,
@@ -90,7 +90,7 @@ def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
 
 
 def _atoms(request: TumbleRequest) -> Any:
-    """The atoms in the principal frame, where there is a geometry."""
+    """The atoms in the principal frame (Å); None without a geometry."""
     top = getattr(request, "top", None)
     if top is None or top.molecule is None or top.frame is None:
         return None
@@ -116,7 +116,7 @@ def _picture_title(request: TumbleRequest) -> str:
 
 
 def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> None:
-    """Print how the body turns, and rows of the motion."""
+    """Print how the body rotates, and rows of the motion."""
     if isinstance(answer, DrivenAnswer):
         _show_driven(answer, report.content)
         return
@@ -165,7 +165,7 @@ def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str
         ("|L|", f"{size}, {vector} in the body: {request.source}"),
         ("energy", f"{content['energy']:.10g}{_unit(units.energy)}"),
         ("motion", _motion_text(request, content)),
-        ("about L", f"turns by {content['turning_rate']:.8g} rad{_per(units.time)} on average, as space sees it"),
+        ("about L", f"turns by {content['turning_rate']:.8g} rad{_per(units.time)} on average, in the space frame"),
     ]
     if ratio is not None:
         low, _, high = sorted(zip(request.moments, request.axes, strict=True))
@@ -196,12 +196,12 @@ def _motion_text(request: TumbleRequest, content: Mapping[str, Any]) -> str:
 def _drift_text(drift: Mapping[str, float]) -> str:
     return (
         f"energy to {drift['energy']:.1e}, |L| to {drift['momentum']:.1e}, L in space to "
-        f"{drift['space_momentum']:.1e} of themselves: round-off, at every time asked for"
+        f"{drift['space_momentum']:.1e} relative: round-off, at all times of the request"
     )
 
 
 def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
-    """What becomes of a spin about each axis."""
+    """Stability of a rotation about each axis."""
     fates = {
         "stable": "a push oscillates",
         "unstable": "a push grows",
@@ -239,7 +239,7 @@ def _driven_table(answer: DrivenAnswer) -> Table:
 
 
 def _rows(columns: Mapping[str, Floats], names: Mapping[str, str], text: Any) -> Table:
-    """Some rows of a motion, evenly chosen."""
+    """Evenly spaced rows of a motion."""
     count = len(columns["t"])
     cells = [
         [f"{columns[name][i]:.6g}" if name == "t" else text(columns[name][i], columns[name]) for name in names]
@@ -266,14 +266,14 @@ def _bracket(name: str) -> str:
 
 
 def _component(value: float, column: Floats) -> str:
-    """Six decimals, or six digits where the whole column is so small that decimals would show nothing (SI units of molecules)."""
+    """A number with six decimals, or with six digits if decimals would show nothing (SI units of molecules)."""
     largest = float(max(abs(column.min()), abs(column.max())))
     return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"
 
 
 VERB = Verb(
     name="tumble",
-    about="Rotation of a molecule or a rigid body: the exact free motion, what it conserves, stable axes; a motion under effects.",
+    about="Rotation of a molecule or a rigid body: exact free motion, conserved quantities, stable axes; motion under effects.",
     examples=EXAMPLES,
     request=MotionInput,
     answer=lambda request, work: answer(request),

@@ -1,4 +1,4 @@
-"""What `tumble` computes of: a molecule, an ordinary body or bare moments, and how it starts."""
+"""Subject of `tumble`: a molecule, an everyday body or bare moments, and its initial motion."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from rotor.classical.tumble import Three, TumbleRequest, Units
     from rotor.verbs.verb import Verb
 
-_UNITS_OF_MOLECULES = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
-TURN_RAD_PER_S = 2 * math.pi  # of a named body that is given no motion: one turn a second
+_HBAR_PER_U_ANGSTROM2_RAD_PER_PS = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
+TURN_RAD_PER_S = 2 * math.pi  # default of a named body: one turn a second
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body that is no molecule. moments: principal ones, in coherent or SI units.
+    """A rigid body that is not a molecule. moments: principal ones, in coherent or SI units.
 
-    named: what an ordinary body consists of. start: its angular momentum where none is given, and how that was chosen.
+    named: dimensions of an everyday body. start: default angular momentum, and how it was chosen.
     """
 
     text: str
@@ -42,13 +42,13 @@ class Body:
 
     @property
     def rate_unit(self) -> str:
-        """Of angular velocities; empty: of any coherent set."""
+        """Unit of angular velocities; empty for coherent units without names."""
         return f"rad/{self.units.time}" if self.units.time else ""
 
 
 @dataclass(frozen=True)
 class TurningBody(OneMolecule):
-    """A molecule, an ordinary body or bare moments."""
+    """A molecule, an everyday body or bare moments."""
 
     fields = {**OneMolecule.fields, **all_fields(BodyInput)}  # noqa: RUF012
 
@@ -58,11 +58,11 @@ class TurningBody(OneMolecule):
         return {**super().options, **all_fields(BodyInput)}
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The key `molecule`, which a body replaces."""
+        """The key `molecule`; a body may replace it."""
         return [optional_molecule("a name, a file, SMILES:..., or a table")]
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
-        """The top or the body that was given."""
+        """Read the molecule or the body."""
         molecule = read_molecule(entries)
         body = read_body(entries)
         if body is None:
@@ -71,7 +71,7 @@ class TurningBody(OneMolecule):
         return Subject({"body": body}, (), body.text, place.note)
 
     def saved(self, request: TumbleRequest | DrivenRequest, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The molecule or the body, and how it starts."""
+        """The molecule or the body, and its initial motion."""
         times = None if request.times is None else [float(time) for time in request.times]
         content = {} if times is None else {"conditions.times": times}
         if subject.molecules:
@@ -99,7 +99,7 @@ class TurningBody(OneMolecule):
 
 
 def read_body(entries: Entries) -> Body | None:
-    """The body that was given by moments or name, or by a source that is the name of one; None for a molecule."""
+    """The body given by moments or by name; None for a molecule."""
     inputs = read_instance(BodyInput, entries)
     called = {
         name: field.called(entries.style)
@@ -140,17 +140,17 @@ def read_body(entries: Entries) -> Body | None:
             f"{called['temperature_k']}: bare moments have no units for a temperature; give {momentum} alone"
         )
     if entries.style == "key" and entries.has(MOTION["angular_momentum"]):
-        raise ValueError(f"{momentum}: is that of a molecule; of a body it stands in [body]")
-    return _body_of_moments(entries, inputs) if named is None else _ordinary_body(named)
+        raise ValueError(f"{momentum}: is for a molecule; for a body give it in [body]")
+    return _body_of_moments(entries, inputs) if named is None else _everyday_body(named)
 
 
 def _momentum(entries: Entries, inputs: BodyInput) -> Any:
-    """The angular momentum as it was given, of a body or of a molecule."""
+    """The angular momentum as entered, of a body or a molecule."""
     return inputs.angular_momentum if inputs.angular_momentum is not None else entries.of(MOTION["angular_momentum"])
 
 
 def _named_source(source: Any) -> NamedBody | None:
-    """The ordinary body of which a source is the name, and no file."""
+    """The everyday body that a source names, unless it is a file."""
     from rotor.classical.bodies import BODIES
 
     return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
@@ -165,8 +165,8 @@ def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
     return Body(text, inputs.moments, SI if inputs.units == "SI" or in_si(typed) else COHERENT)
 
 
-def _ordinary_body(body: NamedBody) -> Body:
-    """An ordinary body in SI units: unless it is spun, one turn a second about the axis that it cannot keep."""
+def _everyday_body(body: NamedBody) -> Body:
+    """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
     import numpy as np
 
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
@@ -182,7 +182,7 @@ def _ordinary_body(body: NamedBody) -> Body:
 
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | DrivenRequest:
-    """The request of a molecule or a body: free, or under effects."""
+    """The request for a molecule or a body: free motion, or motion under effects."""
     motion = read_instance(MotionInput, entries)
     start = read_instance(BodyInput, entries)
     if entries.style == "key" and start.angular_momentum is not None:
@@ -201,7 +201,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | Dri
 
 
 def _refuse_without_effect(entries: Entries) -> None:
-    """ValueError for inputs of a stepped motion that were given to a free one; scenes may have settings that are not used."""
+    """Refuse settings of integration for a free motion; scenes may hold settings that are not used."""
     for field in (
         BODY["attitude"],
         *(MOTION[name] for name in ("tolerance", "step", "order") if entries.style != "key"),
@@ -209,12 +209,12 @@ def _refuse_without_effect(entries: Entries) -> None:
         if entries.has(field):
             raise ValueError(
                 f"{field.called(entries.style)}: belongs to a motion under effects; give {MOTION['effects'].called(entries.style)}, or "
-                "leave it out: a free one is exact"
+                "leave it out: free motion is exact"
             )
 
 
 def _times(entries: Entries, motion: MotionInput, unit: str) -> tuple[float, ...] | None:
-    """The times in the unit of the body."""
+    """Times in the unit of the body."""
     return (
         None if motion.times is None else replace(MOTION["times"], reader=Grid(unit)).read(motion.times, entries.style)
     )
@@ -226,7 +226,7 @@ def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion
     from rotor.classical.tumble import TumbleRequest
 
     body: Body = subject.values["body"]
-    chosen = _chosen(entries, start, motion, np.array(body.moments), body.rate_unit) or body.start
+    chosen = _start(entries, start, motion, np.array(body.moments), body.rate_unit) or body.start
     if chosen is None:
         if entries.style == "key":
             raise ValueError("body: give either angular_momentum or angular_velocity")
@@ -251,8 +251,8 @@ def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion:
 
     top, times = subject.top, _times(entries, motion, "ps")
     in_hbar = start.angular_velocity is not None
-    scale = _UNITS_OF_MOLECULES if in_hbar else 1.0  # ħ for 1 rad/ps
-    chosen = _chosen(entries, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps", "ħ")
+    scale = _HBAR_PER_U_ANGSTROM2_RAD_PER_PS if in_hbar else 1.0  # ħ for 1 rad/ps
+    chosen = _start(entries, start, motion, scale * np.array(top.moments_u_angstrom2), "rad/ps", "ħ")
     if chosen is None:
         return thermal_tumble(top, temperature_k=motion.temperature_k, times_ps=times)
     if entries.has(MOTION["temperature_k"]):
@@ -263,10 +263,10 @@ def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion:
     return replace(thermal_tumble(top, angular_momentum_hbar=chosen[0], times_ps=times), source=chosen[1])
 
 
-def _chosen(
+def _start(
     entries: Entries, start: BodyInput, motion: MotionInput, moments: Any, unit: str, momentum_unit: str = ""
 ) -> tuple[Three, str] | None:
-    """The angular momentum that was given, itself or by an angular velocity, and how; None where neither was."""
+    """The initial angular momentum, entered directly or as an angular velocity, and its source; None if neither is given."""
     if start.angular_velocity is not None:
         name = BODY["angular_velocity"].called(entries.style)
         return _momentum_of(start.angular_velocity, moments, unit, moments), f"given as an angular velocity ({name})"
@@ -277,7 +277,7 @@ def _chosen(
 
 
 def _momentum_of(value: Any, moments: Any, unit: str, factors: Any) -> Three:
-    """An angular momentum other than 0: of an angular velocity, by factors, or as it is given."""
+    """A nonzero angular momentum from an angular velocity (by `factors`, the moments) or as entered."""
     from rotor.classical.euler import checked_momentum
 
     name = "angular_momentum" if factors is None else "angular_velocity"
@@ -310,7 +310,7 @@ def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: Motion
         step = replace(MOTION["step"], reader=Quantity(body.units.time, above=0)).read(motion.step, entries.style)
     if entries.has(MOTION["order"]) and step is None and entries.style != "key":
         names = [MOTION[name].called(entries.style) for name in ("order", "step")]
-        raise ValueError(f"{names[0]}: is that of a splitting; give {names[1]} too")
+        raise ValueError(f"{names[0]}: belongs to a splitting; give {names[1]} too")
     spin, momentum = _spin_or_momentum(entries, body, start, motion)
     return DrivenRequest(
         body.moments, _times(entries, motion, body.units.time) or (), motion.effects, spin, momentum,
@@ -321,7 +321,7 @@ def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: Motion
 def _spin_or_momentum(
     entries: Entries, body: Body, start: BodyInput, motion: MotionInput
 ) -> tuple[Three | None, Three | None]:
-    """ω or L at the first time; a named body turns as it does without effects."""
+    """Initial ω or L; a named body has the default of its free motion."""
     if start.angular_velocity is not None:
         return replace(BODY["angular_velocity"], reader=Custom(lambda typed: three(typed, body.rate_unit))).read(
             start.angular_velocity, entries.style

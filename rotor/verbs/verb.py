@@ -1,4 +1,4 @@
-"""What a verb consists of, and its course: inputs become a request, the request an answer, the answer tables, files and a report."""
+"""The class Verb: inputs become a request, the request an answer, the answer tables, files and a report."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ Note = Callable[[str], None]
 
 
 def silent(_: str) -> None:
-    """Discards a remark."""
+    """Discard a remark."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Place:
-    """Where a call is made. folder: from which files that are read are counted. note: takes remarks."""
+    """Where a call is made. folder: of the files that it reads. note: takes remarks."""
 
     folder: str | os.PathLike[str] = "."
     note: Note = silent
@@ -42,8 +42,10 @@ class Place:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Subject:
-    """What is computed of. values: fields of the request. molecules: as they were asked for. text: as typed. note: takes remarks.
-    departures: of several molecules, the inputs in which each differs from the conditions.
+    """The molecule or other object that a verb computes.
+
+    values: fields of the request. molecules: their inputs. text: as typed. note: takes remarks.
+    departures: for each of several molecules, the inputs in which it differs from the conditions.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -54,15 +56,17 @@ class Subject:
 
     @property
     def top(self) -> Any:
-        """The top, where there is one."""
+        """The top of a molecule."""
         return self.values["top"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Work:
-    """How an answer is made. executor: shares the work. shown: options of the verb itself. files: by the name of the output. note: takes
-    remarks. progress: whether a terminal shows it. provenance: of files that grow. view: of the picture. at_end: takes what is done at the
-    end of a command. from_scene: whether a scene is run.
+    """Conditions of a calculation.
+
+    executor: shares the work. shown: display options. files: by the name of the output. note: takes remarks.
+    progress: whether a terminal shows it. provenance: of files that grow during the calculation. view: of the picture.
+    at_end: takes functions to call at the end of the command. from_scene: whether a scene is run.
     """
 
     executor: Executor | None = None
@@ -78,19 +82,20 @@ class Work:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """What a report and files are made from. content: as of the JSON. shown: options of the verb. typed: what was given.
-    provenance: of files. view: of a picture. sources: printed whole. executor: shares the work of further tables. made: those that
-    several files need.
+    """Data of a report and its files.
+
+    content: of the JSON. shown: display options. entries: as entered. provenance: of files. view: of a picture.
+    sources: whether to print them in full. executor: shares the work of derived tables. cache: derived tables that several files need.
     """
 
     content: Mapping[str, Any]
     shown: Any
-    given: Entries = field(default_factory=Entries)
+    entries: Entries = field(default_factory=Entries)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     sources: bool = False
     executor: Executor | None = None
-    made: dict[str, Any] = field(default_factory=dict)
+    cache: dict[str, Any] = field(default_factory=dict)
 
     @property
     def command(self) -> dict[str, Any]:
@@ -103,10 +108,11 @@ Writer = Callable[[Any, Path, Report], None]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Output:
-    """A file that a verb writes. name: of the key in [outputs] and of the option. write: by default the table itself, by its suffix.
+    """A file that a verb writes.
 
-    of: the table of an answer that is written, where it is not that of the verb. grows: the answer itself writes it. many: repeatable.
-    scene: whether scenes have it too. required: a verb that is there to write this file.
+    name: of the option, and of the key in [outputs]. write: by default writes the table in the format of the suffix.
+    of: returns the written table if it is not that of the verb. grows: written during the calculation. many: repeatable.
+    scene: whether scenes have it too. required: whether the verb exists to write this file.
     """
 
     name: str
@@ -129,14 +135,14 @@ class Output:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorsShown:
-    """Options of every verb."""
+    """Options of all verbs."""
 
     errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shown(ErrorsShown):
-    """Options of every verb whose report ends with sources."""
+    """Options of verbs whose report ends with sources."""
 
     sources: bool = declared(False, Flag(), "Print the sources of the numbers in full", option="--sources")
 
@@ -148,9 +154,10 @@ def no_notes(answer: Any) -> Iterable[str]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Extra:
-    """An option of the command line that stands for fields: `--j 2:5` for jmin and jmax. metavar: empty for an option without a value.
-    read: values by identity from the text, which what was typed itself overrides; None: the verb reads all of them together. files: paths
-    by the names of outputs, of an option that stands for several files.
+    """An option that sets several fields: `--j 2:5` for jmin and jmax.
+
+    metavar: empty for an option without a value. read: returns values by identity from the text; options of single fields override them;
+    None: the verb reads all extras together. files: paths by output, of an option that names several files.
     """
 
     option: str
@@ -165,31 +172,31 @@ class Extra:
 
 
 class SubjectKind:
-    """What a verb computes of; the base class: of nothing."""
+    """Kind of subject that a verb computes; this base class stands for none."""
 
     fields: Mapping[str, Field] = {}
 
     @property
     def options(self) -> Mapping[str, Field]:
-        """Those of them that are options of the command line."""
+        """The inputs that have options on the command line."""
         return self.fields
 
-    def read(self, given: Entries, place: Place, verb: Verb) -> Subject:
-        """What was given, read and checked."""
+    def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
+        """Read and check the inputs of the subject."""
         return Subject(note=place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """What a scene in a folder holds of it, by dotted key."""
+        """The subject as a scene in the folder holds it, by dotted key."""
         return {}
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """Name, type and default of what a scene has of it beside plain tables."""
+        """Name, type and default of the subject's keys outside plain tables."""
         return []
 
-    tables_read: tuple[str, ...] = ()  # keys that are read whole
+    tables_read: tuple[str, ...] = ()  # keys read as a whole
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables of a scene, with those of the subject as its inputs read them."""
+        """The tables of a scene in the form that the subject's inputs expect."""
         return content
 
 
@@ -198,22 +205,23 @@ NOTHING = SubjectKind()
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verb:
-    """One verb.
+    """A verb: its inputs, its calculation, its files and its report.
 
-    about: one line. examples: of the command line. request: a dataclass of declared fields. answer: of a request. table: of an answer,
-    and rows: its key in the JSON. show: prints the report. outputs: files. subject: what is computed of. shown: options of printing and
-    files, a dataclass of declared fields. content: further keys of the JSON. notes: remarks on an answer. nothing: why there is nothing
-    to draw. drawn: unit of the horizontal axis of the picture, None where there is none to change; spectral: a picture of a spectrum;
-    scaled: with --plot-scale. workers: what --workers spreads. start: what a template has switched on. extras: options that stand for
-    several fields. short: of a request that plain Python answers before a compiler would be loaded.
-    accuracy: of what a scene may ask one. numerics: "module:name" of a `rotor.requests.numerics.Numerics`, loaded where it is used.
-    sound: a request that was accepted has no mistake of the user.
-
-    withheld: of files that are named, why some are not written. failure: why an answer that is shown is no result.
-    build: makes the request, where its fields alone do not. adapt: the request to the files that are asked for. check: of a request beside
-    these files. read_extras: values by identity from the texts of all extras. records: the rows of the JSON, where they are not the table.
-    stepwise: it shows every step from the first one on. stated: keys of the JSON that its files have in their
-    provenance. other: a verb that takes the place of this one where an option that it alone has is typed; instead: these options, in words.
+    about: one line. examples: of the command line. start: values that a template sets.
+    request: a dataclass of declared fields. subject: kind of the subject. shown: dataclass of display options.
+    extras: options that set several fields; read_extras: reads them together.
+    build: makes the request if its fields alone do not. adapt: changes the request for the requested files.
+    check: refuses a request that does not fit these files.
+    answer: computes a request. table: of an answer; rows: its key in the JSON; records: rows of the JSON if not the table.
+    content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
+    outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
+    show: prints the report. stepwise: whether every step is shown from the start.
+    drawn: unit of the picture's horizontal axis, None if it cannot be changed. spectral: whether the picture is a spectrum.
+    scaled: whether it has --plot-scale. nothing: reason why there is nothing to draw.
+    workers: what --workers shares out. short: whether plain Python answers before the compiler would be loaded.
+    numerics: "module:name" of a `rotor.requests.numerics.Numerics`. accuracy: observables of an accuracy goal in a scene.
+    sound: whether an accepted request contains no user error.
+    other: verb that takes over if one of its options is typed; instead: these options in words.
     """
 
     name: str
@@ -255,7 +263,7 @@ class Verb:
     has_scenes: ClassVar[bool] = True
 
     def load_numerics(self) -> Any:
-        """How accuracy is chosen, swept and planned; the knobs of the fields alone where nothing else is named."""
+        """Accuracy goals, sweeps and plan; by default those of the knobs alone."""
         from rotor.requests.numerics import Numerics
 
         module, _, name = self.numerics.partition(":")
@@ -263,83 +271,85 @@ class Verb:
 
     @property
     def has_json(self) -> bool:
-        """Whether there is a JSON of it."""
+        """Whether the verb has JSON."""
         return True
 
     @cached_property
     def fields(self) -> dict[str, Field]:
-        """Every declared input by its identity: of the subject, the request and of what is shown."""
+        """All declared inputs by identity: of the subject, the request and the display."""
         return {**self.subject.fields, **all_fields(self.request), **all_fields(self.shown)}
 
     @cached_property
     def options(self) -> dict[str, Field]:
-        """The declared inputs that the command line has options for."""
+        """The inputs with options on the command line."""
         inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
-        return {name: one for name, one in inputs.items() if one.flag and not one.hidden}
+        return {name: item for name, item in inputs.items() if item.flag and not item.hidden}
 
     @cached_property
     def parameters(self) -> dict[str, Field]:
-        """The inputs of the command line: the options, and those of the verb that may take the place."""
+        """The options of this verb and of `other`."""
         return self.options if self.other is None else {**self.other.options, **self.options}
 
     @cached_property
-    def every_output(self) -> tuple[Output, ...]:
-        """The files of the command line: its own, and those of the verb that may take the place."""
+    def all_outputs(self) -> tuple[Output, ...]:
+        """The files of this verb and of `other`."""
         names = {output.name for output in self.outputs}
         others = () if self.other is None else self.other.outputs
         return (*self.outputs, *(output for output in others if output.name not in names))
 
     @property
     def spread(self) -> str:
-        """What --workers spreads, here or in the verb that may take the place."""
+        """What --workers shares out, here or in `other`."""
         return self.workers or ("" if self.other is None else self.other.workers)
 
-    def by_what(self, typed: Collection[str]) -> Verb:
-        """The verb for what was typed, by identity: the other one where an option that it alone has is typed.
+    def verb_for(self, typed: Collection[str]) -> Verb:
+        """This verb, or `other` if one of its options is typed (by identity).
 
-        Raises ValueError for what that has not.
+        Raises ValueError for typed options that `other` does not have.
         """
         other = self.other
         if other is None:
             return self
-        names = {output.name for output in self.every_output} - {output.name for output in self.outputs}
+        names = {output.name for output in self.all_outputs} - {output.name for output in self.outputs}
         alone = names | (other.options.keys() - self.options.keys()) | (set() if self.workers else {"workers"})
         if alone.isdisjoint(typed):
             return self
-        for name, one in self.options.items():
+        for name, option in self.options.items():
             if name in typed and name not in other.options:
-                raise ValueError(f"{one.flag}: expected without {other.instead}")
+                raise ValueError(f"{option.flag}: expected without {other.instead}")
         if "save_scene" in typed:
-            raise ValueError(f"--save-scene: {other.instead} are no part of a scene; expected without them")
+            raise ValueError(f"--save-scene: {other.instead} have no place in a scene; expected without them")
         return other
 
-    def read(self, given: Entries, place: Place) -> tuple[Any, Subject]:
-        """The request that was asked for, and of what.
+    def read(self, entries: Entries, place: Place) -> tuple[Any, Subject]:
+        """The request and its subject.
 
-        Raises ValueError, with the input as the user calls it, for what cannot be.
+        Raises ValueError, with the input in the user's style, for invalid values.
         """
         early = Entries(
-            {name: value for name, value in given.values.items() if name not in self.subject.fields}, given.style
+            {name: value for name, value in entries.values.items() if name not in self.subject.fields}, entries.style
         )
         check_early(self.request, early)
-        subject = self.subject.read(given, place, self)
-        names = {one.name: one.called(given.style) for one in all_fields(self.request).values()}
+        subject = self.subject.read(entries, place, self)
+        names = {
+            declaration.name: declaration.called(entries.style) for declaration in all_fields(self.request).values()
+        }
         with renaming(names):
             if self.build is not None:
-                return self.build(self, given, subject), subject
-            values = read_fields(self.request, given, subject)
+                return self.build(self, entries, subject), subject
+            values = read_fields(self.request, entries, subject)
             return self.request(**subject.values, **values), subject
 
-    def read_shown(self, given: Entries) -> Any:
-        """The options of the verb itself."""
-        return read_instance(self.shown, given)
+    def read_shown(self, entries: Entries) -> Any:
+        """The display options."""
+        return read_instance(self.shown, entries)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """What a scene in a folder holds, by dotted key, to ask for the same again."""
+        """Content of a scene in the folder that repeats the request, by dotted key."""
         return {**self.subject.saved(request, subject, folder), **written_fields(request)}
 
     def stated_in(self, content: Mapping[str, Any]) -> dict[str, Any]:
-        """What the provenance of files has of the content of the JSON."""
+        """The part of the JSON content that files record in their provenance."""
         return {name: plain(content[name]) for name in self.stated if name in content}
 
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
@@ -353,48 +363,53 @@ class Verb:
 
     def output(self, name: str) -> Output:
         """A file by its name."""
-        return next(one for one in self.outputs if one.name == name)
+        return next(output for output in self.outputs if output.name == name)
 
 
 def report_of(
-    verb: Verb, answer: Any, head: Mapping[str, Any], given: Entries, view: Any = None, executor: Executor | None = None
+    verb: Verb,
+    answer: Any,
+    head: Mapping[str, Any],
+    entries: Entries,
+    view: Any = None,
+    executor: Executor | None = None,
 ) -> Report:
-    """What the report, the JSON and the files are made from. head: command or scene, and input."""
-    shown = verb.read_shown(given)
+    """Data of the report, the JSON and the files. head: command or scene, and input."""
+    shown = verb.read_shown(entries)
     content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
     provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}, **verb.stated_in(content)}
-    return Report(content, shown, given, provenance, view, bool(getattr(shown, "sources", False)), executor)
+    return Report(content, shown, entries, provenance, view, bool(getattr(shown, "sources", False)), executor)
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:
-    """The table of a verb as CSV and as Parquet. stem: of the example of a template."""
+    """Outputs for a table as CSV and as Parquet. stem: of the file names in a template."""
     return (
         Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
         Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
     )
 
 
-def check_early(structure: type, given: Entries) -> None:
-    """ValueError for a text that no subject could make right: before anything is read."""
-    for one in all_fields(structure).values():
-        if given.has(one):
-            one.read(given.of(one), given.style)
+def check_early(structure: type, entries: Entries) -> None:
+    """Raise ValueError for a value that is wrong for every subject, before any file is read."""
+    for declaration in all_fields(structure).values():
+        if entries.has(declaration):
+            declaration.read(entries.of(declaration), entries.style)
 
 
 def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Path], None]]:
-    """What writes each file of a verb, by its name."""
+    """Functions that write the files of a verb, by output."""
 
-    def writer(one: Output) -> Callable[[Path], None]:
-        """What writes a file: by its function, or the table itself."""
-        if (by_function := one.write) is not None:
+    def writer(output: Output) -> Callable[[Path], None]:
+        """Write by the output's function, or write its table."""
+        if (by_function := output.write) is not None:
             return lambda path: by_function(answer, path, report)
 
         def rows(path: Path) -> None:
-            """The table as a file."""
+            """Write the table."""
             from rotor.formats import write
 
-            write((one.of or verb.table)(answer), path, settings=dict(report.provenance))
+            write((output.of or verb.table)(answer), path, settings=dict(report.provenance))
 
         return rows
 
-    return {one.name: writer(one) for one in verb.outputs if not one.grows}
+    return {output.name: writer(output) for output in verb.outputs if not output.grows}

@@ -35,14 +35,14 @@ Examples:
 
 @dataclass(frozen=True)
 class MagneticInput:
-    """What a magnetic field acts on; by default what the file of the molecule has in its table [magnetic]."""
+    """Tensors on which a magnetic field acts; by default those in the molecule's file, table [magnetic]."""
 
     g: tuple[float, ...] | None = declared(
         None, Numbers(example="0.6,-0.2,0.3"), "Rotational g tensor along a, b, c: aa,bb,cc[,ab,ac,bc]; parallel,perpendicular; or g",
         "magnetic.g", common=True, panel=CONDITIONS, example=[-0.03],
     )  # fmt: skip
     magnetisability: tuple[float, ...] | None = declared(
-        None, Numbers(example="-3,2,-7"), "Likewise, with its sign, in 1e-6 erg/(G² mol); by default left out", "magnetic.magnetisability",
+        None, Numbers(example="-3,2,-7"), "Magnetisability tensor likewise, with sign, in 1e-6 erg/(G² mol)", "magnetic.magnetisability",
         panel=CONDITIONS, example=[-3.0, 2.0, -7.0],
     )  # fmt: skip
 
@@ -51,17 +51,17 @@ _MAGNETIC = {field.identity: field for field in all_fields(MagneticInput).values
 
 
 class MagneticMolecule(OneMolecule):
-    """A molecule with the tensors on which a magnetic field acts."""
+    """A molecule with its rotational g and magnetisability tensors."""
 
-    fields = {**{one.identity: one for one in FIELDS.values()}, **_MAGNETIC}  # noqa: RUF012
+    fields = {**{field.identity: field for field in FIELDS.values()}, **_MAGNETIC}  # noqa: RUF012
 
     @property
     def options(self) -> Mapping[str, Any]:
-        """Inputs of the molecule, and its tensors."""
+        """Inputs of the molecule, and its magnetic tensors."""
         return {**super().options, **_MAGNETIC}
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The molecule and the tensors that were given."""
+        """The inputs of the molecule, and tensors that the user gave."""
         magnetic = subject.values["top"].magnetic
         stated = {"magnetic.g": _numbers(magnetic.g), "magnetic.magnetisability": _numbers(magnetic.magnetisability)}
         typed = magnetic.source.startswith("given")
@@ -70,7 +70,7 @@ class MagneticMolecule(OneMolecule):
 
 
 def _numbers(tensor: Tensor | None) -> list[float] | None:
-    """aa, bb, cc, and ab, ac, bc where one of them is there."""
+    """aa, bb, cc, with ab, ac, bc if one of them is not 0."""
     if tensor is None:
         return None
     (aa, ab, ac), (_, bb, bc), (_, _, cc) = tensor
@@ -79,7 +79,7 @@ def _numbers(tensor: Tensor | None) -> list[float] | None:
 
 
 def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
-    """The top with the tensors that are given, else those of its file."""
+    """The top with the tensors of the inputs, else with those of its file."""
     from rotor.tops.magnetic import MagneticTensors, tensor_for
 
     magnetic, called = (
@@ -101,19 +101,19 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     if top.magnetic is None:
         raise ValueError(
             f"the rotational g tensor is not known: give {called['g']} aa,bb,cc (principal axes), parallel,perpendicular of a "
-            "symmetric top, or the one g of a linear top"
+            "symmetric top, or the single g of a linear top"
         )
     return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
 
 
 def check(request: ZeemanRequest, outputs: Mapping[str, Any], shown: Any) -> None:
-    """ValueError for a picture of a single field."""
+    """Refuse a picture of a single field."""
     if "plot" in outputs and len(request.fields_tesla) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
 
 
 def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
-    """The picture of the map as a file."""
+    """Draw the map."""
     from rotor.plots.picture import name_of_top
     from rotor.plots.zeeman import plot_zeeman
 
@@ -136,7 +136,7 @@ def _table(states: FieldMap) -> Table:
     first, last = states.fields[0], states.fields[-1]
 
     def row(rows: slice) -> list[str]:
-        """One row of the printed table."""
+        """One row of the table."""
         at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end])
         return [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]
@@ -167,7 +167,7 @@ def _tensor_text(tensor: Tensor) -> str:
 
 VERB = Verb(
     name="zeeman",
-    about="Levels in a static magnetic field: energies, labels and magnetic moments of every M, with nuclear spins where asked.",
+    about="Levels in a static magnetic field: energies, labels and magnetic moments for all M, optionally with nuclear spins.",
     examples=EXAMPLES,
     request=ZeemanRequest,
     answer=lambda request, work: answer_zeeman(request, work.executor),

@@ -232,7 +232,7 @@ MISTAKES = [
     ((*BODY[1:], "--times", "0:1ps:5"), "expected plain numbers here, without the unit 'ps'"),
     (("water", "--times", "0:1:99999999999"), "at most 10000000 numbers"),
     (("water", "--times", "1e999"), "expected finite numbers"),
-    (("water", "--times", "1", "--gif", "a.gif"), "--gif a.gif: a film needs two different times"),
+    (("water", "--times", "1", "--gif", "a.gif"), "--gif a.gif: a film needs at least two different times"),
     (("water", "--csv", "a.txt"), "--csv a.txt: the name must end in .csv"),
     (("water", "--gif", "a.avi"), "--gif a.avi: the name must end in .gif or .mp4"),
     (("atom.xyz",), "is a single atom"),

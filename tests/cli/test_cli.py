@@ -361,8 +361,8 @@ MISTAKES = {
     "falling range": ("spectrum water --range 5:1GHz", "must rise"),
     "ambiguous name": ("spectrum CO", "'CO' is ambiguous"),
     "unknown name": ("spectrum Xx", "'Xx'"),
-    "no input": ("spectrum", "neither was given"),
-    "two inputs": ("spectrum water --constants B=1", "both were given"),
+    "no input": ("spectrum", "neither is"),
+    "two inputs": ("spectrum water --constants B=1", "both are given"),
     "catalogue as a molecule": ("spectrum lines.cat", "catalogue"),
     "unreadable constants": ("spectrum --constants B=x", "--constants"),
     "constants out of order": ("spectrum --constants A=1,B=2,C=3", "--constants"),
@@ -571,9 +571,9 @@ def test_hitran_records_are_written(call, tmp_path):
 
 def test_a_forgotten_unit_is_named(call):
     _, _, err = call("spectrum", "--constants", "A=9.2 B=3 C=2.5", "--dipole-abc", "1,0,0")
-    assert "no unit is given, so the numbers are MHz; for GHz write 'A=9.2 B=3 C=2.5 GHz'" in err
+    assert "no unit is given: the numbers are taken as MHz; for GHz write 'A=9.2 B=3 C=2.5 GHz'" in err
     _, out, _ = call("spectrum", "OCS", "--range", "2:18")
-    assert "--range 2:18 has no unit, so it is MHz: write 2:18GHz for GHz" in out
+    assert "--range 2:18 has no unit and is taken as MHz: write 2:18GHz for GHz" in out
     assert "no unit" not in call("spectrum", "OCS", "--range", "2:3GHz")[1]
 
 

@@ -197,7 +197,7 @@ def test_a_range_without_a_unit_is_pointed_out_where_no_line_is_inside(call, typ
     code, out, _ = call("emission", "CO", "--range", typed)
     assert code == 0
     assert "no lines" in out
-    assert ("--range 115:116 has no unit, so it is MHz: write 115:116GHz for GHz" in out) == hint
+    assert ("--range 115:116 has no unit and is taken as MHz: write 115:116GHz for GHz" in out) == hint
 
 
 def test_every_option_and_key_is_documented(call):

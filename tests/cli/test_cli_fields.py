@@ -105,7 +105,7 @@ def test_stark_refuses_what_changes_no_file_that_is_written(call, folder, option
     words = ("stark", "OCS", "--field", "0,1", "--states", "1", option, value)
     code, out, err = call(*words)
     assert (code, out) == (2, "")
-    assert err.startswith(f"error: {option}: changes nothing of the map itself; give ")
+    assert err.startswith(f"error: {option}: does not change the map itself; expected with ")
     assert file.split()[0] in err
     assert list(folder.iterdir()) == []
     assert call(*words, *file.split())[0] == 0

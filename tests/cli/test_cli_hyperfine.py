@@ -108,7 +108,7 @@ REFUSED = [
     (("emission", "CO", "--range", SPLIT, "--hyperfine"), "no constants of spins are known"),
     (("emission", "CO", "HCN", "--range", SPLIT, *CHI), "--spin-constants: expected with a single molecule"),
     (("emission", "HCN", "--range", SPLIT, "--hyperfine-method", "auto"), "nothing is split"),
-    (("emission", "HCN", "--range", SPLIT, "--spins", "14N=1"), "--spins: says how large the spins"),
+    (("emission", "HCN", "--range", SPLIT, "--spins", "14N=1"), "--spins: states the sizes of the spins"),
     (("emission", "HCN", "--range", SPLIT, "--spin-constants", "chi_aa(14N)"), "--spin-constants"),
     (("thermo", "CO", "--hyperfine"), "no constants of spins are known"),
     (("thermo", "HCN", "--hyperfine-method", "auto"), "nothing is split"),

@@ -155,7 +155,7 @@ def test_model_over_a_spectrum(call, folder):
         (("--fit", "s.txt", "--size", "1"), "without a beam"),
         (("--fit", "s.txt", "--column", "1,2,3"), "3 numbers for 1 species"),
         (("--fit", "s.txt", "--unit", "mag"), "intensity in 'mag'"),
-        (("--fit", "s.txt", "--save-scene", "a.toml"), "no part of a scene"),
+        (("--fit", "s.txt", "--save-scene", "a.toml"), "have no place in a scene"),
     ],
 )
 def test_mistakes_are_one_line(call, folder, options, rule):

@@ -55,7 +55,7 @@ def test_a_bar_takes_the_place_of_the_time(monkeypatch):
         time.sleep(0.3)
     assert "computing" not in terminal.getvalue()
     assert "1/2" in terminal.getvalue()
-    assert progress._Shown.bars == 0
+    assert progress._Display.bars == 0
 
 
 def test_a_pipe_shows_nothing(monkeypatch):

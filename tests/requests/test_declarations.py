@@ -270,9 +270,9 @@ def test_what_is_the_default_is_not_written():
 
 
 def test_files_of_spcat_are_no_scene(call):
-    """An .int file and the constants beside it say all themselves."""
+    """A scene cannot hold an .int file, which states the calculation itself."""
     (case, *_) = ORACLES.glob("**/co.int")
     code, _, err = call("spectrum", str(case), "--save-scene", "s.toml")
     assert code == 2
-    assert "a scene holds none" in err
+    assert "a scene cannot hold an .int file" in err
     assert not Path("s.toml").exists()

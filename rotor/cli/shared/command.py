@@ -45,7 +45,7 @@ def parameters_of(verb: Verb) -> list[Parameter]:
     """Every option of a verb; those of a tool are few, and --help shows all."""
     parameters = [_input(field) for field in verb.parameters.values()]
     parameters += [_extra(extra) for extra in verb.extras]
-    parameters += [_file(output) for output in verb.every_output]
+    parameters += [_file(output) for output in verb.all_outputs]
     if verb.has_json:
         parameters.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
     if verb.has_scenes:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb with the texts that were typed, by identity."""
-    verb = verb.by_what(typed.keys())
+    verb = verb.verb_for(typed.keys())
     there = {name: typed[name] for name in typed.keys() & places_of(verb)}
     inputs = {name: value for name, value in typed.items() if name not in there}
     entries, there = Entries(with_extras(verb, inputs), "option"), with_files(verb, there)
