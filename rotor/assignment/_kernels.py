@@ -12,6 +12,7 @@ Mask = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 
 MIXED = 3  # the type of a family of lines of several types
+OUTSIDE = -1e300  # a frequency that stands for constants out of bounds
 
 
 @njit(cache=True, nogil=True)
@@ -199,6 +200,25 @@ def _root(
 
 
 @njit(cache=True, nogil=True, fastmath=True)
+def _third_lines(
+    sa: float, sb: float, above: float, kappa: Floats, mean_a: Floats, mean_b: Floats, inverse: Floats, third_a: Floats,
+    third_b: Floats, bounds: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """Frequency of the third line at each κ (κ,), `OUTSIDE` where A, B, C are out of bounds; no branches, so that it is vectorised.
+
+    Bounds are wider by 3 % here than at roots, which lie between the points.
+    """
+    for k in range(len(kappa)):
+        half, mean = above * inverse[k], sa * mean_a[k] + sb * mean_b[k]
+        a, b, c = mean + half, mean + kappa[k] * half, mean - half
+        within = (
+            (half > 0.0) & (a < bounds[1] * 1.03) & (a > bounds[0] * 0.97) & (b < bounds[3] * 1.03) & (b > bounds[2] * 0.97)
+            & (c < bounds[5] * 1.03) & (c > bounds[4] * 0.97) & (c * (a + b) > 0.95 * a * b)
+        )  # fmt: skip
+        out[k] = sa * third_a[k] + sb * third_b[k] if within else OUTSIDE
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def sweep(
     difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
     near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
@@ -213,7 +233,11 @@ def sweep(
     """
     n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
     linear = _linear(difference, jj)
-    mean_a, mean_b, inverse, third_a, third_b = linear
+    coarse = np.minimum(np.arange((points + stride - 2) // stride + 1) * stride, points - 1)
+    mean_a, mean_b, inverse, third_a, third_b = (
+        linear[0][coarse], linear[1][coarse], linear[2][coarse], linear[3][coarse], linear[4][coarse],
+    )  # fmt: skip
+    looks, thirds = kappa[coarse], np.empty(len(coarse))
     rises, falls = bool((inverse > 0).all()), bool((inverse < 0).all())
     for a in range(n):
         sa = seeds[a]
@@ -224,15 +248,14 @@ def sweep(
             above = jj[0] * sb - jj[1] * sa
             if (rises and above <= 0) or (falls and above >= 0):  # ½(A-C) below 0 at every κ
                 continue
+            _third_lines(sa, sb, above, looks, mean_a, mean_b, inverse, third_a, third_b, bounds, thirds)
             before, p, at = -1.0, 0, 0
-            for step in range((points + stride - 2) // stride + 1):
-                k = min(step * stride, points - 1)
-                half, mean = above * inverse[k], sa * mean_a[k] + sb * mean_b[k]
-                # bounds are wider between points than at roots
-                if half <= 0.0 or not _inside(mean + half, mean + kappa[k] * half, mean - half, bounds, 0.03, 0.95):
+            for step in range(len(coarse)):
+                third = thirds[step]
+                if third == OUTSIDE:
                     before = -1.0
                     continue
-                third = sa * third_a[k] + sb * third_b[k]
+                k = coarse[step]
                 if before < 0.0:
                     before, at, p = max(third, 0.0), k, np.searchsorted(seeds, max(third, 0.0))
                     continue
