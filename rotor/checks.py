@@ -104,3 +104,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     matches = get_close_matches(name, list(known), n=3)
     return f"; did you mean {', '.join(matches)}?" if matches else ""
+
+
+def first_names(known: Iterable[str], most: int = 12) -> str:
+    """The first of the known names, and how many more there are: errors stay readable.
+
+    >>> first_names("ABCDE", 3)
+    'A, B, C and 2 more'
+    """
+    names = list(known)
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -26,8 +26,8 @@ def probability(grown: Grown) -> float:
     if grown.lines < FEWEST:
         return 0.0
     known = 1.0 if grown.determined else UNDETERMINED
-    odds = (max(grown.evidence, 0.0) / MIDDLE) ** POWER
-    return known * CEILING * odds / (1 + odds)
+    odds = float(max(grown.evidence, 0.0) / MIDDLE) ** POWER
+    return float(known * CEILING * odds / (1 + odds))
 
 
 def probability_of_isotopologue(grown: Grown) -> float:

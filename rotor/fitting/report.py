@@ -108,7 +108,7 @@ def statistics_text(fit: Fit) -> list[str]:
         f"condition number of the column-scaled Jacobian {f'{condition:.3e}' if math.isfinite(condition) else 'infinite'}",
     ]
     out += [
-        f"not determined by these lines: {combination.text} (left at the start)"
+        f"not determined by these lines: {combination.text}" + (" (left at the start)" if fit.converged else "")
         for combination in fit.statistics.undetermined
     ]
     out += [f"far off, {text}" for text in far_off(fit)]

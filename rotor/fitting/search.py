@@ -264,7 +264,7 @@ def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], 
     if zero.all() and options.default_error_mhz is None:
         raise ValueError(
             f"{lines.source or 'the lines'}: every line has an error of 0: give errors in the file, or one for all of them "
-            "(default_error_mhz, --default-error)"
+            "(default_error_mhz)"
         )
     if options.default_error_mhz is not None:
         return excluded, np.where(zero, options.default_error_mhz, lines.error_mhz)

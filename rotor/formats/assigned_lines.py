@@ -2,16 +2,15 @@
 
 A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...; of several states
 `v_upper` too; with spins N in place of J, `n_upper`, and the sums `f1_upper`, ..., `f_upper`, half-integers as 5/2, 2.5, or as twice
-the value, 5), a frequency
-(`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
-needed, `weight`, `blend` (one text or number for the lines of one measured frequency; without this column lines of one frequency and
-error behind each other are a blend, as in a .lin), `excluded` (yes for a line that does not count), `width_mhz` (how far the
-components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Capitals in names of columns do not matter. Of a
-molecule with internal rotation `species` and `vt` of both states may stand in one column, without `vt` all lines are of v_t = 0, J may
-stand for N, and species of one top may be A1, A2, E1, E2 or the numbers of a column `sigma`. Lines in an electric field have `m_upper`,
-`m_lower` and `field_kv_per_cm` (or `field_v_per_cm`). Of a catalogue the lines measured in a
-laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of spins, where the
-file has them, are put together at their mean by intensity. A .lne is a line list of westerfit.
+the value, 5), a frequency (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or
+`error_cm`), and, where needed, `weight`, `blend` (one text or number for the lines of one measured frequency; without this column
+neighbouring lines of one frequency and error are a blend, as in a .lin), `excluded` (yes for a line that does not count), `width_mhz`
+(how far the components of a blend may lie apart, rms, at one of its lines or at all) and `comment`. Capitals do not matter. For internal
+rotation `species` and `vt` of both states may stand in one column, without `vt` all lines are of v_t = 0, J may stand for N, and species
+of one top may be A1, A2, E1, E2 or the numbers of a column `sigma`. Lines in an electric field have `m_upper`, `m_lower` and
+`field_kv_per_cm` (or `field_v_per_cm`). Intensities of a predicted list (`rotor spectrum --csv`) are passed over.
+A catalogue gives the lines measured in a laboratory (a negative tag); those of one frequency and error are one blend by intensity, and
+components of spins are put together at their mean by intensity. A .lne is a line list of westerfit.
 """
 
 from __future__ import annotations
@@ -57,6 +56,8 @@ QUANTA = {
     "oblate": ("j", "k"),
     "asymmetric": ("j", "ka", "kc"),
 }
+# columns of a predicted list that a fit has no use for
+PREDICTED = ("lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2", "intensity_cm_per_molecule")
 _YES, _NO = ("yes", "true", "1"), ("no", "false", "0", "")
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
@@ -195,6 +196,9 @@ def _from_csv(
     if "field" in names:
         rows = [_with_field(path, columns, i, row) for i, row in enumerate(rows, 1)]
         columns = [name for name in columns if name not in _FIELD] + ["field_upper", "field_lower"]
+    if passed := [name for name in columns if name in PREDICTED]:
+        columns = [name for name in columns if name not in PREDICTED]
+        notes = [*notes, f"columns of a prediction that a fit does not use: {', '.join(passed)}"]
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment", "excluded"}
     _refuse_columns(path, columns, labels, known)
@@ -330,9 +334,10 @@ def _refuse_columns(
     strange = [name for name in columns if name not in known]
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
+        present = f"; the file has {', '.join(columns)}" if missing else ""
         raise ValueError(
             f"{path}: {what}; columns are {', '.join(_shown(labels))}, a frequency ({' or '.join(_FREQUENCY)}), an error "
-            f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, excluded, comment"
+            f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, excluded, comment{present}"
         )
     twice = next((name for name in columns if columns.count(name) > 1), None)
     if twice is not None:

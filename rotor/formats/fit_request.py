@@ -328,7 +328,11 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     origin = (
         f"{doubt}fitted by rotor to {counted(int(fit.used.sum()), 'line')} of {Path(request.files.source).name}, weighted by their "
         f"errors; weighted rms {fit.weighted_rms:.4g}; errors from the stated errors of the lines"
-        + (f"; not determined by these lines and left at the start: {lost}" if lost else "")
+        + (
+            f"; not determined by these lines{' and left at the start' if fit.converged else ''}: {lost}"
+            if lost
+            else ""
+        )
     )
     start = request.files.start or ""
     is_toml = start.lower().endswith(".toml") and Path(start).exists()

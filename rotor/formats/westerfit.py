@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.checks import first_names
 from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -166,7 +167,7 @@ def _second_order(lines: Sequence[tuple[int, str]]) -> tuple[dict[str, float], d
             spins |= {(QUADRUPOLE | SPIN_ROTATION)[name]: value} if value else {}
         elif name not in WITHOUT_COUNTERPART:
             raise ValueError(
-                f"line {number}: {name}: known are {', '.join((*SECOND_ORDER, *QUADRUPOLE, *SPIN_ROTATION))}"
+                f"line {number}: {name}: known are {first_names((*SECOND_ORDER, *QUADRUPOLE, *SPIN_ROTATION))}"
             )
         elif value:
             raise ValueError(

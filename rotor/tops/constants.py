@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from rotor.checks import first_names
 from rotor.tops.kind_of_constants import KNOWN, RIGID, kind_of, reduction_of, representation_of, vocabulary
 from rotor.tops.operators import Powers, powers_of_spelled, published_name, spelled_term
 from rotor.tops.uncertain_numbers import parse_named, write_number
@@ -289,7 +290,7 @@ def _refuse_unknown(names: Iterable[str]) -> None:
             elif _OF_SPIN_OR_STATE.match(name):
                 hint = "constants of spins and of further states go to a Top, as spin_constants and states, such as chi_aa(14N). "
             raise UnknownConstantError(
-                f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
+                f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {first_names(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
             )
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from rotor.checks import did_you_mean, first_names
 from rotor.units import parse_quantity
 
 BARRIERS = ("V3", "V6", "V9")
@@ -115,9 +116,10 @@ class InternalRotationConstants:
             if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[3-9]", name):
                 raise ValueError(f"{name}: computed are molecules with one or two tops; leave the others locked")
             if not is_torsional(name):
-                known = ", ".join(("F", "rho", *BARRIERS, *NAMED))
+                known = ("F", "rho", *BARRIERS, *NAMED)
                 raise ValueError(
-                    f"{name!r} is no constant of an internal rotor: known are {known}, and terms such as J2p2"
+                    f"{name!r} is no constant of an internal rotor: known are {first_names(known)}, and terms such as "
+                    f"J2p2{did_you_mean(name, known)}"
                 )
         needed: tuple[str, ...] = NEEDED[self.frame]
         others: tuple[str, ...] = NEEDED["PAM" if self.frame == "RAM" else "RAM"]

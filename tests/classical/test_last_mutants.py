@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from observed_cases import artificial, injected
 
+from rotor.classical.effects.drag import LinearDrag
 from rotor.classical.effects.torques import ConstantTorque
 from rotor.classical.integrators import lie_runge_kutta
 from rotor.classical.integrators.method import integrate
@@ -27,6 +28,15 @@ def test_a_torque_that_no_step_follows_is_refused(monkeypatch, plain_steps):
     torque = ConstantTorque([1e300, 1e300, 0.0])
     with np.errstate(all="ignore"), pytest.raises(ValueError, match="no step is short enough at time 0"):
         integrate(lie_runge_kutta.LieRungeKutta(), [1.0, 1.5, 2.0], [0.0, 0.0, 1.0], [0.0, 1.0], effects=[torque])
+
+
+def test_a_motion_that_speeds_up_without_bound_is_refused_early(monkeypatch):
+    """Drag of the wrong sign: steps shorten as exp(-t), so that what is left is estimated after each compiled call."""
+    monkeypatch.setattr(lie_runge_kutta, "PLAIN_STEPS", 0)
+    monkeypatch.setattr(lie_runge_kutta, "MOST_STEPS", 1e5)
+    drag = LinearDrag([-1.0, -1.0, -1.0])
+    with pytest.raises(ValueError, match="more steps are needed: an effect feeds energy in without bound"):
+        integrate(lie_runge_kutta.LieRungeKutta(), [1.0, 2.0, 3.0], [0.3, 0.2, 1.0], [0.0, 1000.0], effects=[drag])
 
 
 def test_a_shape_has_three_coordinates_for_each_mass():

@@ -99,6 +99,24 @@ def test_not_converged_is_exit_code_1_with_the_reason_and_no_constants_written(c
     assert "NOT CONVERGED" in (folder / "new.fit").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("molecule", "free"), [("OCS", "B"), ("formamide", "A,B,C")])
+def test_a_predicted_list_is_fitted(call, molecule, free):
+    """The CSV of `rotor spectrum` gives its constants back; a note says which of its columns a fit does not use."""
+    assert call("spectrum", molecule, "--jmax", "3", "--csv", "predicted.csv")[0] == 0
+    code, out, err = call("fit", "predicted.csv", "--start", molecule, "--free", free)
+    assert code == 0
+    assert "columns of a prediction that a fit does not use: lgint, energy_lower_cm, g_upper" in err
+    assert "weighted rms 0.00000" in out
+
+
+def test_a_list_of_another_kind_of_top_says_its_columns(call):
+    assert call("spectrum", "OCS", "--jmax", "3", "--csv", "predicted.csv")[0] == 0
+    code, _, err = call("fit", "predicted.csv", "--start", "formamide", "--free", "B")
+    assert code == 2
+    assert "no column n_upper" in err or "no column ka_upper" in err
+    assert "; the file has frequency_mhz, error_mhz, j_upper, j_lower" in err
+
+
 BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
 
 
@@ -116,7 +134,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("empty.csv", "--constants", "B=57000 MHz", "--free", "B"), "no lines in it"),
         (("co.csv", "--constants", "A=6 B=5 C=4 GHz", "--free", "B"), "no column ka_upper"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--out", "no/folder"), "there is no folder"),
-        (("zero.csv", "--constants", "B=57000 MHz", "--free", "B"), "every line has an error of 0"),
+        (("zero.csv", "--constants", "B=57000 MHz", "--free", "B"), "or one for all of them (--default-error)"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,Q"), "--free: 'Q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "--free: 'mu_q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "mu_a, mu_b, mu_c (lines in a field)"),

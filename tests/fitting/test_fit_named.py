@@ -299,6 +299,7 @@ def test_the_command_with_advice(case, call):
         ("A,Q[1]", "--free: Q[1]: a state of this asymmetric top has E, A, B, C,"),
         ("A,A[0]", "--free: A[0]: state 0 is the top's own, whose constants have no brackets"),
         ("A,foo(14N)", "--free: foo(14N): known constants of spins are chi_aa,"),
+        ("A,chis_aa(14N)", "and 46 more; did you mean chi_aa"),
         ("A,mu_q", "--free: 'mu_q' is not a rotational constant"),
         ("A,d_q[1]", "--free: d_q[1]: a state of this asymmetric top has E,"),
         ("A,Z_c[0,1]", "--free: Z_c[0,1]: couplings of two states are G_a,"),

@@ -25,10 +25,17 @@ SMALLEST_STEP = 1e-13  # of the interval between two times asked for
 STAGES = 12
 PLAIN_STEPS = 400  # a tenth of a second in numpy, as long as loading the compiled form of all further ones
 STEPS_OF_A_CALL = 20_000  # of one body: a compiled call obeys no signal
+MOST_STEPS = 3e9  # left at the present step: more than an hour of one body
 ROLLING_COST = 8  # of a plain step with added inertia, 1.7 ms, beside one with torques
 _TOO_SHORT = (
     "no step is short enough at time {time:g}: an effect is discontinuous or grows without bound there; "
     "end the motion before it, or loosen the tolerance"
+)
+
+
+_TOO_LONG = (
+    "at time {time:g} about {steps:.0e} more steps are needed: an effect feeds energy in without bound, or the time is too long; "
+    "end the motion earlier, or loosen the tolerance"
 )
 
 
@@ -118,6 +125,8 @@ class LieRungeKutta(Method):
             taken += steps
             if not good:
                 raise ValueError(_TOO_SHORT.format(time=time))
+            if (left := abs(times[-1] - time) / abs(step)) > MOST_STEPS:
+                raise ValueError(_TOO_LONG.format(time=time, steps=left))
         return path[1:], taken
 
     def _first_step(self, system: System, time: float, momentum: Floats, attitude: Floats) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rotor.checks import did_you_mean, first_names
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hyperfine_method import EXACT, TOLERANCE_MHZ, HyperfineMethod
@@ -57,7 +58,8 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
         symbol = parse_name(name).symbol if name.startswith(tuple(known)) else ""
         kind = next((kind for kind in kinds if symbol in kind.symbols), None)
         if kind is None:
-            raise ValueError(f"{name}: known constants of spins are {', '.join(known)}")
+            hint = did_you_mean(name.partition("(")[0], known)
+            raise ValueError(f"{name}: known constants of spins are {first_names(known)}{hint}")
         values.setdefault(kind, {})[name] = value
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 

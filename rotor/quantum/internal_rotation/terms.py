@@ -27,6 +27,7 @@ from functools import lru_cache, reduce
 
 import numpy as np
 
+from rotor.checks import did_you_mean, first_names
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_squared, j_x, j_y, j_z, ladder, sum_of_powers
@@ -90,9 +91,10 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
         return (Product(UNIT, 0.5 * (UNIT - cosine(int(name[1:]) // 3))),)
     match = SPELLED.fullmatch(name)
     if not name or match is None:
-        accepted = ", ".join(("A", "B", "C", "F", "rho", *BARRIERS, *NAMED, *distortion))
+        accepted = ("A", "B", "C", "F", "rho", *BARRIERS, *NAMED, *distortion)
         raise ValueError(
-            f"{name!r} is no term of internal rotation: known are {accepted}, and operators such as J2p2 or Jz1p1cos3"
+            f"{name!r} is no term of internal rotation: known are {first_names(accepted)}, and operators such as J2p2 or "
+            f"Jz1p1cos3{did_you_mean(name, accepted)}"
         )
     if axes.angle:
         raise ValueError(f"{name}: terms that are spelled as operators belong to the rho-axis frame")
