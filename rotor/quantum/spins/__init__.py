@@ -1,4 +1,4 @@
-"""Spins coupled to the rotation, N + S1 = J, J + I1 = F1, ... = F: the levels, and what lines and fits need of them.
+"""Spins coupled to the rotation, N + S1 = J, J + I1 = F1, ... = F: levels, line strengths and derivatives.
 
     H = H_rot + Σ_terms (`operators`)
 

@@ -1,11 +1,11 @@
-"""Axial tops with spins, whole arrays at a time: functions |N K⟩ times coupling patterns, K good.
+"""Operators of axial tops with spins over functions |N K⟩ times coupling patterns, K a good quantum number.
 
-A solved block of the rotation is one function, so that the Hamiltonian of every F and K has as many rows as patterns with N ≥ K,
+A solved block of the rotation is a single function, so the Hamiltonian of each F and K has one row for each pattern with N ≥ K,
 
-    ⟨N' p'|H|N p⟩ = E_N,K δ + Σ_channels c(p', p) X(N', N, K),
+    ⟨N' p'|H|N p⟩ = E_N,K δ + Σ_channels c(p', p) X(N', N, K).
 
-and those of one size stand in one array (`axial_levels`). X is a closed form over arrays of N and K (`symmetric_top_elements`), by the
-formulas of `operators`.
+Matrices of one size share an array (`axial_levels`). X is a closed form over arrays of N and K (`symmetric_top_elements`), by the formulas
+of `operators`.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 
-Exist = Callable[[Ints], NDArray[np.bool_]]  # which of the levels with these labels there are
+Exist = Callable[[Ints], NDArray[np.bool_]]  # whether levels with these labels exist
 
 
 def are_axial(blocks: Sequence[RotorBlock]) -> bool:
-    """Whether solved blocks of the rotation are functions |N K⟩."""
+    """Whether the solved blocks of the rotation are functions |N K⟩."""
     return isinstance(blocks[0].parts[0].basis, AxialState)
 
 
 def existing_functions(blocks: Sequence[RotorBlock], exist: Exist, spins: int) -> list[RotorBlock]:
-    """The functions |N K⟩ whose v and K exist, all of them if none does."""
+    """The functions |N K⟩ whose v and K exist; all of them if none does."""
     names = [(block.parts[0].v, block.parts[0].basis.k[0], 0, *[0] * (1 + spins)) for block in blocks]
-    there = exist(np.array(names, dtype=np.int64)).tolist()
-    return [block for block, exists in zip(blocks, there, strict=True) if exists] or list(blocks)
+    existing = exist(np.array(names, dtype=np.int64)).tolist()
+    return [block for block, exists in zip(blocks, existing, strict=True) if exists] or list(blocks)
 
 
 def contracted_operators(
@@ -62,33 +62,34 @@ def operators_of_axial_stacks(
         for low in stacks:
             for rise in range(reach + 1):
                 pairs, k = _higher_first(up, low, *_pairs(up, low, rise, 0))
-                for found, pieces in zip(out, operators, strict=True) if len(k) else ():
+                for contracted, pieces in zip(out, operators, strict=True) if len(k) else ():
                     values = _values(pieces, (up.sections[0].v, low.sections[0].v), pairs, k, representation)
                     if values.any():
-                        found.append(Contracted(up, low, pairs, values[:, None, None]))
+                        contracted.append(Contracted(up, low, pairs, values[:, None, None]))
     return out
 
 
 def _pairs(up: Stack, low: Stack, rise: int, q: int) -> tuple[Pairs, Ints]:
-    """Functions of two stacks whose N differ by `rise` and K by `q`, and K of the second."""
-    of_up, of_low = _axial_k(up), _axial_k(low)
-    width = 1 + max(int(of_up.max()), int(of_low.max())) + abs(q)
-    _, a, b = np.intersect1d(up.n * width + of_up, (low.n + rise) * width + of_low + q, True, True)
-    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None]), of_low[b]
+    """Pairs of functions of two stacks with N' - N = rise and K' - K = q, and K of the second function."""
+    k_up, k_low = _axial_k(up), _axial_k(low)
+    width = 1 + max(int(k_up.max()), int(k_low.max())) + abs(q)
+    _, a, b = np.intersect1d(up.n * width + k_up, (low.n + rise) * width + k_low + q, True, True)
+    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None]), k_low[b]
 
 
 def _higher_first(up: Stack, low: Stack, pairs: Pairs, k: Ints) -> tuple[Pairs, Ints]:
-    """The pairs in which the number of the first is not below that of the second."""
+    """The pairs whose first block number is not below the second."""
     ordered = up.numbers[pairs.up] >= low.numbers[pairs.low]
     return Pairs(*(column[ordered] for column in pairs)), k[ordered]
 
 
 def _axial_k(stack: Stack) -> Ints:
-    return np.array([part.basis.axial_k for part in stack.sections[0].every])  # type: ignore[union-attr]
+    """K of the functions of a stack."""
+    return np.array([part.basis.axial_k for part in stack.sections[0].parts])  # type: ignore[union-attr]
 
 
 def _values(pieces: Sequence[Piece], states: tuple[int, int], pairs: Pairs, k: Ints, representation: str) -> Floats:
-    """Σ value ⟨N'K‖X‖N K⟩ of the pieces and, between different states, of their conjugates, (pairs,)."""
+    """Σ value ⟨N'K‖X‖N K⟩ over the pieces and, between different states, their conjugates: (pairs,)."""
     m, n = pairs.m[:, 0].astype(float), pairs.n[:, 0].astype(float)
     total = np.zeros(len(k))
     for piece in pieces:
@@ -101,9 +102,9 @@ def _values(pieces: Sequence[Piece], states: tuple[int, int], pairs: Pairs, k: I
 
 
 def tensors_of_axial_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
-    """`contraction.tensors_of_stacks` for stacks of |N K⟩, times √(number of components), so that squares are those of both signs of K.
+    """`contraction.tensors_of_stacks` for stacks of |N K⟩, times √(number of components), so that squares count both signs of K.
 
-    A component across the axis has its absolute value.
+    A component across the axis enters with its absolute value.
     """
     rank = rank_of(tensors)
     if rank > MOST_RANK:
@@ -125,7 +126,7 @@ def tensors_of_axial_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[C
 
 
 def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[RotorBlock]) -> Floats:
-    """N^2p Nz^2q, (N (N + 1))^p K^2q, of every function and of so many parameters, (blocks, count); what changes K does not act."""
+    """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (blocks, count); operators that change K do not contribute."""
     parts = [block.parts[0] for block in blocks]
     v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True))
     x, out = n * (n + 1.0), np.zeros((len(parts), count))

@@ -1,4 +1,4 @@
-"""Levels of axial tops with spins, and their derivatives: all blocks of one size in one array, see `axial`."""
+"""Levels of axial tops with spins, and their derivatives: all blocks of one size in one array (see `axial`)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-_MOST = 100  # patterns of an F: tables of coefficients grow with the square
+_MOST = 100  # largest number of patterns of an F; tables of coefficients grow with its square
 
 
 class Functions(NamedTuple):
-    """The functions of blocks of one size: the place of each block's F, and numbers of solved blocks and patterns, (blocks, size)."""
+    """Functions of blocks of one size: index of each block's F, (blocks,), and numbers of solved blocks and of patterns, (blocks, size)."""
 
     f: Ints
     numbers: Ints
@@ -37,44 +37,44 @@ class Functions(NamedTuple):
 def by_size(
     members: Sequence[tuple[int, Sequence[SpinPart]]], places: dict[int, Ints]
 ) -> Iterator[tuple[list[int], Functions]]:
-    """Blocks, given by their doubled F and parts, of one number of functions: which, and their functions."""
+    """Group blocks (doubled F, parts) by their number of functions: numbers of the blocks, and their functions."""
     offsets = dict(zip(places, accumulate(map(len, places.values()), initial=0), strict=False))
-    every, first = np.concatenate(list(places.values())), min(places)
+    pattern_numbers, first = np.concatenate(list(places.values())), min(places)
     number, start, repeats = np.array(
         [(part.number, offsets[f] + part.patterns.start, part.repeats) for f, parts in members for part in parts]
     ).T
-    part = np.repeat(np.arange(len(number)), repeats)  # of every function
+    part = np.repeat(np.arange(len(number)), repeats)  # part of each function
     row = np.arange(len(part)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    numbers, patterns = number[part], every[start[part] + row]
+    numbers, patterns = number[part], pattern_numbers[start[part] + row]
     sizes = np.array([parts[-1].place.stop for _, parts in members])
-    begins, of_f = np.cumsum(sizes) - sizes, (np.array([f for f, _ in members]) - first) // 2
+    begins, f_index = np.cumsum(sizes) - sizes, (np.array([f for f, _ in members]) - first) // 2
     for size in dict.fromkeys(sizes.tolist()):
         which = np.flatnonzero(sizes == size)
         at = begins[which, None] + np.arange(size)
-        yield which.tolist(), Functions(of_f[which], numbers[at], patterns[at])
+        yield which.tolist(), Functions(f_index[which], numbers[at], patterns[at])
 
 
 class AxialTables:
-    """Elements of sums of channels over the functions of blocks: closed forms by pairs of solved blocks, coefficients by F."""
+    """Matrices of sums of channels over the functions of blocks: closed forms by pairs of solved blocks, coefficients by F."""
 
     def __init__(self, functions: Sequence[RotorPart], scheme: Scheme, twice_f: tuple[int, int]) -> None:
         self._n = np.array([part.basis.j for part in functions])
         self._v = np.array([part.v for part in functions])
         self._scheme, self._range = scheme, twice_f
 
-    def matrices(self, found: Sequence[Contracted], channels: Sequence[Channel], functions: Functions) -> Floats:
+    def matrices(self, contracted: Sequence[Contracted], channels: Sequence[Channel], functions: Functions) -> Floats:
         """Σ_channels c(p', p) X(r', r), the lower triangles (blocks, size, size)."""
         table = np.zeros((int(self._v.max()) + 1, _REACH + 1, len(self._n)))
-        for up, low, pairs, values in found:
+        for up, low, pairs, values in contracted:
             table[up.sections[0].v, pairs.rise, low.numbers[pairs.low]] = values[:, 0, 0]
         bra, ket = functions.numbers[:, :, None], functions.numbers[:, None, :]
         rise = self._n[bra] - self._n[ket]
         elements = np.where((rise >= 0) & (rise <= _REACH), table[self._v[bra], np.clip(rise, 0, _REACH), ket], 0.0)
         coefficients = sum(couplings_by_f(self._scheme, channel, *self._range) for channel in channels)
-        of_functions = np.asarray(coefficients)[
+        by_function = np.asarray(coefficients)[
             functions.f[:, None, None], functions.patterns[:, :, None], functions.patterns[:, None, :]
         ]
-        return np.tril(of_functions * elements)
+        return np.tril(by_function * elements)
 
 
 def axial_states(plan: Plan, members: Sequence[Member], table: PatternTable) -> Iterator[States]:
@@ -84,17 +84,19 @@ def axial_states(plan: Plan, members: Sequence[Member], table: PatternTable) -> 
     rotation = np.array([block.energies_mhz[0] for block in plan.blocks])
     for which, functions in by_size([member[:2] for member in members], table.places):
         diagonal = rotation[functions.numbers]
-        zeros = diagonal[:, 0]  # taken out of the matrices for the sake of digits
+        zeros = diagonal[
+            :, 0
+        ]  # subtracted from the matrices, so that round-off is relative to splittings instead of energies
         matrices = (diagonal - zeros[:, None])[:, :, None] * np.eye(diagonal.shape[1])
-        for found, channels in plan.contracted:
-            matrices += tables.matrices(found, channels, functions)
+        for contracted, channels in plan.contracted:
+            matrices += tables.matrices(contracted, channels, functions)
         yield diagonalised(which, matrices, zeros)
 
 
 def axial_derivatives(
     top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock], count: int
 ) -> Floats:
-    """∂E/∂c (count, parameters) of the states of spin blocks, by the rows of their levels."""
+    """∂E/∂c (count, parameters) of the states of spin blocks, by rows of the levels."""
     shared, out = blocks[0].shared, np.zeros((count, len(names)))
     twice_f = [block.twice_f for block in blocks]
     places = pattern_table(shared.scheme, min(twice_f), max(twice_f)).places
@@ -106,14 +108,14 @@ def axial_derivatives(
     along = powers_of_axial(StateTerms.of(top, effects, names, shared.representation), len(names), rotors)
     tables = AxialTables([rotor.parts[0] for rotor in rotors], shared.scheme, (min(places), max(places)))
     channels = parameter_channels(top, effects, names, shared.scheme)
-    acting = [(column, channel) for column, own in enumerate(channels) for channel in own]
+    acting = [(column, channel) for column, by_channel in enumerate(channels) for channel in by_channel]
     pieces = [channels[column][channel] for column, channel in acting]
     spins = operators_of_axial_stacks(stacks, _REACH, pieces, shared.representation)
     for which, functions in by_size([(block.twice_f, block.parts) for block in blocks], places):
         vectors = np.stack([blocks[i].vectors for i in which])
         slopes = np.matmul((vectors**2).transpose(0, 2, 1), along[functions.numbers])
-        for (column, channel), found in zip(acting, spins, strict=True):
-            whole = whole_of_lower(tables.matrices(found, [channel], functions))
+        for (column, channel), contracted in zip(acting, spins, strict=True):
+            whole = whole_of_lower(tables.matrices(contracted, [channel], functions))
             slopes[:, :, column] += (np.matmul(whole, vectors) * vectors).sum(axis=1)
         rows = np.array([blocks[i].start for i in which])[:, None] + np.arange(vectors.shape[2])
         out[rows] = slopes

@@ -1,11 +1,11 @@
 """Levels of each F: rotational eigenstates coupled with the spins, one real symmetric matrix for each connected part.
 
-The rotation, with all states v and what connects them, is solved first. Its eigenstates r of every N from F - ΣS to F + ΣS,
-times the coupling patterns p of that N, are the basis of an F,
+The rotation, with all states v and their interactions, is solved first. Its eigenstates r of N from F - ΣS to F + ΣS, times the coupling
+patterns p of each N, are the basis of an F,
 
     ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'|X|r⟩,
 
-a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart. `parts` names the levels.
+a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved separately. `parts` labels the levels.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
+FEW = 100  # with more patterns of an F, coefficients are computed one F at a time
 Operators = dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]
 """Matrices between two blocks of the rotation, each with the channels that share it."""
 InStacks = list[tuple[list[Contracted], list[Channel]]]
@@ -54,8 +54,7 @@ InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 @dataclass(frozen=True)
 class Shared:
-    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks, and elements that
-    were computed once."""
+    """Data of all blocks of a calculation: coupling scheme, representation, blocks of the rotation in stacks, and a cache of elements."""
 
     scheme: Scheme
     representation: str
@@ -65,22 +64,22 @@ class Shared:
 
     @property
     def state_by_state(self) -> bool:
-        """Whether spins mix no states of the rotation."""
+        """Whether spins mix no rotational states (first order)."""
         return self.used is not None and self.used.method == FIRST_ORDER
 
     @property
     def axial(self) -> bool:
-        """Whether the functions are |N K⟩, not those of Wang blocks."""
+        """Whether the functions are |N K⟩ instead of Wang functions."""
         return are_axial(self.stacks[0].blocks)
 
 
 @dataclass(frozen=True)
 class SpinBlock(Block):
-    """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
+    """States of one F that are solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
-    patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
-    of states. mixing: (n,) shares of the sub-blocks that name them. start: row of the first state. allowed: the functions that are there.
-    group: blocks of other F that it was solved with.
+    patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K if axial), Kc and the doubled pattern N, J ... F.
+    mixing: (n,) weight of the sub-block that labels each state. start: row of the first state. allowed: functions that exchange allows.
+    group: blocks of other F solved in the same array.
     """
 
     with_spins: ClassVar[bool] = True
@@ -104,31 +103,34 @@ class SpinBlock(Block):
 
     @property
     def axial_k(self) -> int | None:
-        """|K| where K is good."""
+        """|K| where K is a good quantum number."""
         return getattr(self.parts[0].rotor.parts[0].basis, "axial_k", None)
 
     @property
     def used(self) -> Used | None:
-        """The method, the same for all blocks of a calculation."""
+        """Treatment of the spins, the same for all blocks of a calculation."""
         return self.shared.used
 
     @cached_property
     def single(self) -> bool:
-        """Whether every part has one pattern."""
+        """Whether each part has a single pattern."""
         return all(part.repeats == 1 for part in self.parts)
 
     @cached_property
     def by_number(self) -> dict[int, list[SpinPart]]:
-        """The parts by the number of their block of the rotation."""
-        found: dict[int, list[SpinPart]] = {}
+        """The parts by the number of their rotational block."""
+        parts: dict[int, list[SpinPart]] = {}
         for part in self.parts:
-            found.setdefault(part.number, []).append(part)
-        return found
+            parts.setdefault(part.number, []).append(part)
+        return parts
 
 
 class Member(NamedTuple):
-    """A block before it is solved: doubled F, parts, v, Ka, Kc and pattern of the levels that its sub-blocks name one after another, how
-    many each names, and the functions that are there."""
+    """A block before it is solved.
+
+    names: v, Ka, Kc and pattern of the levels, sub-block after sub-block. sizes: number of levels of each sub-block. allowed: functions
+    that exchange of equivalent nuclei allows.
+    """
 
     twice_f: int
     parts: tuple[SpinPart, ...]
@@ -138,7 +140,7 @@ class Member(NamedTuple):
 
 
 class States(NamedTuple):
-    """Solved blocks of one size: their numbers, energies (blocks, n), rising, vectors (blocks, functions, n), groups by number."""
+    """Solved blocks of one size: their numbers, energies (blocks, n), rising, vectors (blocks, functions, n), and groups by number."""
 
     numbers: Sequence[int]
     energies_mhz: Floats
@@ -149,7 +151,7 @@ class States(NamedTuple):
 def diagonalised(
     numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats, groups: Mapping[int, Group] = MappingProxyType({})
 ) -> States:
-    """States of blocks of one size, given by the lower triangles (blocks, n, n) with `zeros_mhz` taken off their diagonals."""
+    """States of blocks of one size from lower triangles (blocks, n, n), from whose diagonals `zeros_mhz` (blocks,) is subtracted."""
     if not np.isfinite(matrices).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrices)  # reads the lower triangles
@@ -158,40 +160,40 @@ def diagonalised(
 
 @dataclass(frozen=True)
 class Plan:
-    """Solved rotation, operators of every channel, and which blocks they connect.
+    """Solved rotation, operators of each channel, and the blocks that they connect.
 
-    families: members (block, class), see `families`. contracted: the operators in stacks, each with the channels that share it.
-    given: the operators by pairs of blocks (i ≥ k), where they are others.
+    families: members (block, class), see `families`. contracted: operators in stacks, each with the channels that share it.
+    replacement: operators by pairs of blocks (i ≥ k) that replace the contracted ones.
     """
 
     shared: Shared
     blocks: list[RotorBlock]
     families: list[list[tuple[int, int]]]
     contracted: InStacks = field(repr=False)
-    given: Operators | None = field(default=None, repr=False)
+    replacement: Operators | None = field(default=None, repr=False)
 
     @cached_property
     def operators(self) -> Operators:
         """Operators by pairs of blocks (i ≥ k)."""
-        if self.given is not None:
-            return self.given
+        if self.replacement is not None:
+            return self.replacement
         out: Operators = {}
-        for found, channels in self.contracted:
-            for pair, operator in by_numbers(found).items():
+        for stacked, channels in self.contracted:
+            for pair, operator in by_numbers(stacked).items():
                 out.setdefault(pair, []).append((operator, channels))
         return out
 
     @cached_property
     def families_at(self) -> dict[tuple[int, int], dict[int, list[tuple[int, int]]]]:
-        """By N and class, and by the number of a family, the places in it and the blocks of its members there."""
-        found: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
+        """By N and class, then by number of the family: (place in the family, block) of its members there."""
+        places: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
         for number, family in enumerate(self.families):
-            for at, (i, own) in enumerate(family):
-                found.setdefault((self.blocks[i].n, own), {}).setdefault(number, []).append((at, i))
-        return found
+            for at, (i, symmetry_class) in enumerate(family):
+                places.setdefault((self.blocks[i].n, symmetry_class), {}).setdefault(number, []).append((at, i))
+        return places
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
-        """The same rotation with some of the operators, all by default, and what that is called."""
+        """This rotation with the operators of a treatment of the spins (all by default), which `used` describes."""
         shared = replace(self.shared, used=used)
         if operators is None:
             return replace(self, shared=shared)
@@ -207,24 +209,24 @@ def plan_of(
     executor: Executor | None,
     exist: Exist | None = None,
 ) -> Plan:
-    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it.
+    """Solve the rotation from N = `nmin` to `nmax` and contract each channel to its eigenstates.
 
     Parameters
     ----------
     top : Top
+        Constants and kind.
     effects : tuple of QuantumEffect
-        All of the Hamiltonian, those of spins among them.
+        All effects of the Hamiltonian, spins included.
     nmin, nmax : int
         Lowest and highest N.
     executor : Executor or None
-        N are spread over it.
+        Blocks of different N are solved on it in parallel.
     exist : callable, optional
         See `levels.levels_of_f`; functions |N K⟩ that do not exist are left out.
 
     Returns
     -------
-    Plan
-    """
+    Plan"""
     without_internal_rotation(top, "levels with spins in a field")
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
@@ -235,18 +237,20 @@ def plan_of(
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
     stacks = stacks_of(blocks)
-    found: dict[Channel, list[Contracted]] = {}
+    by_channel: dict[Channel, list[Contracted]] = {}
     for rank in {channel.rank for channel in distinct}:
-        own = [channel for channel in distinct if channel.rank == rank]
-        pieces = [distinct[channel] for channel in own]
-        found |= zip(own, contracted_operators(stacks, min(reach, rank), pieces, representation), strict=True)
-    contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
+        same_rank = [channel for channel in distinct if channel.rank == rank]
+        pieces = [distinct[channel] for channel in same_rank]
+        by_channel |= zip(
+            same_rank, contracted_operators(stacks, min(reach, rank), pieces, representation), strict=True
+        )
+    contracted = [(by_channel[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:
-    """Of each channel the first one with the same operators of N, such as that of an equivalent nucleus: they share their matrices."""
+    """The first channel with the same operators of N for each channel (such as another equivalent nucleus): they share matrices."""
     firsts: dict[Channel, Channel] = {}
     for channel, pieces in channels.items():
         alike = (other for other in firsts.values() if other.rank == channel.rank and channels[other] == pieces)
@@ -254,69 +258,73 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
     return firsts
 
 
-def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
-    """The parts of every block of an F whose patterns these are; none of an F that N and the spins do not make."""
-    if not len(every):
+def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
+    """The parts of each block of an F with these patterns; nothing for an F that N and the spins cannot form."""
+    if not len(patterns):
         return
-    n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
-    bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
+    n, classes = patterns[:, 0] // 2, plan.shared.scheme.classes(patterns)
+    bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(patterns)]
     rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}
     for number in sorted({number for place in rows for number in plan.families_at.get(place, ())}):
         members = [(at, i, rows[place]) for place in rows for at, i in plan.families_at.get(place, {}).get(number, ())]
-        yield _parts(plan, [(i, own) for _, i, own in sorted(members, key=lambda member: member[0])])
+        yield _parts(plan, [(i, rows_of_n) for _, i, rows_of_n in sorted(members, key=lambda member: member[0])])
 
 
 def functions_of_blocks(plan: Plan, every_f: Iterable[int]) -> list[SpinBlock]:
-    """The functions of the blocks of all F, each named after its state of the rotation, with the energy of that; no vectors."""
+    """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
     cache, tables = plan.shared.cache, {f: plan.shared.scheme.patterns(f) for f in every_f}
     cache["patterns"] = tables
-    known = couplings_of_all(plan, tables)
+    coefficients = couplings_of_all(plan, tables)
     out = []
-    for twice_f, every in tables.items():
-        cache["coupling", twice_f] = known[twice_f] if known else couplings(plan, {twice_f: every})[twice_f]
-        for parts in parts_of_f(plan, every):
+    for twice_f, patterns in tables.items():
+        cache["coupling", twice_f] = (
+            coefficients[twice_f] if coefficients else couplings(plan, {twice_f: patterns})[twice_f]
+        )
+        for parts in parts_of_f(plan, patterns):
             energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
-            labels = np.concatenate([_labels_of_functions(part, every[part.patterns]) for part in parts])
+            labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
             ones = np.ones(len(energies))
-            out.append(SpinBlock(twice_f, every, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
+            out.append(SpinBlock(twice_f, patterns, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
     return out
 
 
-def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
+def _labels_of_functions(part: SpinPart, part_patterns: Ints) -> Ints:
+    """Labels of the functions of a part, pattern by pattern."""
     names = named_states(part.rotor, part.rotor.vectors)
-    return np.concatenate([np.column_stack([names, np.tile(one, (len(names), 1))]) for one in own_patterns])
+    return np.concatenate([np.column_stack([names, np.tile(pattern, (len(names), 1))]) for pattern in part_patterns])
 
 
 def couplings_of_all(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
-    """Coefficients of all channels for many F at once, by F; none where they are too many, or have a total spin: made F by F."""
+    """Coefficients of all channels for many F at once, by F; empty where patterns are too many or have a total spin."""
     few = not plan.shared.scheme.equivalent and max(map(len, tables.values()), default=0) <= FEW
     return couplings(plan, tables) if few and tables else {}
 
 
 def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
-    """c(p', p) of all channels by F."""
-    acting = {channel for found in plan.operators.values() for _, channels in found for channel in channels}
-    found = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
-    return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
+    """c(p', p) of all channels by F, then by channel."""
+    acting = {channel for by_channel in plan.operators.values() for _, channels in by_channel for channel in channels}
+    by_channel = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
+    return {f: {channel: by_f[f] for channel, by_f in by_channel.items()} for f in tables}
 
 
 @lru_cache(maxsize=1024)
 def _coefficients_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
-    """c(p', p) of a channel over all patterns of one F, which levels and their derivatives share; read-only."""
-    found = coefficients_of(scheme, channel, scheme.patterns(twice_f))
-    found.flags.writeable = False
-    return found
+    """c(p', p) of a channel over all patterns of one F; read-only, shared by levels and derivatives."""
+    coefficients = coefficients_of(scheme, channel, scheme.patterns(twice_f))
+    coefficients.flags.writeable = False
+    return coefficients
 
 
 def couplings_of(scheme: Scheme, channel: Channel, tables: dict[int, Ints]) -> dict[int, Floats]:
-    """c(p', p) of a channel by F, whose patterns these are."""
+    """c(p', p) of a channel by F, from the patterns of each F."""
     if scheme.equivalent:
         return {f: _coefficients_of_f(scheme, channel, f) for f in tables}
-    both = {f: (own, own) for f, own in tables.items()}
+    both = {f: (patterns, patterns) for f, patterns in tables.items()}
     return for_every_f(both, lambda bra, ket: _between(scheme, channel, bra, ket))
 
 
 def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:
+    """The parts of one block: rotational blocks with rows of their patterns, one after another."""
     parts, start = [], 0
     for i, rows in members:
         block = plan.blocks[i]
@@ -332,36 +340,38 @@ def product(left: Floats, right: Floats) -> Floats:
     return (left[:, None, :, None] * right[None, :, None, :]).reshape(rows, columns)
 
 
-def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    """c(p', p) of a channel between all patterns of an F, with its powers of N·S; every: (..., n, columns)."""
+def coefficients_of(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
+    """c(p', p) of a channel between all patterns (..., n, columns) of an F, with its powers of N·S."""
     if not scheme.equivalent:
-        return _between(scheme, channel, every, every)
-    return _with_conserved_and_powers(scheme, channel, every, every, _with_total(scheme, channel, every))
+        return _between(scheme, channel, patterns, patterns)
+    return _with_conserved_and_powers(scheme, channel, patterns, patterns, _with_total(scheme, channel, patterns))
 
 
 def _between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
-    """The same of any patterns, coupled one by one."""
-    found = coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
-    return _with_conserved_and_powers(scheme, channel, bra, ket, found)
+    """c(p', p) between any patterns that are coupled one by one."""
+    values = coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
+    return _with_conserved_and_powers(scheme, channel, bra, ket, values)
 
 
-def _with_conserved_and_powers(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints, found: Floats) -> Floats:
+def _with_conserved_and_powers(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints, values: Floats) -> Floats:
+    """Set elements between different conserved sums to zero, and multiply by powers of N·S."""
     for column in scheme.conserved_columns:
-        found = np.where(bra[..., :, None, column] == ket[..., None, :, column], found, 0.0)
+        values = np.where(bra[..., :, None, column] == ket[..., None, :, column], values, 0.0)
     powers = channel.ns, channel.n2
-    return np.asarray(found * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else found
+    return np.asarray(values * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else values
 
 
-def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    return coefficients(scheme.twice, channel.acting, channel.rank, every, every)
+def _one_by_one(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
+    """c(p', p) between patterns coupled one by one, without powers."""
+    return coefficients(scheme.twice, channel.acting, channel.rank, patterns, patterns)
 
 
-def _with_total(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    """The coefficients over patterns with a total spin; of two equivalent spins half the sum or the difference with both exchanged."""
-    plain, turn = scheme.recoupling(int(every[0, -1]))
-    found = _one_by_one(scheme, channel, plain)
+def _with_total(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
+    """c(p', p) over patterns with a total spin; for two equivalent spins ½(value ± value with both exchanged)."""
+    plain, turn = scheme.recoupling(int(patterns[0, -1]))
+    values = _one_by_one(scheme, channel, plain)
     b = len(scheme.spins) - 1
     turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
     if turned != channel.acting and scheme.equivalent == 2:
-        found = (found + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
-    return np.asarray(turn.T @ found @ turn)
+        values = (values + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
+    return np.asarray(turn.T @ values @ turn)

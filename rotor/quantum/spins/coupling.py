@@ -1,14 +1,14 @@
-"""Angular momenta coupled one after another, N + S1 = J1, J1 + S2 = J2, ... = F: the functions of an F, and coefficients between them.
+"""Angular momenta coupled one after another, N + S1 = J1, J1 + S2 = J2, ... = F: coupling patterns of an F and coefficients between them.
 
 A coupling pattern is (N, J1, ..., F), stored doubled. A scalar operator T^K(N) · W^K(spins) has the element
 
     ⟨p'|T·W|p⟩ = c(p', p) ⟨N'‖T^K‖N⟩
 
 whose coefficient c is a product over the steps of the chain, each with one symbol (A. R. Edmonds, Angular Momentum in Quantum
-Mechanics, 1957): with T^K alone, (7.1.7); where a spin closes the scalar product, (7.1.6); where T^L and a first spin
-make a tensor that a second spin closes, (7.1.5). Reduced elements are defined as there and in `tensors`.
+Mechanics, 1957): (7.1.7) where T^K does not act on the spin; (7.1.6) where a spin closes the scalar product; (7.1.5) where T^L and a
+first spin form a tensor that a second spin closes. Reduced elements are defined as there and in `tensors`.
 
-Two equivalent spins, the last ones, may be coupled to a total first, I_a + I_b = I_tot, F' + I_tot = F: patterns (N, ..., F', I_tot, F).
+The last two spins, if equivalent, may be coupled to a total first, I_a + I_b = I_tot, F' + I_tot = F: patterns (N, ..., F', I_tot, F).
 """
 
 from __future__ import annotations
@@ -24,31 +24,32 @@ from rotor.quantum.wigner import nine_j, six_j
 
 
 def patterns(spins: tuple[int, ...], f: int) -> Ints:
-    """All coupling patterns of one F, (number, 1 + spins), everything doubled; N whole, rising from the first column on.
+    """All coupling patterns of one F, (number, 1 + spins), doubled; N is an integer, and rows rise from the first column on.
 
     >>> patterns((2,), 2).tolist()  # I = 1, F = 1: N = 0, 1, 2
     [[0, 2], [2, 2], [4, 2]]
     """
-    found: list[tuple[int, ...]] = [(f,)]
+    chains: list[tuple[int, ...]] = [(f,)]
     for spin in reversed(spins):
-        found = [(j, *rest) for rest in found for j in range(abs(rest[0] - spin), rest[0] + spin + 1, 2)]
-    whole = sorted(pattern for pattern in found if pattern[0] % 2 == 0)
+        chains = [(j, *rest) for rest in chains for j in range(abs(rest[0] - spin), rest[0] + spin + 1, 2)]
+    whole = sorted(pattern for pattern in chains if pattern[0] % 2 == 0)
     return np.array(whole, dtype=np.int64).reshape(-1, 1 + len(spins))
 
 
 def patterns_of_total(spins: tuple[int, ...], f: int) -> Ints:
-    """All patterns of one F whose last two spins are coupled to a total, (number, 1 + spins), doubled; by N, then those with
-    I_a + I_b - I_tot even, then odd.
+    """All patterns of one F whose last two spins are coupled to a total, (number, 1 + spins), doubled.
+
+    They are ordered by N, then even before odd I_a + I_b - I_tot.
 
     >>> patterns_of_total((1, 1), 2).tolist()  # I = 1/2 twice, F = 1
     [[0, 2, 2], [2, 2, 2], [2, 0, 2], [4, 2, 2]]
     """
     *others, a, b = spins
-    found = []
+    rows = []
     for total in range(abs(a - b), a + b + 1, 2):
         for pattern in patterns((*others, total), f).tolist():
-            found.append((pattern[0], (a + b - total) // 2 % 2, *pattern[1:-1], total, pattern[-1]))
-    table = np.array(sorted(found), dtype=np.int64).reshape(-1, 2 + len(spins))
+            rows.append((pattern[0], (a + b - total) // 2 % 2, *pattern[1:-1], total, pattern[-1]))
+    table = np.array(sorted(rows), dtype=np.int64).reshape(-1, 2 + len(spins))
     return np.delete(table, 1, axis=1)
 
 
@@ -60,14 +61,14 @@ def recoupling(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -> Floats:
     a, b = spins[-2:]
     left, right = one_by_one[:, None, :], total[None, :, :]
     alike = (left[..., :-2] == right[..., :-2]).all(axis=-1) & (left[..., -1] == right[..., -1])
-    first, between, of_pair, f = left[..., -3], left[..., -2], right[..., -2], left[..., -1]
-    root = np.sqrt((between + 1.0) * (of_pair + 1.0))
-    symbol = six_j(first / 2, a / 2, between / 2, b / 2, f / 2, of_pair / 2)
+    first, between, pair_total, f = left[..., -3], left[..., -2], right[..., -2], left[..., -1]
+    root = np.sqrt((between + 1.0) * (pair_total + 1.0))
+    symbol = six_j(first / 2, a / 2, between / 2, b / 2, f / 2, pair_total / 2)
     return np.where(alike, _sign(first + a + b + f) * root * symbol, 0.0)
 
 
 def reduced_spin(spin: int, rank: int) -> float:
-    """⟨I‖W^K‖I⟩ of the spin vector (rank 1) and of T²(I, I)/(2I(2I-1)) (rank 2), the form of a quadrupole; 2I is given.
+    """⟨I‖W^K‖I⟩ of the spin vector (rank 1) or of T²(I, I)/(2I(2I-1)) (rank 2, the form of a quadrupole); `spin` is 2I.
 
     √(I(I+1)(2I+1)), and √((I+1)(2I+1)(2I+3)/(24 I(2I-1))) with T²_0(I, I) = (3Iz² - I²)/√6.
 
@@ -83,14 +84,16 @@ def reduced_spin(spin: int, rank: int) -> float:
 
 
 def _passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
-    """⟨(j' S)J'‖T^K‖(j S)J⟩ over ⟨j'‖T^K‖j⟩ where T does not touch S: bra and ket are pairs (..., 2) of doubled j, J.
+    """⟨(j' S)J'‖T^K‖(j S)J⟩ over ⟨j'‖T^K‖j⟩ where T does not act on S: bra and ket are pairs (..., 2) of doubled j, J.
 
     (-1)^(j'+S+J+K) √((2J'+1)(2J+1)) {j' J' S; J j K}
     """
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
     root = np.sqrt((b + 1.0) * (d + 1.0))
     near = (np.abs(a - c) <= 2 * rank) & (np.abs(b - d) <= 2 * rank)
-    symbol = _of_distinct(near, (a, b, c, d), lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank))
+    symbol = _symbol_of_distinct(
+        near, (a, b, c, d), lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank)
+    )
     return _sign(a + spin + d + 2 * rank) * root * symbol
 
 
@@ -98,19 +101,19 @@ def _closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
     near = (np.abs(a - c) <= 2 * rank) & (b == d)
-    symbol = _of_distinct(near, (a, c, d), lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2))
+    symbol = _symbol_of_distinct(near, (a, c, d), lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2))
     return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
 
 
-def _of_distinct(chosen: NDArray[np.bool_], arguments: Sequence[Ints], symbol: Callable[..., Floats]) -> Floats:
-    """A symbol of doubled arguments where `chosen`, 0 elsewhere: patterns share their first steps, so that few are distinct."""
-    own = [np.broadcast_to(argument, chosen.shape)[chosen] for argument in arguments]
-    code, scale = own[0], 1 + max((int(argument.max(initial=0)) for argument in own), default=0)
-    for argument in own[1:]:
+def _symbol_of_distinct(chosen: NDArray[np.bool_], arguments: Sequence[Ints], symbol: Callable[..., Floats]) -> Floats:
+    """A symbol of doubled arguments where `chosen`, 0 elsewhere; computed for distinct arguments only, since patterns share steps."""
+    selected = [np.broadcast_to(argument, chosen.shape)[chosen] for argument in arguments]
+    code, scale = selected[0], 1 + max((int(argument.max(initial=0)) for argument in selected), default=0)
+    for argument in selected[1:]:
         code = code * scale + argument
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     out = np.zeros(chosen.shape)
-    out[chosen] = symbol(*(argument[first] for argument in own))[place]
+    out[chosen] = symbol(*(argument[first] for argument in selected))[place]
     return out
 
 
@@ -123,6 +126,7 @@ def _opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
 
 
 def _sign(doubled: Ints) -> Floats:
+    """(-1)^n for doubled n."""
     return np.where(doubled // 2 % 2, -1.0, 1.0)
 
 
@@ -134,15 +138,20 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
 
     Parameters
     ----------
-    spins : 2S of every spin, in the order of coupling
-    acting : places of the spins in the operator, from 0: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2),
-        (i, j) the product of two, coupled to K = 0 (S_i · S_j) or 2; () none
-    rank : K of the operator of N. One of rank 0 is given as a plain matrix, not as a reduced one.
-    bra, ket : patterns (..., n, 1 + spins), doubled
+    spins : tuple of int
+        2S of each spin, in the order of coupling.
+    acting : tuple of int
+        Places of the spins in the operator, from 0: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2),
+        (i, j) the product of two, coupled to K = 0 (S_i · S_j) or 2; () none.
+    rank : int
+        K of the operator of N. The operator of rank 0 is a plain matrix, not a reduced one.
+    bra, ket : (..., n, 1 + spins) array
+        Patterns, doubled.
 
     Returns
     -------
-    (..., n, m). T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
+    (..., n, m) array
+        Pure numbers. T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
     """
     left, right = bra[..., :, None, :], ket[..., None, :, :]
     if not acting:
@@ -155,8 +164,8 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
         if place > last:
             total = total * (pair[0][..., 1] == pair[1][..., 1])
         elif place == last:
-            own = 2 if acting == (last, last) else 1
-            total = total * _closed(*pair, spin, own) * reduced_spin(spin, own)
+            spin_rank = 2 if acting == (last, last) else 1
+            total = total * _closed(*pair, spin, spin_rank) * reduced_spin(spin, spin_rank)
         elif place == first:
             total = total * _opened(*pair, spin, carried) * reduced_spin(spin, 1)
             carried = 1
@@ -168,7 +177,7 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
 
 
 def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
-    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that touches no spin, such as the dipole.
+    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that acts on no spin, such as the dipole.
 
     Parameters
     ----------
@@ -201,7 +210,7 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     rank : int
         L of the tensor of the rotation.
     acting : int or None
-        Which spin belongs to V, counted from 0; None for T^1 itself.
+        Place of the spin in V, counted from 0; None for T^1 itself.
     bra, ket : (patterns, columns) arrays of int
         Coupling patterns N, J1, ... F of both sides, doubled.
 
@@ -212,7 +221,7 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
 
     Notes
     -----
-    T^0 is given as a plain matrix, not as a reduced one.
+    T^0 is a plain matrix, not a reduced one.
     """
     if acting is None:
         return tensor_coefficients(spins, rank, bra, ket)
@@ -228,38 +237,39 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     return np.asarray(total)
 
 
-_AT_ONCE = 200_000  # elements at a time: the arrays on the way stay in the cache of the processor
-_LARGE = 10_000  # elements of a table that is worked on by itself
+_AT_ONCE = 200_000  # elements computed at a time; intermediate arrays then fit the processor's cache
+_LARGE = 10_000  # a table with more elements is computed alone
 
 
 def for_every_f(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
-    """Coefficients `of` patterns of bra and ket, (bra, ket) each, by F: those of many small tables from one call, pair by pair."""
+    """Coefficients `of` (bra, ket) patterns by F; many small tables are computed in one call, pair by pair."""
     out = {f: of(bra, ket) for f, (bra, ket) in tables.items() if len(bra) * len(ket) > _LARGE}
-    some: list[int] = []
+    batch: list[int] = []
     count = 0
     for f in (f for f in tables if f not in out):
-        some.append(f)
+        batch.append(f)
         count += len(tables[f][0]) * len(tables[f][1])
         if count > _AT_ONCE:
-            out |= _pair_by_pair({f: tables[f] for f in some}, of)
-            some, count = [], 0
-    return out | (_pair_by_pair({f: tables[f] for f in some}, of) if some else {})
+            out |= _pair_by_pair({f: tables[f] for f in batch}, of)
+            batch, count = [], 0
+    return out | (_pair_by_pair({f: tables[f] for f in batch}, of) if batch else {})
 
 
 def _pair_by_pair(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
+    """Coefficients of several tables as one list of pairs of patterns."""
     bra = np.concatenate([left.repeat(len(right), axis=0) for left, right in tables.values()])
     ket = np.concatenate([np.tile(right, (len(left), 1)) for left, right in tables.values()])
-    every, start = of(bra[:, None, :], ket[:, None, :]).ravel(), 0
+    values, start = of(bra[:, None, :], ket[:, None, :]).ravel(), 0
     out: dict[int, Floats] = {}
     for f, (left, right) in tables.items():
         stop = start + len(left) * len(right)
-        out[f] = every[start:stop].reshape(len(left), len(right))
+        out[f] = values[start:stop].reshape(len(left), len(right))
         start = stop
     return out
 
 
 def n_dot_s(pattern: Ints, spin: int) -> Floats:
-    """N·S of the first spin, (...,): ½[J(J+1) - N(N+1) - S(S+1)]."""
+    """N·S of the first spin by pattern: ½[J(J+1) - N(N+1) - S(S+1)]."""
     n, j = pattern[..., 0], pattern[..., 1]
     return np.asarray((j * (j + 2) - n * (n + 2) - spin * (spin + 2)) / 8)
 
@@ -280,10 +290,11 @@ def powers_between(spin: int, powers: tuple[int, int], bra: Ints, ket: Ints) -> 
     -------
     (..., n', n) array
     """
-    left, right = (_of_n_dot_s(spin, powers, patterns) for patterns in (bra, ket))
+    left, right = (_n_dot_s_power(spin, powers, patterns) for patterns in (bra, ket))
     return np.asarray((left[..., :, None] + right[..., None, :]) / 2)
 
 
-def _of_n_dot_s(spin: int, powers: tuple[int, int], pattern: Ints) -> Floats:
+def _n_dot_s_power(spin: int, powers: tuple[int, int], pattern: Ints) -> Floats:
+    """(N·S)^r N^2p of the first spin by pattern."""
     n = pattern[..., 0] / 2.0
     return np.asarray((n * (n + 1)) ** powers[1] * n_dot_s(pattern, spin) ** powers[0])

@@ -1,9 +1,9 @@
-"""How large coefficients of coupling can be, for all F together: of an operator with the spins alone that act in it.
+"""Bounds of coupling coefficients for all F, from the spins on which a channel acts.
 
-A channel acts on N and on one or two spins, and leaves all the others as they are. So its coefficients c between the patterns of N' and
-of N have, over all F, the norm that they have with those spins alone, over all sums J of N and them; and their eigenvalues within one
-N lie between the same two. Those of one spin are numbers by J. Of two spins, bounds: ‖c‖₂² ≤ ‖c‖₁ ‖c‖∞ (largest sums of columns and of
-rows), and the circles of Gershgorin.
+A channel acts on N and on one or two spins, and leaves the others unchanged. Its coefficients c between the patterns of N' and N therefore
+have the same norm over all F as with those spins alone over all sums J of N and the spins, and their eigenvalues within one N have the same
+limits. With one spin they are numbers by J. With two spins the norm is bounded by ‖c‖₂² ≤ ‖c‖₁ ‖c‖∞ (largest sums of columns and of rows),
+and the eigenvalues by Gershgorin circles.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rotor.quantum.spins.scheme import Scheme
 
 
 class Alone(NamedTuple):
-    """Of a channel by N: norm (N', N), lowest and highest eigenvalue (N,) of its coefficients."""
+    """Bounds of the coefficients of a channel: norm (N', N), lowest and highest eigenvalue (N,)."""
 
     norm: Floats
     lowest: Floats
@@ -28,41 +28,44 @@ class Alone(NamedTuple):
 
 
 def coupling_alone(scheme: Scheme, channel: Channel, highest_n: int) -> Alone:
-    """Bounds of the coefficients of a channel for all F and up to an N.
+    """Bounds of the coefficients of a channel for all F and N up to `highest_n`.
 
-    Half the sum or difference of an operator and of that with two equivalent spins exchanged has no larger norm than each of both;
-    eigenvalues of half the sum lie between the same two, those of half the difference reach half their distance at most.
+    For ½(X ± X'), with two equivalent spins exchanged in X', the norm is at most that of X. Eigenvalues of ½(X + X') have the limits of X;
+    those of ½(X - X') lie within ± half the distance of these limits.
     """
     places = sorted({*channel.acting, *([0] if channel.ns else [])})
     acting = tuple(places.index(place) for place in channel.acting)
     twice = tuple(scheme.twice[place] for place in places)
-    found = _alone(twice, channel._replace(acting=acting, exchange=0), highest_n)
+    bounds = _alone(twice, channel._replace(acting=acting, exchange=0), highest_n)
     if channel.exchange >= 0:
-        return found
-    half = (found.highest - found.lowest) / 2
-    return Alone(found.norm, -half, half)
+        return bounds
+    half = (bounds.highest - bounds.lowest) / 2
+    return Alone(bounds.norm, -half, half)
 
 
 @lru_cache(maxsize=64)
 def _alone(twice: tuple[int, ...], channel: Channel, highest_n: int) -> Alone:
+    """Bounds with the acting spins only; read-only."""
     tables = {j: patterns(twice, j) for j in range(sum(twice) % 2, 2 * highest_n + sum(twice) + 1, 2)}
-    tables = {j: own[own[:, 0] <= 2 * highest_n] for j, own in tables.items()}
+    tables = {j: patterns_of_j[patterns_of_j[:, 0] <= 2 * highest_n] for j, patterns_of_j in tables.items()}
 
     def of(bra: Ints, ket: Ints) -> Floats:
-        own = coefficients(twice, channel.acting, channel.rank, bra, ket)
-        return own * powers_between(twice[0], (channel.ns, channel.n2), bra, ket) if channel.ns else own
+        plain = coefficients(twice, channel.acting, channel.rank, bra, ket)
+        return plain * powers_between(twice[0], (channel.ns, channel.n2), bra, ket) if channel.ns else plain
 
-    found = for_every_f({j: (own, own) for j, own in tables.items() if len(own)}, of)
+    by_j = for_every_f(
+        {j: (patterns_of_j, patterns_of_j) for j, patterns_of_j in tables.items() if len(patterns_of_j)}, of
+    )
     norm = np.zeros((highest_n + 1, highest_n + 1))
     ends = np.full((2, highest_n + 1), -np.inf)
-    for j, own in found.items():
+    for j, values in by_j.items():
         n, starts = np.unique(tables[j][:, 0] // 2, return_index=True)
-        size, inside = np.abs(own), np.ix_(n, n)
+        size, inside = np.abs(values), np.ix_(n, n)
         rows = np.maximum.reduceat(np.add.reduceat(size, starts, axis=1), starts, axis=0)
         columns = np.maximum.reduceat(np.add.reduceat(size, starts, axis=0), starts, axis=1)
         norm[inside] = np.maximum(norm[inside], np.sqrt(rows * columns))
-        diagonal, places = np.diag(own), np.searchsorted(n, tables[j][:, 0] // 2)
-        radius = np.add.reduceat(size, starts, axis=1)[np.arange(len(own)), places] - np.abs(diagonal)
+        diagonal, places = np.diag(values), np.searchsorted(n, tables[j][:, 0] // 2)
+        radius = np.add.reduceat(size, starts, axis=1)[np.arange(len(values)), places] - np.abs(diagonal)
         circles = np.array([radius - diagonal, radius + diagonal])
         ends[:, n] = np.maximum(ends[:, n], np.maximum.reduceat(circles, starts, axis=1))
     for array in (norm, ends):

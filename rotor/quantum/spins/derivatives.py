@@ -1,11 +1,11 @@
-"""How levels with spins depend on the constants: ∂E_i/∂c = ⟨i|∂H/∂c|i⟩ (Hellmann and Feynman, see `estimates.derivatives`).
+"""Derivatives of levels with spins by constants: ∂E_i/∂c = ⟨i|∂H/∂c|i⟩ (Hellmann and Feynman, see `estimates.derivatives`).
 
-∂H/∂c is a sum over channels of coefficients of coupling times elements of the rotation, c(p', p) ⟨r'|X_c|r⟩. With a state as V_pr,
+∂H/∂c is a sum over channels of coupling coefficients times elements of the rotation, c(p', p) ⟨r'|X_c|r⟩. With V_pr for the state i,
 
-    ∂E_i/∂c = Σ_r'r X_c(r', r) D_i(r', r),     D_i(r', r) = Σ_p'p V_p'r' c(p', p) V_pr,
+    ∂E_i/∂c = Σ_r'r X_c(r', r) D_i(r', r),     D_i(r', r) = Σ_p'p V_p'r' c(p', p) V_pr.
 
-so that the density D of a channel is made once for all constants, and all of them are one contraction. Blocks whose functions differ in F
-alone stand side by side (`many_f`), elements of the rotation in tables by N. Axial tops: `axial_levels`.
+The density D of a channel is computed once and contracted with all constants. Blocks whose functions differ only in F share arrays
+(`many_f`); elements of the rotation are tables by N. For axial tops see `axial_levels`.
 """
 
 from __future__ import annotations
@@ -31,14 +31,16 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-_AT_ONCE = 1 << 19  # numbers of the largest density that is made at a time: 4 MB, about the cache of a core
-_PADDED = 1 << 21  # numbers of the vectors that stand side by side: 16 MB
-_LIKE = 1.5  # sizes of blocks whose vectors stand side by side
+_AT_ONCE = 1 << 19  # largest density at a time (numbers): 4 MB, about the cache of a core
+_PADDED = 1 << 21  # largest array of vectors (numbers): 16 MB
+_LIKE = 1.5  # largest ratio of sizes of blocks whose vectors share an array
 
 
 class UnitTables(NamedTuple):
-    """Unit elements (N, units, states', states) between two kinds of blocks of the rotation; what parameters, by their columns, have of
-    each at every N: mix (N, parameters, units)."""
+    """Unit elements (N, units, states', states) between two kinds of rotational blocks.
+
+    columns: the parameters that act. mix: (N, parameters, units), the factor of each unit in the derivative by each parameter.
+    """
 
     elements: Floats
     columns: Ints
@@ -56,13 +58,13 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if shared.axial:
         return np.asarray(axial_derivatives(top, levels.effects, names, levels.blocks, len(levels))[rows])
     frame, groups = _frame_and_groups(levels.blocks, shared)
-    out = np.zeros((len(levels) + 1, len(names)))  # the last row is that of padding
+    out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
     tables = [
         (couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1]), elements)
         for channel, elements in _unit_tables(top, levels, names, shared, frame)
     ]
     for group, blocks in groups:
-        for alike in _of_like_size(blocks):
+        for alike in _runs_of_similar_size(blocks):
             states = states_of_group(group, alike, len(levels))
             total = np.zeros((len(alike), len(names), states.rows.shape[1]))
             for coefficients, elements in tables:
@@ -72,113 +74,116 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
 
 
 def _frame_and_groups(blocks: Sequence[SpinBlock], shared: Shared) -> tuple[Frame, list[tuple[Group, list[SpinBlock]]]]:
-    """Groups of blocks that differ in F alone: those in which they were solved, or made for blocks that were solved one by one."""
+    """Groups of blocks that differ only in F: those in which they were solved, or new ones for blocks solved one by one."""
     if all(block.group is not None for block in blocks):
         frame: Frame = shared.cache["frame"]
         return frame, groups_of_blocks(blocks)
     twice_f = [block.twice_f for block in blocks]
     table = pattern_table(shared.scheme, min(twice_f), max(twice_f))
-    frame = frame_of(shared.stacks, table.places, table.every)
-    made = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
-    return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in made]
+    frame = frame_of(shared.stacks, table.places, table.distances)
+    grouped = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
+    return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in grouped]
 
 
-def _of_like_size(blocks: Sequence[SpinBlock]) -> Iterator[list[SpinBlock]]:
-    """Blocks whose vectors stand side by side, in the order of F: of like size and bounded memory."""
-    some: list[SpinBlock] = []
+def _runs_of_similar_size(blocks: Sequence[SpinBlock]) -> Iterator[list[SpinBlock]]:
+    """Runs of blocks of similar size whose vectors share an array of bounded memory, in the order of F."""
+    run: list[SpinBlock] = []
     for block in blocks:
-        sizes = [len(one.vectors) for one in (*some, block)]
-        if some and (max(sizes) > _LIKE * min(sizes) or len(sizes) * max(sizes) ** 2 > _PADDED):
-            yield some
-            some = []
-        some.append(block)
-    yield some
+        sizes = [len(member.vectors) for member in (*run, block)]
+        if run and (max(sizes) > _LIKE * min(sizes) or len(sizes) * max(sizes) ** 2 > _PADDED):
+            yield run
+            run = []
+        run.append(block)
+    yield run
 
 
 def _unit_tables(
     top: Top, levels: Levels, names: Sequence[str], shared: Shared, frame: Frame
 ) -> Iterator[tuple[Channel, dict[Kinds, UnitTables]]]:
-    """The elements of all parameters by channel: powers of N, operators of spins, other operators of N."""
+    """Elements of all parameters by channel: powers of N, operators of spins, other operators of N."""
     terms = StateTerms.of(top, levels.effects, names, shared.representation)
-    yield ALONE, _of_powers(terms, shared, frame)
-    every = parameter_channels(top, levels.effects, names, shared.scheme)
-    channels = dict.fromkeys(channel for own in every for channel in own)
+    yield ALONE, _power_tables(terms, shared, frame)
+    by_parameter = parameter_channels(top, levels.effects, names, shared.scheme)
+    channels = dict.fromkeys(channel for by_channel in by_parameter for channel in by_channel)
     for rank in {channel.rank for channel in channels}:
-        own = [channel for channel in channels if channel.rank == rank]
-        yield from zip(own, _of_spins(every, own, shared, frame), strict=True)
+        same_rank = [channel for channel in channels if channel.rank == rank]
+        yield from zip(same_rank, _spin_tables(by_parameter, same_rank, shared, frame), strict=True)
     if terms.linked:
         linked = [name if column in terms.linked else "" for column, name in enumerate(names)]
-        of_linked = StateTerms.of(top, levels.effects, linked, shared.representation)
-        yield ALONE, _of_links(of_linked, len(names), terms.linked, levels.blocks, frame)
+        linked_terms = StateTerms.of(top, levels.effects, linked, shared.representation)
+        yield ALONE, _link_tables(linked_terms, len(names), terms.linked, levels.blocks, frame)
 
 
-def _of_spins(
-    every: Sequence[Channels], channels: Sequence[Channel], shared: Shared, frame: Frame
+def _spin_tables(
+    by_parameter: Sequence[Channels], channels: Sequence[Channel], shared: Shared, frame: Frame
 ) -> Iterator[dict[Kinds, UnitTables]]:
-    """Operators of spins in some channels of one rank: a unit for each operator of N, which a parameter has ½(N'^2p + N^2p) times."""
-    units = [_units([by_channel.get(channel, []) for by_channel in every]) for channel in channels]
-    reach, alone = min(_REACH, channels[0].rank), [[unit] for own in units for unit in own]
+    """Spin operators of channels of one rank: one unit for each operator of N, which a parameter multiplies by ½(N'^2p + N^2p)."""
+    units = [_units([by_channel.get(channel, []) for by_channel in by_parameter]) for channel in channels]
+    reach, alone = min(_REACH, channels[0].rank), [[unit] for units_of_channel in units for unit in units_of_channel]
     contracted = iter(operators_of_stacks(shared.stacks, reach, alone, shared.representation))
-    for channel, own in zip(channels, units, strict=True):
+    for channel, units_of_channel in zip(channels, units, strict=True):
         terms = [
-            (own.index(_unit(piece)), piece, column)
-            for column, by_channel in enumerate(every)
+            (units_of_channel.index(_unit(piece)), piece, column)
+            for column, by_channel in enumerate(by_parameter)
             for piece in by_channel.get(channel, ())
         ]
         columns = sorted({column for _, _, column in terms})
-        tables = [tables_of(next(contracted), frame) for _ in own]
-        found = {}
+        tables = [tables_of(next(contracted), frame) for _ in units_of_channel]
+        by_kinds = {}
         for key, elements in _side_by_side(tables).items():
-            mix = np.zeros((frame.count_of_n, len(columns), len(own)))
+            mix = np.zeros((frame.count_of_n, len(columns), len(units_of_channel)))
             n = frame.lowest + np.arange(frame.count_of_n)
             m = n + key[2]
             for unit, piece, column in terms:
                 powers = ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
                 mix[:, columns.index(column), unit] += piece.value * powers
-            found[key] = UnitTables(elements, np.array(columns), mix)
-        yield found
+            by_kinds[key] = UnitTables(elements, np.array(columns), mix)
+        yield by_kinds
 
 
 def _unit(piece: Piece) -> Piece:
+    """A piece with value 1 and no power of N²."""
     return replace(piece, value=1.0, n2=0)
 
 
 def _units(pieces: Sequence[Sequence[Piece]]) -> list[Piece]:
-    """The operators of N in sums of pieces, without values and powers of N, each once."""
-    return list(dict.fromkeys(_unit(piece) for own in pieces for piece in own))
+    """The distinct operators of N in sums of pieces, without values and powers of N²."""
+    return list(dict.fromkeys(_unit(piece) for sum_of_pieces in pieces for piece in sum_of_pieces))
 
 
 def _side_by_side(tables: Sequence[Tables]) -> dict[Kinds, Floats]:
     """Tables (N, states', states) of several units as (N, units, states', states)."""
-    found: dict[Kinds, Floats] = {}
-    for unit, own in enumerate(tables):
-        for key, table in own.items():
-            found.setdefault(key, np.zeros((len(table), len(tables), *table.shape[1:])))[:, unit] = table
-    return found
+    joined: dict[Kinds, Floats] = {}
+    for unit, table_of_unit in enumerate(tables):
+        for key, table in table_of_unit.items():
+            joined.setdefault(key, np.zeros((len(table), len(tables), *table.shape[1:])))[:, unit] = table
+    return joined
 
 
-def _of_links(
+def _link_tables(
     terms: StateTerms, count: int, linked: Sequence[int], blocks: Sequence[SpinBlock], frame: Frame
 ) -> dict[Kinds, UnitTables]:
-    """Parameters that multiply other operators of N than powers, each a unit."""
+    """Parameters that multiply operators of N other than powers, one unit each."""
     rotors = {part.number: part.rotor for block in blocks for part in block.parts}
-    found: dict[Kinds, Floats] = {}
+    tables: dict[Kinds, Floats] = {}
     linear = blocks_of_terms(terms, count, blocks[0].shared.representation, list(rotors.values()))
     for (number, rotor), block in zip(rotors.items(), linear, strict=True):
         kind, size = frame.kinds[number], block.size
         states = frame.energies_mhz[kind].shape[1]
-        table = found.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
+        table = tables.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
         units = [linked.index(parameter) for parameter in block.parameters.tolist()]
         table[rotor.n - frame.lowest, units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
     mix = np.tile(np.eye(len(linked)), (frame.count_of_n, 1, 1))
-    return {key: UnitTables(table, np.array(linked), mix) for key, table in found.items()}
+    return {key: UnitTables(table, np.array(linked), mix) for key, table in tables.items()}
 
 
-def _of_powers(every: StateTerms, shared: Shared, frame: Frame) -> dict[Kinds, UnitTables]:
-    """Powers of N, N^2p ½[Nz^2q, N₊^2n + N₋^2n]₊: a unit for each (v, q, n), which a parameter has N^2p times at each N."""
-    others = every.linked
+def _power_tables(state_terms: StateTerms, shared: Shared, frame: Frame) -> dict[Kinds, UnitTables]:
+    """Powers N^2p ½[Nz^2q, N₊^2n + N₋^2n]₊: one unit for each (v, q, n), which a parameter multiplies by N^2p."""
+    others = state_terms.linked
     terms = [
-        ((v, q, n), p, column, factor) for v, (p, q, n), column, factor in every.by_power() if column not in others
+        ((v, q, n), p, column, factor)
+        for v, (p, q, n), column, factor in state_terms.by_power()
+        if column not in others
     ]
     units = list(dict.fromkeys(unit for unit, *_ in terms))
     columns = sorted({column for _, _, column, _ in terms})
@@ -186,23 +191,23 @@ def _of_powers(every: StateTerms, shared: Shared, frame: Frame) -> dict[Kinds, U
     mix = np.zeros((len(n), len(columns), len(units)))
     for unit, p, column, factor in terms:
         mix[:, columns.index(column), units.index(unit)] += factor * (n * (n + 1.0)) ** p
-    found: dict[Kinds, Floats] = {}
+    tables: dict[Kinds, Floats] = {}
     for stack, matrices in powers_of_stacks(shared.stacks, units) if units else ():
         count, states = frame.energies_mhz[stack.kind].shape
-        table = found.setdefault((stack.kind, stack.kind, 0), np.zeros((count, len(units), states, states)))
+        table = tables.setdefault((stack.kind, stack.kind, 0), np.zeros((count, len(units), states, states)))
         table[stack.n - frame.lowest, :, : matrices.shape[2], : matrices.shape[3]] = matrices
-    return {key: UnitTables(elements, np.array(columns), mix) for key, elements in found.items()}
+    return {key: UnitTables(elements, np.array(columns), mix) for key, elements in tables.items()}
 
 
 def _add(total: Floats, states: States, tables: dict[Kinds, UnitTables], coefficients: Floats, frame: Frame) -> None:
-    """Adds the derivatives (blocks, parameters, states) by one channel for blocks of a group that stand side by side."""
+    """Add the derivatives (blocks, parameters, states) from one channel for blocks of a group."""
     group, twice_f = states.group, list(states.places)
-    own = coefficients[frame.of_f(twice_f)]
+    coefficients_of_f = coefficients[frame.rows_of_f(twice_f)]
     for left in group.rotations:
         for right in group.rotations:
             key = (left.kind, right.kind, (left.rise - right.rise) // 2)
             if key in tables:
-                slopes = _between(states, left, right, tables[key], own, frame.of_n(twice_f, right))
+                slopes = _between(states, left, right, tables[key], coefficients_of_f, frame.rows_of_n(twice_f, right))
                 twice = (
                     1.0 if left.kind == right.kind and left.rise == right.rise else 2.0
                 )  # the other order has no table
@@ -213,7 +218,7 @@ def _between(
     states: States, left: RotationColumns, right: RotationColumns, table: UnitTables, coefficients: Floats,
     places: slice | list[int],
 ) -> Floats:  # fmt: skip
-    """Σ_p'r' V_p'r' Σ_pr c(p', p) X_c(r', r) V_pr between two kinds of blocks: (blocks, parameters, states)."""
+    """Σ_p'r' V_p'r' Σ_pr c(p', p) X_c(r', r) V_pr between two kinds of rotational blocks: (blocks, parameters, states)."""
     elements = table.elements[places]  # (blocks, units, r', r)
     blocks, units, rows, columns = elements.shape
     rows, columns = min(rows, states.vectors.shape[2]), min(columns, states.vectors.shape[2])
@@ -224,7 +229,7 @@ def _between(
         moved = between[:, :, :, None] * ket
     else:
         moved = np.matmul(between, ket.reshape(blocks, ket.shape[1], -1)).reshape(blocks, -1, columns, ket.shape[3])
-    found = np.matmul(elements, moved).reshape(blocks, -1, units, rows, moved.shape[3])
-    found *= bra[:, :, None]
-    slopes = found.sum(axis=(1, 3))
+    products = np.matmul(elements, moved).reshape(blocks, -1, units, rows, moved.shape[3])
+    products *= bra[:, :, None]
+    slopes = products.sum(axis=(1, 3))
     return np.asarray(np.matmul(table.mix[places], slopes))

@@ -1,7 +1,7 @@
-"""Which solved blocks of the rotation belong together, since operators with spins connect them.
+"""Families of solved rotational blocks that operators with spins connect.
 
-Two equivalent spins make two classes of each block: of functions that keep (0) and that change (1) their sign with the exchange of
-both. An operator that changes sign with the exchange joins one class to the other.
+With two equivalent spins each block has two classes of functions: symmetric (0) and antisymmetric (1) under their exchange. An operator
+that changes sign with the exchange connects the two classes.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from rotor.quantum.spins.contraction import Contracted, acting_numbers
 from rotor.quantum.spins.rotor import Channel
 
 Link = tuple[int, int, int]
-"""Two blocks that an operator connects, and 1 where that changes sign with the exchange."""
+"""Two blocks that an operator connects, and 1 if the operator changes sign with the exchange, else 0."""
 
 
 def links_of_stacks(contracted: Iterable[tuple[Sequence[Contracted], Sequence[Channel]]]) -> Iterator[Link]:
-    """The links of the same operators in stacks, each with the channels that share it."""
-    for found, channels in contracted:
+    """Links of operators in stacks, each with the channels that share it."""
+    for matrices, channels in contracted:
         kinds = {int(channel.exchange < 0) for channel in channels}
-        for i, k in acting_numbers(found):
+        for i, k in acting_numbers(matrices):
             for changed in kinds:
                 yield i, k, changed
 
@@ -33,15 +33,19 @@ def families_of(count: int, links: Iterable[Link], classes: int) -> list[list[tu
     count : int
         Number of blocks.
     links : iterable of Link
-        What connects them.
+        Pairs of connected blocks.
     classes : int
         1, or 2 with two equivalent spins, or 3.
 
     Returns
     -------
     list of list of (int, int)
-        Every block and class once, by the lowest member of each family.
+        Each block and class once; families in the order of their lowest member.
     """
-    pairs = ((i * classes + own, k * classes + (own ^ changed)) for i, k, changed in links for own in range(classes))
+    pairs = (
+        (i * classes + symmetry_class, k * classes + (symmetry_class ^ changed))
+        for i, k, changed in links
+        for symmetry_class in range(classes)
+    )
     edges = (pair for pair in pairs if pair[0] != pair[1])
     return [[divmod(member, classes) for member in part] for part in connected_parts(count * classes, edges)]

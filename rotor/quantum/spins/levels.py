@@ -1,4 +1,4 @@
-"""Levels with spins, F by F: the table of them, with their names, degeneracies and weights."""
+"""Levels with spins, F by F: the table of levels with labels, degeneracies and weights."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 def spin_levels(
     top: Top, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int, executor: Executor | None = None
 ) -> Levels:
-    """All levels of a top with spins whose label has N from `jmin` to `jmax`, by (v), n, k or ka and kc, j, f1, ... f.
+    """All levels of a top with spins whose label has N from `jmin` to `jmax`, labelled by (v), n, k or ka and kc, j, f1, ... f.
 
-    Every F that such an N reaches is solved with all its N, so that nothing is left out of a block.
+    Each F that such an N reaches is solved with all its N, so that no block is truncated.
 
     Parameters
     ----------
     top : Top
         Constants, kind and spin weights.
     effects : tuple of QuantumEffect
-        What the Hamiltonian consists of, spins among it.
+        Effects of the Hamiltonian, spins included.
     jmin, jmax : int
         Lowest and highest N of the labels.
     executor : Executor, optional
-        The rotation is spread over it by N.
+        Rotational blocks of different N are solved on it in parallel.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def levels_of_f(
     executor: Executor | None = None,
     exist: Exist | None = None,
 ) -> Levels:
-    """The levels of all F in `every_f`, those whose label has N within `n_range`, if that is given.
+    """The levels of all F in `every_f` whose label has N within `n_range`.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def levels_of_f(
     every_f : sequence of int
         Total angular momenta, doubled.
     n_range : (int, int), optional
-        Lowest and highest N of the labels; all by default.
+        Lowest and highest N of the labels; by default all.
     executor : Executor, optional
-        The rotation is spread over it by N.
+        Rotational blocks of different N are solved on it in parallel.
     exist : callable, optional
-        Which of levels (n, columns as `SpinBlock.labels`) there are, (n,) of bool; blocks with none of them are not
-        solved. In an axial top v and K decide.
+        Takes labels (n, columns as `SpinBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an
+        existing level are not solved. In an axial top v and K decide.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def levels_of_f(
 
 
 def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[Levels, Plan]:
-    """The functions of all F in `every_f`, states of the rotation times coupling patterns, as levels that the spins do not move.
+    """Basis functions of all F in `every_f`, rotational states times coupling patterns, as levels without spin splitting.
 
     Parameters
     ----------
@@ -108,27 +108,28 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
     Returns
     -------
     levels : Levels
-        Named as levels are, without vectors; each block in the order of its functions.
+        Labelled as solved levels are, without vectors; each block in the order of its functions.
     plan : Plan
-        The rotation, what acts between its blocks, and the coefficients of coupling of these F.
+        The rotation, operators between its blocks, and the coupling coefficients of these F.
     """
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = plan_of(top, effects, lowest, highest, None)
     if plan.shared.scheme.equivalent == 3:
         raise ValueError(
-            "functions of three equivalent nuclei are no products of a state of the rotation and a pattern"
+            "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
         )
     blocks = tuple(_placed(functions_of_blocks(plan, every_f)))
     return _table(top, effects, plan.shared, blocks, highest), plan
 
 
 def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[int, int]:
-    """The lowest and the highest N that couple with the spins to one of the F, which are doubled."""
+    """The lowest and the highest N that couple with the spins to one of these F (doubled)."""
     total = scheme_of(top, effects).total
     return min(max(0, (f - total) // 2) for f in every_f), max((f + total) // 2 for f in every_f)
 
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
+    """The states of a block whose N lies in a range."""
     n = block.labels[:, 3] // 2
     chosen = (n >= n_range[0]) & (n <= n_range[1])
     cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
@@ -136,6 +137,7 @@ def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
 
 
 def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
+    """Blocks that have states, with the row of the first state of each."""
     start = 0
     for block in blocks:
         if len(block.energies_mhz):
@@ -146,6 +148,7 @@ def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
 def _table(
     top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
 ) -> Levels:
+    """The table of the levels of these blocks."""
     if not blocks:
         raise ValueError("no level with these spins exists in the range of F")
     labels = np.concatenate([block.labels for block in blocks])

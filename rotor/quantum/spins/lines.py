@@ -1,6 +1,6 @@
 """Elements of molecule-fixed tensors between levels with spins.
 
-A dipole touches no spin: its element between two functions is that of the rotation times a product of 6j symbols,
+A dipole does not act on spins: its element between two functions is that of the rotation times a product of 6j symbols,
 
     ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
 
@@ -22,8 +22,8 @@ from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of
 
-_FEW = 10_000  # elements between two F; where there are more, they are made when they are needed
-ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
+_FEW = 10_000  # with more elements between two F, they are computed one pair of F at a time
+ROUND_OFF = 1e-13  # round-off of sums of products of a few coefficients of size 1
 
 
 def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
@@ -32,10 +32,10 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
     rows, columns = up.vectors.shape[0], low.vectors.shape[0]
     if rows * columns <= _FEW:
-        whole, of_single = np.zeros((rows, columns)), t.tolist() if up.single and low.single else None
+        whole, single_factors = np.zeros((rows, columns)), t.tolist() if up.single and low.single else None
         for target, source, element in acting:
-            if of_single:
-                factor = of_single[target.patterns.start][source.patterns.start]
+            if single_factors:
+                factor = single_factors[target.patterns.start][source.patterns.start]
                 np.multiply(element, factor, out=whole[target.place, source.place])
             else:
                 whole[target.place, source.place] = product(t[target.patterns, source.patterns], element)
@@ -47,7 +47,7 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
 
 
 def acting_on(vectors: Floats, coefficients: Floats, element: Floats) -> Floats:
-    """The Kronecker product of coefficients (p', p) and an element of the rotation (r', r) times columns (p r, n)."""
+    """Apply the Kronecker product of coefficients (p', p) and a rotational matrix (r', r) to columns (p r, n)."""
     (target, source), (up, low) = coefficients.shape, element.shape
     if source == 1:
         moved = element @ vectors
@@ -66,9 +66,9 @@ Acting = list[tuple[SpinPart, SpinPart, Floats]]
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of some tensors between the blocks of the rotation, and between which parts of pairs of spin blocks they act.
+    """Elements of tensors between rotational blocks, and the parts of spin blocks between which they act.
 
-    partners: of every block by its number those with an element.
+    partners: for each rotational block, the blocks with which it has an element, and the element.
     """
 
     partners: dict[int, list[tuple[int, Floats]]]
@@ -76,26 +76,28 @@ class Elements:
     reached: dict[int, set[int]] = field(default_factory=dict)
 
     def reached_from(self, up: SpinBlock) -> set[int]:
-        """The numbers of all partners of the parts of a block."""
+        """The numbers of all rotational blocks with which a spin block has an element."""
         if up.start not in self.reached:
-            self.reached[up.start] = {number for own in up.by_number for number, _ in self.partners.get(own, ())}
+            self.reached[up.start] = {
+                number for part_number in up.by_number for number, _ in self.partners.get(part_number, ())
+            }
         return self.reached[up.start]
 
     def acting(self, up: SpinBlock, low: SpinBlock) -> Acting:
         """Pairs of parts of two blocks with their elements."""
         sources = low.by_number
         return [
-            (target, source, found)
+            (target, source, element)
             for target in up.parts
-            for number, found in self.partners.get(target.number, ())
+            for number, element in self.partners.get(target.number, ())
             if number in sources
             for source in sources[number]
         ]
 
 
 def _elements(shared: Shared, tensors: Tensors) -> Elements:
-    """All of them at once."""
-    key = ("elements", *sorted(tensors.items(), key=lambda one: one[0]))
+    """Elements of the tensors between all rotational blocks, computed once."""
+    key = ("elements", *sorted(tensors.items(), key=lambda pair: pair[0]))
     if key not in shared.cache:
         partners: dict[int, list[tuple[int, Floats]]] = {}
         for (i, k), element in by_numbers(contracted_tensors(shared.stacks, tensors)).items():
@@ -106,18 +108,18 @@ def _elements(shared: Shared, tensors: Tensors) -> Elements:
 
 
 def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> Acting:
-    """Pairs of parts between which the tensors act, with the element of the rotation."""
+    """Pairs of parts between which the tensors act, with the rotational element."""
     if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
         return []
     elements, place = _elements(low.shared, tensors), (up.start, low.start)
     if place not in elements.pairs:
         if elements.reached_from(up).isdisjoint(low.by_number):
             return []
-        found = elements.acting(up, low)
+        acting = elements.acting(up, low)
         if low.shared.scheme.equivalent:
             t = _coefficients(up, low, rank)
-            found = [(target, source, x) for target, source, x in found if t[target.patterns, source.patterns].any()]
-        elements.pairs[place] = found
+            acting = [(target, source, x) for target, source, x in acting if t[target.patterns, source.patterns].any()]
+        elements.pairs[place] = acting
     return elements.pairs[place]
 
 
@@ -125,23 +127,25 @@ def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
     """t(p', p) between all patterns of two F."""
     shared, key = low.shared, ("tensor", rank, up.twice_f, low.twice_f)
     if key not in shared.cache:
-        shared.cache.update(_of_alike(shared, rank, up, low))
-    found: Floats = shared.cache[key]
-    return found
+        shared.cache.update(_coefficients_of_step(shared, rank, up, low))
+    coefficients: Floats = shared.cache[key]
+    return coefficients
 
 
-def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[tuple[str, int, int, int], Floats]:
-    """t(p', p) between these F and, where patterns are few, between all others of the same distance."""
+def _coefficients_of_step(
+    shared: Shared, rank: int, up: SpinBlock, low: SpinBlock
+) -> dict[tuple[str, int, int, int], Floats]:
+    """t(p', p) between these two F and, where patterns are few, between all F with this difference."""
     if shared.scheme.equivalent or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
         only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     step = up.twice_f - low.twice_f
-    found = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
-    return {("tensor", rank, f + step, f): own for f, own in found.items()}
+    by_f = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
+    return {("tensor", rank, f + step, f): coefficients for f, coefficients in by_f.items()}
 
 
-def coefficients_of_step(scheme: Scheme, every: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
-    """t(p', p) of all F' = F + step by F, where there are both.
+def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
+    """t(p', p) between F' = F + step and F, by F, where both exist.
 
     Parameters
     ----------
@@ -150,22 +154,23 @@ def coefficients_of_step(scheme: Scheme, every: dict[int, Ints], rank: int, step
     every : dict of int to (n, columns) array
         Coupling patterns by doubled F.
     rank, step : int
-        Rank of the tensor, and by how much F changes, doubled.
+        Rank of the tensor, and the doubled change of F.
 
     Returns
     -------
     dict of int to (n', n) array
         Pure numbers by doubled F.
     """
-    tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
+    tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
     if scheme.equivalent:
-        return {f: _tensor_coefficients(scheme, rank, *of_both) for f, of_both in tables.items()}
+        return {f: _tensor_coefficients(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
     return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme.twice, rank, bra, ket))
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:
+    """t(p', p) between patterns of two F, with or without a total spin."""
     if not scheme.equivalent:
         return tensor_coefficients(scheme.twice, rank, bra, ket)
-    (up, left), (low, right) = (scheme.recoupling(int(own[0, -1])) for own in (bra, ket))
-    found = left.T @ tensor_coefficients(scheme.twice, rank, up, low) @ right
-    return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
+    (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
+    values = left.T @ tensor_coefficients(scheme.twice, rank, up, low) @ right
+    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)

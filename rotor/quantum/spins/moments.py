@@ -1,6 +1,7 @@
-"""Lines of levels with spins by moments of every kind (`rotor.quantum.moments`): elements between F blocks, and which they connect.
+"""Lines of levels with spins by any moments (`rotor.quantum.moments`): their elements between blocks of F.
 
-An electric moment touches no spin. A magnetic one of a spin S has T^0 or T² of the rotation in place of a vector: with L its rank,
+An electric moment does not act on spins. The magnetic moment of a spin S contains T^0 or T² of the rotation in place of a vector; with L
+the rank,
 
     ⟨p'‖[T^L x S]^1‖p⟩ = m(p', p) ⟨N'‖T^L‖N⟩,     Σ_q T²_pq S_q = -√(5/3) [T² x S]^1_p
 
@@ -37,10 +38,10 @@ class SpinMoments:
     moments: tuple[Moment, ...]
     scheme: Scheme
     representation: str
-    _known: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    _cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def amplitudes(self, up: SpinBlock, low: SpinBlock) -> Floats:
-        """The square roots of line strengths between all states of two blocks, (n_up, n_low)."""
+        """Square roots of line strengths between all states of two blocks, (n_up, n_low)."""
         kinds = dict.fromkeys((moment.electric, moment.imaginary) for moment in self.moments)
         sums = [self._sum(up, low, kind) for kind in kinds]
         return np.asarray(sums[0] if len(sums) == 1 else np.sqrt(sum(each * each for each in sums)))
@@ -57,7 +58,7 @@ class SpinMoments:
         )
 
     def _sum(self, up: SpinBlock, low: SpinBlock, kind: tuple[bool, bool]) -> Floats:
-        """Of the moments that interfere with each other: electric or not, real or imaginary."""
+        """Sum over moments that interfere with each other: electric or magnetic, real or imaginary."""
         moved = np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
         for place, moment in enumerate(self.moments):
             if (moment.electric, moment.imaginary) == kind:
@@ -66,40 +67,42 @@ class SpinMoments:
                     for source in low.parts:
                         element = self._element(place, target, source)
                         if element is not None:
-                            own = product(t[target.patterns, source.patterns], element)
-                            moved[target.place] += own @ low.vectors[source.place]
+                            matrix = product(t[target.patterns, source.patterns], element)
+                            moved[target.place] += matrix @ low.vectors[source.place]
         return np.asarray(up.vectors.T @ moved)
 
     def _coefficients(self, moment: Moment, up: int, low: int) -> Floats:
         """m(p', p) between all patterns of two F."""
         rank, acting = self._rank(moment), self.scheme.place(moment.spin) if moment.spin else None
         key = (rank, acting, up, low)
-        if key not in self._known:
-            self._known[key] = _coefficients(self.scheme, rank, acting, up, low)
-        found: Floats = self._known[key]
-        return found
+        if key not in self._cache:
+            self._cache[key] = _coefficients(self.scheme, rank, acting, up, low)
+        coefficients: Floats = self._cache[key]
+        return coefficients
 
     def _rank(self, moment: Moment) -> int:
+        """Rank of the rotational tensor of a moment."""
         return 1 if not moment.spin else 0 if moment.tensor is None and moment.along_abc is None else 2
 
     def _element(self, place: int, target: SpinPart, source: SpinPart) -> Floats | None:
-        """The element of the rotation, over both signs of K of axial states."""
+        """The rotational element of a moment, summed over both signs of K of axial states."""
         key = (place, target.number, source.number)
-        if key not in self._known:
-            self._known[key] = self._of_blocks(self.moments[place], target.rotor, source.rotor)
-        found: Floats | None = self._known[key]
-        return found
+        if key not in self._cache:
+            self._cache[key] = self._block_element(self.moments[place], target.rotor, source.rotor)
+        element: Floats | None = self._cache[key]
+        return element
 
-    def _of_blocks(self, moment: Moment, up: RotorBlock, low: RotorBlock) -> Floats | None:
+    def _block_element(self, moment: Moment, up: RotorBlock, low: RotorBlock) -> Floats | None:
+        """The element of a moment between the eigenstates of two rotational blocks; None where it is zero."""
         total: Floats | None = None
         for left in up.parts:
             for right in low.parts:
                 if (left.v, right.v) not in (moment.states, moment.states[::-1]):
                     continue
-                found = self._between(moment, left, right)
-                if found is not None and found.any():
+                element = self._between(moment, left, right)
+                if element is not None and element.any():
                     value = moment.value_debye * _order(moment, left, right)
-                    moved = up.vectors[left.place].T @ (value * found) @ low.vectors[right.place]
+                    moved = up.vectors[left.place].T @ (value * element) @ low.vectors[right.place]
                     total = moved if total is None else total + moved
         first, second = up.parts[0].basis, low.parts[0].basis
         if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
@@ -107,26 +110,27 @@ class SpinMoments:
         return total
 
     def _between(self, moment: Moment, left: RotorPart, right: RotorPart) -> Floats | None:
+        """The element of a moment between the functions of two parts; None where it is zero."""
         up, low = left.basis, right.basis
         if moment.written is not None:
             back = left.v != right.v and (left.v, right.v) != moment.states
-            found = written_elements(moment.written, up, low, self.representation, back)
-            return found * _factor(moment.powers, left, right) if found is not None and moment.powers else found
+            element = written_elements(moment.written, up, low, self.representation, back)
+            return element * _factor(moment.powers, left, right) if element is not None and moment.powers else element
         if moment.along_abc is not None and moment.spin:
-            found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            return None if found is None else found * _stretch(up.j, low.j)
+            element = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
+            return None if element is None else element * _stretch(up.j, low.j)
         if moment.along_abc is not None:
-            found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            if found is None:
+            element = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
+            if element is None:
                 return None
             turned = character(up, moment.turned) if moment.turned and isinstance(up, WangBlock) else 1
-            return found * (turned * _factor(moment.powers, left, right) * _cosine(moment, left, right))
+            return element * (turned * _factor(moment.powers, left, right) * _cosine(moment, left, right))
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
-            found = tensor_elements(up, low, self._tensor(moment.tensor, 2))
+            element = tensor_elements(up, low, self._tensor(moment.tensor, 2))
             back = moment.with_i and left.v != right.v and (left.v, right.v) != moment.states
-            return -found if found is not None and back else found
+            return -element if element is not None and back else element
         if up != low:
             return None
         n = low.j
@@ -136,20 +140,18 @@ class SpinMoments:
         return np.diag(diagonal)
 
     def _tensor(self, components: Any, rank: int) -> BodyTensor:
+        """The spherical tensor of these components, computed once."""
         key = (rank, components)
-        if key not in self._known:
-            self._known[key] = body_tensor(components, rank, self.representation)
-        found: BodyTensor = self._known[key]
-        return found
+        if key not in self._cache:
+            self._cache[key] = body_tensor(components, rank, self.representation)
+        tensor: BodyTensor = self._cache[key]
+        return tensor
 
 
 def moments_of(
     levels: Levels, dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
 ) -> SpinMoments:
-    """Dipoles by pairs of states and other moments, for levels that were solved with spins.
-
-    Raises ValueError for other levels.
-    """
+    """Dipoles by pairs of states and other moments, for levels with spins; ValueError for levels without."""
     if not levels.blocks or not isinstance(levels.blocks[0], SpinBlock):
         raise ValueError("moments besides plain dipoles need levels that were solved with spins")
     shared = levels.blocks[0].shared
@@ -159,18 +161,18 @@ def moments_of(
 def with_dipoles(
     dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
 ) -> tuple[Moment, ...]:
-    """Plain dipoles by pairs of states as moments, before the others."""
+    """All moments: plain dipoles by pairs of states, then the others."""
     plain = [Moment(1.0, states, along) for states, along in dipoles.items() if any(along)]
     return (*plain, *(moment for moment in moments if moment.value_debye))
 
 
 def _stretch(up: int, low: int) -> float:
-    """What the elements of φ are multiplied with for {φ, N} of rank 2; 0 between N = 0 and 1 alone."""
+    """Factor of the elements of φ in those of {φ, N} of rank 2; zero between N = 0 and 1."""
     return sqrt(max(0.375 * ((up + low + 1) ** 2 - 4) * (1 - (up - low) ** 2 / 4), 0.0))
 
 
 def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
-    """What powers of N² and Nz² multiply an element with. A commutator changes its sign with the order: the lower F is the bra."""
+    """Factor of an element from powers of N² and Nz². A commutator changes sign with the order of states; the lower F is the bra."""
     m, n = left.basis.j * (left.basis.j + 1.0), right.basis.j * (right.basis.j + 1.0)
     if powers == "K":
         k, other = left.basis.k.astype(float) ** 2, right.basis.k.astype(float) ** 2
@@ -181,14 +183,14 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
 
 
 def _order(moment: Moment, left: RotorPart, right: RotorPart) -> int:
-    """The sign of what depends on the order of the states; beside that of what is turned, i · i = -1."""
+    """Sign of a moment that depends on the order of its states; with a half turn there is a further i · i = -1."""
     if not moment.by_order or left.v == right.v:
         return 1
     return -1 if (left.v < right.v) == bool(moment.turned) else 1
 
 
 def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:
-    """cos(α'K' + αK): between functions of |K| too, since of an element with ΔK = 0 or 1 either both K have one sign or one is 0."""
+    """cos(α'K' + αK). It holds for functions of |K| too: with ΔK = 0 or 1 either both K have one sign or one of them is 0."""
     if moment.cosine is None:
         return np.ones(1)
     angle = dict(zip(moment.states, moment.cosine, strict=True))
@@ -197,9 +199,10 @@ def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:
 
 
 def _coefficients(scheme: Scheme, rank: int, acting: int | None, up: int, low: int) -> Floats:
+    """m(p', p) between all patterns of two F, with or without a total spin."""
     if not scheme.equivalent:
         bra, ket = patterns(scheme.twice, up), patterns(scheme.twice, low)
         return moment_coefficients(scheme.twice, rank, acting, bra, ket)
     (bra, left), (ket, right) = scheme.recoupling(up), scheme.recoupling(low)
-    found = left.T @ moment_coefficients(scheme.twice, rank, acting, bra, ket) @ right
-    return np.asarray(scheme.count_of(() if acting is None else (acting,)) * found)
+    values = left.T @ moment_coefficients(scheme.twice, rank, acting, bra, ket) @ right
+    return np.asarray(scheme.count_of(() if acting is None else (acting,)) * values)

@@ -1,15 +1,15 @@
-"""By how much levels with spins may shift by elements that a simpler method leaves out: one bound for every rotational state.
+"""Bounds of the shifts of levels with spins by elements that a simpler method leaves out, one for each rotational state.
 
 The spins split a rotational state r to first order into levels between low_r and high_r. An element of norm V between two states whose
-levels are Δ apart at least shifts a level by at most
+levels are at least Δ apart shifts a level by at most
 
     2V² / [Δ + √(Δ² + 4V²)]        (C.-K. Li and R.-C. Li, Linear Algebra Appl. 395, 183 (2005))
 
 as for two levels (the formula stands in the abstract of arXiv:2508.08203, the same paper). V is the sum of |⟨r'|X|r⟩| ‖c‖ over the
-channels, ‖c‖ as in `couplings_alone`, the same for all F: Δ, V and so the bound are those of all F together. The shifts by all other
-states are added, and Δ is taken once more less what third states shift the two by. States of one N that the spins mix have in common what
-other N do to both; the cross term is added with the mixing. This is no strict bound where three states are mixed strongly; in 370 random
-molecules it held in every one.
+channels, with ‖c‖ of `couplings_alone`; Δ, V and the bound hold for all F together. The shifts by all other states are added. In a second
+pass, Δ is reduced by the shifts of the two states by third ones. States of one N that the spins mix share the shifts by other N; their
+cross term is added in proportion to the mixing. The bound is not strict where three states are mixed strongly; it held in all of 370
+random molecules.
 """
 
 from __future__ import annotations
@@ -24,13 +24,18 @@ from rotor.quantum.spins.blocks import Plan
 from rotor.quantum.spins.couplings_alone import Alone, coupling_alone
 from rotor.quantum.spins.rotor import Channel
 
-_ROUND_OFF = 4 * float(np.finfo(float).eps)  # of the highest energy, of eigenvalues of two methods
-_AT_ONCE = 100_000  # elements in one array: those on the way stay in the cache of the processor
+_ROUND_OFF = 4 * float(
+    np.finfo(float).eps
+)  # difference of eigenvalues from two methods, relative to the highest energy
+_AT_ONCE = 100_000  # elements in one array; intermediate arrays then fit the processor's cache
 _TINY = float(np.finfo(float).tiny)
 
 
 class _Matrices(NamedTuple):
-    """Operators between blocks: their numbers (pairs,) twice, by channels that share it (pairs, states', states)."""
+    """Operators between pairs of blocks.
+
+    up, low: numbers of the blocks, (pairs,). acting: matrices (pairs, states', states), each with the channels that share it.
+    """
 
     up: Ints
     low: Ints
@@ -38,7 +43,7 @@ class _Matrices(NamedTuple):
 
 
 class _States(NamedTuple):
-    """All rotational states: N, lowest and highest level to first order in MHz, (n,) each."""
+    """All rotational states: N, and the lowest and highest first-order level in MHz, (n,) each."""
 
     n: Ints
     low: Floats
@@ -46,7 +51,7 @@ class _States(NamedTuple):
 
 
 class _Elements(NamedTuple):
-    """Two states each, and the norm of what joins them in MHz, (elements,)."""
+    """Pairs of states and the norm (MHz) of the elements that connect them, (elements,) each."""
 
     up: Ints
     low: Ints
@@ -54,35 +59,36 @@ class _Elements(NamedTuple):
 
 
 def largest_shifts(plan: Plan) -> tuple[float, float]:
-    """The largest shift of a level in MHz by elements between different N, and by those between other states of one N.
+    """The largest shift of a level (MHz) by elements between different N, and between different states of one N.
 
-    With the round-off of the highest energy in the first.
+    The first includes the round-off of the highest energy.
     """
     sizes = np.array([len(block.energies_mhz) for block in plan.blocks], dtype=np.int64)
     starts = np.cumsum(sizes) - sizes
     n = np.array([block.n for block in plan.blocks], dtype=np.int64)
     highest = int(n.max(initial=0))
-    acting = {channel for _, _, found in _matrices(plan) for _, channels in found for channel in channels}
+    acting = {channel for _, _, matrices in _matrices(plan) for _, channels in matrices for channel in channels}
     alone = {channel: coupling_alone(plan.shared.scheme, channel, highest) for channel in acting}
     states = _states(plan, n, starts, alone)
-    elements = [_elements(found, n, starts, alone) for found in _matrices(plan)]
-    other, own = _shifts(states, [*_together(states, elements)])
+    elements = [_elements(matrices, n, starts, alone) for matrices in _matrices(plan)]
+    other_n, same_n = _shifts(states, [*_together(states, elements)])
     energy = max((float(np.abs(block.energies_mhz).max(initial=0.0)) for block in plan.blocks), default=0.0)
-    return float(other.max(initial=0.0)) + _ROUND_OFF * energy, float(own.max(initial=0.0))
+    return float(other_n.max(initial=0.0)) + _ROUND_OFF * energy, float(same_n.max(initial=0.0))
 
 
 def _matrices(plan: Plan) -> Iterator[_Matrices]:
-    """Every pair of blocks once, those of two stacks together."""
-    of_stacks: dict[tuple[int, int, int], _Matrices] = {}
-    for every, channels in plan.contracted:
-        for up, low, pairs, matrices in every:
+    """Each pair of blocks once; pairs of two stacks come together."""
+    by_stacks: dict[tuple[int, int, int], _Matrices] = {}
+    for contracted, channels in plan.contracted:
+        for up, low, pairs, matrices in contracted:
             numbers = up.numbers[pairs.up], low.numbers[pairs.low]
             key = (int(up.numbers[0]), int(low.numbers[0]), pairs.rise)
-            of_stacks.setdefault(key, _Matrices(*numbers, [])).acting.append((matrices, channels))
-    yield from of_stacks.values()
+            by_stacks.setdefault(key, _Matrices(*numbers, [])).acting.append((matrices, channels))
+    yield from by_stacks.values()
 
 
 def _states(plan: Plan, n: Ints, starts: Ints, alone: dict[Channel, Alone]) -> _States:
+    """First-order limits of all rotational states."""
     energies = np.concatenate([block.energies_mhz for block in plan.blocks])
     low, high = energies.copy(), energies.copy()
     for up, other, acting in _matrices(plan):
@@ -99,71 +105,71 @@ def _states(plan: Plan, n: Ints, starts: Ints, alone: dict[Channel, Alone]) -> _
     return _States(np.repeat(n, [len(block.energies_mhz) for block in plan.blocks]), low, high)
 
 
-def _elements(found: _Matrices, n: Ints, starts: Ints, alone: dict[Channel, Alone]) -> _Elements:
-    """The elements between other states, each once."""
-    of_n = n[found.up], n[found.low]
+def _elements(operators: _Matrices, n: Ints, starts: Ints, alone: dict[Channel, Alone]) -> _Elements:
+    """The elements between different states, each once."""
+    n_pairs = n[operators.up], n[operators.low]
     total = np.zeros(())
-    for matrices, channels in found.acting:
-        norms = sum((alone[channel].norm[of_n] for channel in channels), np.zeros(len(found.up)))
+    for matrices, channels in operators.acting:
+        norms = sum((alone[channel].norm[n_pairs] for channel in channels), np.zeros(len(operators.up)))
         total = total + np.abs(matrices) * norms[:, None, None]
-    if found.up[0] == found.low[0]:
+    if operators.up[0] == operators.low[0]:
         total = np.tril(total, -1)
     pair, row, column = np.nonzero(total)
-    return _Elements(starts[found.up[pair]] + row, starts[found.low[pair]] + column, total[pair, row, column])
+    return _Elements(starts[operators.up[pair]] + row, starts[operators.low[pair]] + column, total[pair, row, column])
 
 
 def _together(states: _States, elements: list[_Elements]) -> Iterator[_Elements]:
-    """The elements in few arrays, of which each has those within one N or those between two alone."""
+    """The elements in few arrays, each either within one N or between different N."""
     for same in (False, True):
-        some: list[_Elements] = []
-        for found in (found for found in elements if len(found.norm) and _is_same(states, found) == same):
-            some.append(found)
-            if sum(len(one.norm) for one in some) > _AT_ONCE:
-                yield _Elements(*map(np.concatenate, zip(*some, strict=True)))
-                some = []
-        if some:
-            yield _Elements(*map(np.concatenate, zip(*some, strict=True)))
+        batch: list[_Elements] = []
+        for part in (part for part in elements if len(part.norm) and _is_same(states, part) == same):
+            batch.append(part)
+            if sum(len(member.norm) for member in batch) > _AT_ONCE:
+                yield _Elements(*map(np.concatenate, zip(*batch, strict=True)))
+                batch = []
+        if batch:
+            yield _Elements(*map(np.concatenate, zip(*batch, strict=True)))
 
 
 def _shifts(states: _States, elements: list[_Elements]) -> tuple[Floats, Floats]:
-    """Bounds (n,) of the shift of every state in MHz: by other N, and by other states of its N."""
+    """Bounds (n,) in MHz of the shift of each state: by other N, and by other states of its N."""
     count = len(states.n)
-    total, own, other, mixed = np.zeros((4, count))
-    for found in elements:
-        _add(total, found, _of_two(_apart(states, found), found.norm))
+    total, same_n, other_n, mixed = np.zeros((4, count))
+    for pairs in elements:
+        _add(total, pairs, _two_level_shift(_apart(states, pairs), pairs.norm))
     second = []
-    for found in elements:
-        apart = _apart(states, found)
-        of_pairs = _of_two(apart, found.norm)
-        third = total[found.up] + total[found.low] - 2 * of_pairs
+    for pairs in elements:
+        apart = _apart(states, pairs)
+        pair_shifts = _two_level_shift(apart, pairs.norm)
+        third = total[pairs.up] + total[pairs.low] - 2 * pair_shifts
         apart = np.maximum(apart - third, 0.0)
-        _add(own if _is_same(states, found) else other, found, _of_two(apart, found.norm))
+        _add(same_n if _is_same(states, pairs) else other_n, pairs, _two_level_shift(apart, pairs.norm))
         second.append(apart)
-    root = np.sqrt(other)
-    for found, apart in zip(elements, second, strict=True):
-        if _is_same(states, found):
-            mixing = 2 * found.norm / (np.sqrt(apart**2 + 4 * found.norm**2) + _TINY)
-            mixed += np.bincount(found.up, mixing * root[found.low], count)
-            mixed += np.bincount(found.low, mixing * root[found.up], count)
-    return other + root * mixed, own
+    root = np.sqrt(other_n)
+    for pairs, apart in zip(elements, second, strict=True):
+        if _is_same(states, pairs):
+            mixing = 2 * pairs.norm / (np.sqrt(apart**2 + 4 * pairs.norm**2) + _TINY)
+            mixed += np.bincount(pairs.up, mixing * root[pairs.low], count)
+            mixed += np.bincount(pairs.low, mixing * root[pairs.up], count)
+    return other_n + root * mixed, same_n
 
 
-def _is_same(states: _States, found: _Elements) -> bool:
-    """Whether the elements join states of one N; those of two stacks have all the same difference of N."""
-    return bool(states.n[found.up[0]] == states.n[found.low[0]])
+def _is_same(states: _States, pairs: _Elements) -> bool:
+    """Whether the elements connect states of one N; all elements of two stacks have the same difference of N."""
+    return bool(states.n[pairs.up[0]] == states.n[pairs.low[0]])
 
 
-def _apart(states: _States, found: _Elements) -> Floats:
-    """Distances of the levels of both states."""
-    up, low = found.up, found.low
+def _apart(states: _States, pairs: _Elements) -> Floats:
+    """Smallest distances (MHz) between the first-order levels of both states."""
+    up, low = pairs.up, pairs.low
     return np.maximum(np.maximum(states.low[up] - states.high[low], states.low[low] - states.high[up]), 0.0)
 
 
-def _add(sums: Floats, found: _Elements, shifts: Floats) -> None:
-    """Adds the shift of every pair to both of its states."""
-    sums += np.bincount(found.up, shifts, len(sums)) + np.bincount(found.low, shifts, len(sums))
+def _add(sums: Floats, pairs: _Elements, shifts: Floats) -> None:
+    """Add the shift of each pair to both of its states."""
+    sums += np.bincount(pairs.up, shifts, len(sums)) + np.bincount(pairs.low, shifts, len(sums))
 
 
-def _of_two(apart: Floats, norm: Floats) -> Floats:
-    """The shift of two levels by an element between them."""
+def _two_level_shift(apart: Floats, norm: Floats) -> Floats:
+    """Bound of the shift of two levels by an element between them."""
     return np.asarray(2 * norm**2 / (np.sqrt(apart**2 + 4 * norm**2) + apart + _TINY))

@@ -1,8 +1,8 @@
-"""Terms of the Hamiltonian that couple the rotation with spins: an operator of N, an operator of spins, and powers.
+"""Operators of N in the terms of the Hamiltonian that couple rotation and spins.
 
     c · factor · ½{N^2p (N·S1)^r, ½{Nz^2q, X^K(N)}} · W^K(spins)
 
-X^K is made of direction cosines φ_pi between space-fixed p and molecule-fixed i, and of N:
+X^K contains N and the direction cosines φ_pi between space-fixed p and molecule-fixed i:
 
 | operator | X^K | terms |
 |---|---|---|
@@ -12,12 +12,12 @@ X^K is made of direction cosines φ_pi between space-fixed p and molecule-fixed 
 | `CosinesWithN` | Σ_ij c_ij ½{φ_pi, N_j}, K = 1 | spin-rotation |
 | `ByElements` | any, by its elements over |N k⟩ | higher orders, series |
 
-The last one is no tensor of the molecule alone. With c = c0 1 + c_s + c_a, symmetric and traceless, antisymmetric with the vector
-v_k = c_ij,
+`CosinesWithN` is not a tensor of the molecule alone. With c = c0 1 + c_s + c_a, where c_s is symmetric and traceless and c_a antisymmetric
+with the vector v_k = c_ij,
 
     ⟨N'‖X‖N⟩ = c0 √(N(N+1)(2N+1)) δ + √{[(N'+N+1)² - 4][1 - (N'-N)²/4]/6} ⟨N'‖T²(c_s)‖N⟩ + (i/2)[N'(N'+1) - N(N+1)] ⟨N'‖φ·v‖N⟩
 
-(the last part is the commutator [N², φ·v] i/2, so that it has ΔN = ±1 alone). All matrices are real, over the functions of `tensors`.
+(the last part is the commutator [N², φ·v] i/2, which has ΔN = ±1 only). All matrices are real, over the functions of `tensors`.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from rotor.quantum.wang.basis import WangBlock, character
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
 
-EVERY_STATE = -1  # in place of v: a term that is diagonal in the states, and the same in all of them
+EVERY_STATE = -1  # in place of v: a term that is diagonal in the states and equal in all of them
 
 Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 Vector = tuple[float, float, float]
 
 
 class AxialState(NamedTuple):
-    """|N K⟩ of a symmetric top with K ≥ 0, which stands for -K too: K is good where everything is axial."""
+    """|N K⟩ of a symmetric top with K ≥ 0, which stands for -K too; K is a good quantum number where all terms are axial."""
 
     j: int
     axial_k: int
@@ -59,9 +59,9 @@ Basis = WangBlock | AxialState
 
 
 def tensor_elements(up: Basis, low: Basis, tensor: BodyTensor | None) -> Floats | None:
-    """Real reduced elements of a tensor between two blocks, None where it does not act.
+    """Real reduced elements of a tensor between two blocks; None where it does not act.
 
-    Between axial states the element of one sign of K; a component across the axis has its absolute value.
+    Between axial states this is the element of one sign of K, with the absolute value of a component across the axis.
     """
     if tensor is None:
         return None
@@ -82,7 +82,7 @@ def tensor_elements(up: Basis, low: Basis, tensor: BodyTensor | None) -> Floats 
 
 @dataclass(frozen=True)
 class Scalar:
-    """Operators of N by powers (p, q, n): X of rank 0, given as a plain matrix."""
+    """Operators of N by powers (p, q, n): X of rank 0, as a plain matrix."""
 
     operators: tuple[tuple[Powers, float], ...] = (((0, 0, 0), 1.0),)
     rank = 0
@@ -107,29 +107,31 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Cosines:
-    """Direction cosines with components along a, b, c: a vector (rank 1), or a matrix of which T² acts (rank 2)."""
+    """Direction cosines with components along a, b, c: a vector (rank 1), or the T² part of a matrix (rank 2)."""
 
     components: Vector | Matrix
 
     @property
     def rank(self) -> int:
-        """1 of a vector, 2 of a matrix."""
+        """1 for a vector, 2 for a matrix."""
         return 2 if isinstance(self.components[0], tuple) else 1
 
     @property
     def odd(self) -> bool:
-        """Whether time reversal changes the sign once spins are contracted with it."""
+        """Whether time reversal changes the sign of the operator after contraction with spins."""
         return self.rank == 1
 
     def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix; of a vector that of i times it, Hermitian and invariant under time reversal."""
-        found = tensor_elements(up, low, tensor_of(self.components, self.rank, representation))
-        return -found if found is not None and self.rank == 1 else found  # i (i E)
+        """The real reduced matrix; for a vector that of i times it, which is Hermitian and invariant under time reversal."""
+        matrix = tensor_elements(up, low, tensor_of(self.components, self.rank, representation))
+        return -matrix if matrix is not None and self.rank == 1 else matrix  # i · (i E)
 
 
 def factors_with_n(m: float | Floats, n: float | Floats) -> tuple[Floats, float | Floats, Floats]:
-    """Of the elements of `CosinesWithN` from N = n to N' = m, |m - n| <= 1: of T² of c, of its antisymmetric part, of a third of its
-    trace (for m = n)."""
+    """Factors in the elements of `CosinesWithN` from N = n to N' = m, |m - n| ≤ 1, as in the formula of this module.
+
+    They multiply T² of c, its antisymmetric part, and a third of its trace (for m = n).
+    """
     stretch = np.sqrt(np.maximum(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
     return stretch, (n * (n + 1) - m * (m + 1)) / 2, np.sqrt(n * (n + 1) * (2 * n + 1))
 
@@ -148,21 +150,21 @@ class CosinesWithN:
         if abs(m - n) > 1 or not m + n:
             return None
         stretch, change, length = factors_with_n(float(m), float(n))
-        found = [
+        terms = [
             (stretch, tensor_elements(up, low, tensor_of(self.components, 2, representation))),
             (change, tensor_elements(up, low, axis_tensor(self.components, representation))),
             (float(np.trace(c)) / 3, length * np.eye(low.size) if up == low else None),
         ]
-        acting = [factor * matrix for factor, matrix in found if matrix is not None and factor]
+        acting = [factor * matrix for factor, matrix in terms if matrix is not None and factor]
         return np.asarray(sum(acting)) if acting else None
 
 
 @dataclass(frozen=True)
 class ByElements:
-    """Any operator by its reduced elements over |N'k'⟩ and |N k⟩; of rank 0 plain ones within N.
+    """Any operator by its reduced elements over |N'k'⟩ and |N k⟩; for rank 0, plain elements within N.
 
-    matrix: of N', N and the representation, (2N' + 1, 2N + 1). odd: time reversal changes the sign once spins are contracted with it; the
-    elements have the factor i of the operator then.
+    matrix: returns (2N' + 1, 2N + 1) elements for N', N and the representation. odd: whether time reversal changes the sign after
+    contraction with spins; the elements then contain the factor i of the operator.
     """
 
     rank: int
@@ -174,18 +176,18 @@ class ByElements:
         if not abs(up.j - low.j) <= self.rank <= up.j + low.j:
             return None
         between = self.matrix(up.j, low.j, representation)
-        found = (functions_of(up).conj().T @ between @ functions_of(low)).real
-        return found if np.abs(found).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=0.0) else None
+        reduced = (functions_of(up).conj().T @ between @ functions_of(low)).real
+        return reduced if np.abs(reduced).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=0.0) else None
 
 
-_NOTHING = 1e-13  # of the largest element over |N k⟩: round-off of a product of a few numbers
+_NOTHING = 1e-13  # round-off of a product of a few numbers, relative to the largest element over |N k⟩
 
 
 @lru_cache(maxsize=256)
 def functions_of(basis: Basis) -> Complexes:
-    """The functions of a basis over |N k⟩, k rising from -N, in columns; of |N K⟩ that with K = 0 alone.
+    """The functions of a basis over |N k⟩ (k rising from -N) in columns.
 
-    Raises ValueError for |N K⟩ with K > 0, which stands for -K too.
+    Raises ValueError for an axial state |N K⟩ with K > 0, which stands for -K too.
     """
     if isinstance(basis, AxialState):
         if basis.axial_k:
@@ -202,55 +204,59 @@ def functions_of(basis: Basis) -> Complexes:
 
 @dataclass(frozen=True)
 class HalfTurned:
-    """C2g times an operator that half a turn about g, one of a, b, c, turns around: what stands for it in functions that θ C2g
-    leaves as they are, θ being time reversal. Of an operator that θ turns around too it is Hermitian within one state."""
+    """C2g times an operator that changes sign under the half turn C2g about the axis g.
 
-    of: Cosines | CosinesWithN | ByElements
+    It represents the operator in functions that θ C2g leaves unchanged, θ being time reversal. If θ changes the sign of the operator too,
+    the product is Hermitian within one state.
+    """
+
+    operator: Cosines | CosinesWithN | ByElements
     axis: str
     odd = False
 
     @property
     def rank(self) -> int:
-        """That of the operator."""
-        return self.of.rank
+        """Rank of the operator."""
+        return self.operator.rank
 
     def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
         """The real reduced matrix between two blocks, None where it is zero."""
-        found = self.of.elements(up, low, representation)
+        elements = self.operator.elements(up, low, representation)
         assert isinstance(up, WangBlock)
-        return None if found is None else character(up, self.axis) * found
+        return None if elements is None else character(up, self.axis) * elements
 
 
 @dataclass(frozen=True)
 class BetweenSpecies:
-    """An operator without its elements between Wang blocks of other species than the pairs given."""
+    """An operator restricted to elements between pairs of Wang-block species."""
 
-    of: Cosines | CosinesWithN | ByElements | HalfTurned
+    operator: Cosines | CosinesWithN | ByElements | HalfTurned
     pairs: frozenset[tuple[str, str]]
 
     @property
     def odd(self) -> bool:
-        """As of the operator."""
-        return self.of.odd
+        """Whether time reversal changes the sign of the operator."""
+        return self.operator.odd
 
     @property
     def rank(self) -> int:
-        """That of the operator."""
-        return self.of.rank
+        """Rank of the operator."""
+        return self.operator.rank
 
     def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
         """The real reduced matrix between two blocks, None where it is zero."""
         assert isinstance(up, WangBlock)
         assert isinstance(low, WangBlock)
-        return self.of.elements(up, low, representation) if (up.species, low.species) in self.pairs else None
+        return self.operator.elements(up, low, representation) if (up.species, low.species) in self.pairs else None
 
 
 Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned | BetweenSpecies
-_ALONE = Scalar | ByElements | HalfTurned | BetweenSpecies  # which are not added to others
+_ALONE = Scalar | ByElements | HalfTurned | BetweenSpecies  # operators that are not added to others
 
 
 @lru_cache(maxsize=256)
 def tensor_of(components: Vector | Matrix, rank: int, representation: str) -> BodyTensor | None:
+    """Spherical tensor of a vector, or of the symmetric traceless part of a matrix; None if it is zero."""
     parts = np.array(components, dtype=float)
     if rank == 2:
         parts = (parts + parts.T) / 2 - np.eye(3) * np.trace(parts) / 3
@@ -259,7 +265,7 @@ def tensor_of(components: Vector | Matrix, rank: int, representation: str) -> Bo
 
 @lru_cache(maxsize=256)
 def axis_tensor(components: Matrix, representation: str) -> BodyTensor | None:
-    """The vector of the antisymmetric part."""
+    """Spherical tensor of the vector of the antisymmetric part; None if it is zero."""
     c = np.array(components, dtype=float)
     c = (c - c.T) / 2
     return tensor_of((float(c[1, 2]), float(c[2, 0]), float(c[0, 1])), 1, representation)
@@ -287,9 +293,9 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
 
 
 def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:
-    """Operators times numbers, those of one form that differ in their components alone added to one.
+    """Weighted operators, in which those of one kind are added to one by their components.
 
-    What adds up to 0 within the round-off of the sum is left out: it would connect what symmetry keeps apart.
+    A sum that is zero within round-off is left out: it would connect states of different symmetry.
     """
     sums: dict[object, list[Floats]] = {}
     for value, rotor in weighted:
@@ -307,8 +313,9 @@ def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]
     return out
 
 
-_CANCELS = 1e-14  # of the terms of a sum of a few numbers
+_CANCELS = 1e-14  # round-off of a sum, relative to the sum of absolute values of its terms
 
 
 def _nested(array: Floats) -> tuple:  # type: ignore[type-arg]
+    """An array as nested tuples, which can be hashed."""
     return tuple(_nested(row) if row.ndim else float(row) for row in array)

@@ -1,6 +1,6 @@
 """Coupling patterns of many F, and coefficients between them, in tables by F.
 
-They depend on the spins and on F alone, so that the last ones stay in memory: a fit or a second prediction finds them.
+They depend only on the spins and on F. The most recent ones stay in memory for fits and further predictions.
 """
 
 from __future__ import annotations
@@ -19,36 +19,41 @@ from rotor.quantum.spins.scheme import Scheme
 
 
 class PatternTable(NamedTuple):
-    """Patterns by doubled F, their numbers among those of the highest F, counted by their distances from F, and these distances, with
-    the class of exchange in the last column."""
+    """Patterns by doubled F, numbered alike for all F by their distances from F.
+
+    places: numbers of the patterns of each F. distances: the distances that each number stands for, and the class of exchange in the last
+    column.
+    """
 
     patterns: dict[int, Ints]
     places: dict[int, Ints]
-    every: Ints
+    distances: Ints
 
 
 @lru_cache(maxsize=16)
 def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
-    """The patterns of all F from the first to the last, doubled, that have any."""
-    patterns = {f: own for f in range(first, last + 1, 2) if len(own := scheme.patterns(f))}
+    """The patterns of all doubled F from the first to the last that have any."""
+    patterns = {f: patterns_of_f for f in range(first, last + 1, 2) if len(patterns_of_f := scheme.patterns(f))}
     if not patterns:
         return PatternTable({}, {}, np.zeros((0, 0), dtype=np.int64))
     highest = patterns[max(patterns)]
     moving = np.ones(highest.shape[1], dtype=np.int64)
     if scheme.equivalent:
-        moving[-scheme.equivalent : -1] = (
-            0  # a total of equivalent spins does not rise with F, nor its symmetry of three
-        )
-    # by distances from F: of the highest F first, then those that equivalent spins have at lower F alone
+        # the total of equivalent spins does not rise with F, nor does the symmetry number of three
+        moving[-scheme.equivalent : -1] = 0
+    # patterns of the highest F come first, then those that equivalent spins have only at lower F
     classes: dict[tuple[int, ...], int] = {}
     for f in sorted(patterns, reverse=True):
         distances = (patterns[f] - moving * f).tolist()
         for row, number in zip(distances, np.asarray(scheme.classes(patterns[f])).tolist(), strict=True):
             classes.setdefault(tuple(row), number)
     numbers = {row: place for place, row in enumerate(classes)}
-    places = {f: np.array([numbers[tuple(row)] for row in (own - moving * f).tolist()]) for f, own in patterns.items()}
-    every = np.array(list(classes), dtype=np.int64)
-    return PatternTable(patterns, places, np.column_stack([every, list(classes.values())]))
+    places = {
+        f: np.array([numbers[tuple(row)] for row in (patterns_of_f - moving * f).tolist()])
+        for f, patterns_of_f in patterns.items()
+    }
+    all_distances = np.array(list(classes), dtype=np.int64)
+    return PatternTable(patterns, places, np.column_stack([all_distances, list(classes.values())]))
 
 
 @lru_cache(maxsize=64)
@@ -58,9 +63,9 @@ def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> F
     Parameters
     ----------
     scheme : Scheme
-        Which spins are coupled.
+        Order in which the spins are coupled.
     channel : Channel
-        Which of them act, and with what power.
+        Acting spins, rank and powers.
     first, last : int
         The first and the last F, doubled.
 
@@ -80,9 +85,9 @@ def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) ->
     Parameters
     ----------
     scheme : Scheme
-        Which spins are coupled.
+        Order in which the spins are coupled.
     rank, step : int
-        Rank of the tensor, and by how much F changes, doubled.
+        Rank of the tensor, and the doubled change of F.
     first, last : int
         The first and the last F, doubled.
 
@@ -96,9 +101,10 @@ def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) ->
 
 
 def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) -> Floats:
-    first, count = min(table.patterns), len(table.every)
+    """Coefficients by F as one read-only array (F, patterns', patterns)."""
+    first, count = min(table.patterns), len(table.distances)
     out = np.zeros((len(table.patterns), count, count))
-    for f, own in coefficients.items():
-        out[(f - first) // 2, table.places[f + step][:, None], table.places[f]] = own
+    for f, values in coefficients.items():
+        out[(f - first) // 2, table.places[f + step][:, None], table.places[f]] = values
     out.flags.writeable = False
     return out

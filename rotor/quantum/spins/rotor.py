@@ -1,7 +1,7 @@
-"""The rotation as spins see it: solved blocks of N, and operators of N contracted to their eigenstates.
+"""Solved blocks of the rotation to which spins are coupled, and channels of the spin terms.
 
-Terms that have the same spins, rank and power of N·S share every coefficient of coupling; they are one channel, whose
-contracted matrices Σ_terms c ⟨r'‖X^K‖r⟩ between solved blocks are computed once for all F.
+Terms with the same spins, rank and power of N·S share all coupling coefficients. They form one channel, whose contracted matrices
+Σ_terms c ⟨r'‖X^K‖r⟩ between solved blocks are computed once for all F.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class RotorPart(NamedTuple):
-    """Functions of one state v within a block: a Wang block, or |N K⟩ of a symmetric top; where they stand."""
+    """Functions of one state v within a block (a Wang block, or |N K⟩ of a symmetric top), and their places."""
 
     v: int
     basis: Basis
@@ -41,7 +41,7 @@ class RotorPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RotorBlock:
-    """States of one N solved together: energies (n,) in MHz, eigenvectors (n, n) in columns over the parts."""
+    """States of one N that are solved together: energies (n,) in MHz and eigenvectors (n, n) in columns over the parts."""
 
     n: int
     parts: tuple[RotorPart, ...]
@@ -50,9 +50,9 @@ class RotorBlock:
 
 
 class Channel(NamedTuple):
-    """Places of the spins that act, the rank, and the powers of N·S1 and, with it, of N².
+    """Places of the acting spins, the rank, and the powers of N·S1 and, with it, of N².
 
-    exchange: of two equivalent spins, 1: half the sum of the operator and of that with both exchanged, -1: half the difference.
+    exchange: for two equivalent spins, 1 is half the sum of the operator and its exchanged form, -1 half the difference; else 0.
     """
 
     acting: tuple[int, ...]
@@ -84,29 +84,29 @@ Terms = list[tuple[float, SpinTerm]]
 def solved_rotor(
     top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
 ) -> tuple[list[RotorBlock], str]:
-    """The rotation solved from N = `nmin` to `nmax`, and the representation of its functions.
+    """Solve the rotation from N = `nmin` to `nmax`.
 
-    A symmetric top whose terms are all axial is left in |N K⟩, one function a block.
+    A symmetric top whose terms are all axial has functions |N K⟩, one in each block.
 
     Parameters
     ----------
     top : Top
         Constants and kind.
     effects : tuple of QuantumEffect
-        What the Hamiltonian consists of.
+        Effects of the Hamiltonian.
     terms : list of (float, SpinTerm)
         Terms with spins, each with its value in MHz.
     nmin, nmax : int
         Lowest and highest N.
     executor : Executor or None
-        N are spread over it.
+        Blocks of different N are solved on it in parallel.
 
     Returns
     -------
     blocks : list of RotorBlock
         Solved blocks, energies in MHz.
     representation : str
-        Which principal axes are x, y, z.
+        Representation of the functions, such as Ir.
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))
@@ -117,29 +117,29 @@ def solved_rotor(
     representation = str(levels.representation)
     if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
         return [_rotor_block(block, representation) for block in levels.blocks], representation
-    names = np.column_stack(
-        [np.zeros(len(levels), dtype=np.int64), levels.quanta["ka"], levels.quanta["kc"]]
-    )  # of states in order of energy, as those of functions are
-    return [_of_one_state(block, names) for block in levels.blocks], representation
+    # labels of states in order of energy, as labels of functions are
+    names = np.column_stack([np.zeros(len(levels), dtype=np.int64), levels.quanta["ka"], levels.quanta["kc"]])
+    return [_single_state_block(block, names) for block in levels.blocks], representation
 
 
 def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
+    """Whether all operators of a symmetric top leave K good."""
     axis = "a" if top.kind == "prolate" else "c"
     if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
         return False
     scheme = scheme_of(top, effects)
-    if scheme.equivalent == 3:  # their total needs functions with a sign
+    if scheme.equivalent == 3:  # total spin states of three nuclei need Wang functions
         return False
     channels = channels_of(terms, scheme)  # C_bb and C_cc are axial together where they are equal
     if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
-    own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
+    operators = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
     coupled = any(effect.couplings(top) or (top.states is None and effect.states(top)) for effect in effects)
-    return not coupled and all(operator is None for operator in own)
+    return not coupled and all(operator is None for operator in operators)
 
 
 def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[RotorBlock]:
-    """A block of one function for each level; their arrays are rows of shared ones."""
+    """A block of one function for each level; their arrays are views of shared ones."""
     names, alone, vector = np.column_stack([v, k, np.zeros_like(k)]), slice(0, 1), np.ones((1, 1))
     rows = enumerate(zip(v.tolist(), n.tolist(), k.tolist(), strict=True))
     return [
@@ -148,13 +148,15 @@ def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[Rotor
     ]
 
 
-def _of_one_state(block: SolvedBlock, names: Ints) -> RotorBlock:
+def _single_state_block(block: SolvedBlock, names: Ints) -> RotorBlock:
+    """A solved block of one state v as a rotor block."""
     size = block.basis.size
     part = RotorPart(0, block.basis, slice(0, size), names[block.start : block.start + size])
     return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
 
 
 def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:
+    """A solved or coupled block as a rotor block."""
     if isinstance(block, CoupledBlock):
         n, where = block.j, [(part.v, part.basis, part.place) for part in block.parts]
     else:
@@ -164,16 +166,17 @@ def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> Roto
 
 
 def _names(v: int, basis: WangBlock, representation: str) -> Ints:
+    """v, Ka and Kc of the functions of a Wang block."""
     ka, kc = names_of(basis, representation)
     return np.column_stack([np.full(len(ka), v), ka, kc])
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
-    """Every spin term of the effects with the value of its parameter times its factor, zeros left out.
+    """Spin terms of the effects with values in MHz (parameter times factor), without zeros.
 
     Raises ValueError for a quadrupole coupling of a spin of 1/2.
     """
-    found = []
+    weighted = []
     for effect in effects:
         values, twice = effect.parameters(top), {spin.name: spin.twice for spin in effect.spins(top)}
         for term in effect.spin_terms(top):
@@ -187,12 +190,12 @@ def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
                     f"parameter {term.name.partition('#')[0]}: spin {term.spins[0]} of 1/2 has no quadrupole moment; that needs a spin of "
                     "1 or more"
                 )
-            found.append((values[term.name] * term.factor, term))
-    return [(value, term) for value, term in found if value]
+            weighted.append((values[term.name] * term.factor, term))
+    return [(value, term) for value, term in weighted if value]
 
 
 def channels_of(terms: Terms, scheme: Scheme) -> Channels:
-    """Terms by channel; operators that differ only in their components are added to one."""
+    """Pieces by channel; operators that differ only in their components are added to one."""
     groups: dict[tuple[Any, ...], list[tuple[float, Rotor]]] = {}
     for value, term in terms:
         acting = tuple(sorted(scheme.place(name) for name in term.spins))
@@ -200,16 +203,16 @@ def channels_of(terms: Terms, scheme: Scheme) -> Channels:
         for part, sign in _by_exchange(channel, scheme):
             key = (part, term.bra, term.ket, 0 if term.ns else term.n2, term.nz2)
             groups.setdefault(key, []).append((sign * value, term.rotor))
-    found: Channels = {}
+    channels: Channels = {}
     for (channel, *where), members in groups.items():
-        found.setdefault(channel, []).extend(Piece(value, rotor, *where) for value, rotor in summed(members))
-    return found
+        channels.setdefault(channel, []).extend(Piece(value, rotor, *where) for value, rotor in summed(members))
+    return channels
 
 
 def parameter_channels(
     top: Top, effects: Iterable[QuantumEffect], names: Sequence[str], scheme: Scheme
 ) -> list[Channels]:
-    """∂H/∂c of each named parameter by channel, but for what it multiplies of the rotation alone."""
+    """Spin part of ∂H/∂c for each named parameter, by channel."""
     terms: dict[str, Terms] = {name: [] for name in names}
     for term in (term for effect in effects for term in effect.spin_terms(top)):
         if term.name in terms:
@@ -218,23 +221,23 @@ def parameter_channels(
 
 
 def _by_exchange(channel: Channel, scheme: Scheme) -> list[tuple[Channel, float]]:
-    """A channel as parts that keep or change the symmetry of two equivalent spins: ½(A + B) ± ½(A - B); of three, as in `scheme`."""
+    """Parts of a channel that keep or change the symmetry of two equivalent spins, ½(A + B) ± ½(A - B); for three spins, see `scheme`."""
     if not scheme.equivalent:
         return [(channel, 1.0)]
     if channel.ns and len(scheme.spins) == scheme.equivalent:
         raise ValueError("powers of N·S1 are those of a spin that is coupled before the equivalent ones")
     b = len(scheme.spins) - 1
     if scheme.equivalent == 3:
-        return [(_of_three(channel, b - 2), float(scheme.count_of(channel.acting)))]
+        return [(_channel_of_three_spins(channel, b - 2), float(scheme.count_of(channel.acting)))]
     a = b - 1
     if set(channel.acting) >= {a, b} or not set(channel.acting) & {a, b}:
         return [(channel._replace(exchange=1), 1.0)]
-    of_a = channel._replace(acting=tuple(sorted(a if place == b else place for place in channel.acting)))
-    return [(of_a._replace(exchange=1), 1.0), (of_a._replace(exchange=-1), -1.0 if b in channel.acting else 1.0)]
+    first = channel._replace(acting=tuple(sorted(a if place == b else place for place in channel.acting)))
+    return [(first._replace(exchange=1), 1.0), (first._replace(exchange=-1), -1.0 if b in channel.acting else 1.0)]
 
 
-def _of_three(channel: Channel, first: int) -> Channel:
-    """The channel of the first of three equivalent spins, or of the pair that lies across from it: the second and the third."""
+def _channel_of_three_spins(channel: Channel, first: int) -> Channel:
+    """The channel of the first of three equivalent spins, or of the pair opposite to it: the second and the third."""
     among = tuple(place for place in channel.acting if place >= first)
     if set(among) <= {first}:
         return channel

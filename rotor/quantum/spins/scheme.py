@@ -1,4 +1,4 @@
-"""Which spins there are, in which order they are coupled, N + S1 = J, J + I1 = F1, ... = F, and what their sums are called."""
+"""Coupling scheme of the spins, N + S1 = J, J + I1 = F1, ... = F: their order, and names of the sums."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scheme:
-    """Which spins are coupled, and what the angular momenta on the way to F are called.
+    """The spins in the order of coupling, and names of the intermediate sums.
 
-    equivalent: how many, two or three of the last ones, are coupled to a total spin first; else 0. conserved: names of sums between
-    whose values all elements are left out, as in perturbation theory.
+    equivalent: number of last spins (two or three) that are coupled to a total spin first; else 0. conserved: names of sums that count as
+    good quantum numbers; elements between their different values are neglected, as in perturbation theory.
     """
 
     spins: tuple[Spin, ...]
@@ -54,21 +54,21 @@ class Scheme:
         return sum(self.twice)
 
     def patterns(self, twice_f: int) -> Ints:
-        """The coupling patterns of one F, doubled: N, ..., F."""
+        """The coupling patterns N, ..., F of one doubled F, doubled."""
         of = {0: patterns, 2: patterns_of_total, 3: patterns_of_three}[self.equivalent]
         return of(self.twice, twice_f)
 
     def recoupling(self, twice_f: int) -> tuple[Ints, Floats]:
-        """The patterns of one F coupled one by one, and their amplitudes in those with a total spin, (one by one, total)."""
+        """Patterns of one F with spins coupled one by one, and their amplitudes in patterns with a total spin, (one by one, total)."""
         plain = patterns(self.twice, twice_f)
         of = recoupling_of_three if self.equivalent == 3 else recoupling
         return plain, of(self.twice, plain, self.patterns(twice_f))
 
-    def classes(self, every: Ints) -> Ints:
-        """Of patterns, 1 where two equivalent spins have a function that changes sign with their exchange, else 0."""
+    def classes(self, patterns: Ints) -> Ints:
+        """1 for patterns whose function of two equivalent spins changes sign with their exchange, else 0."""
         if self.equivalent != 2:
-            return np.zeros(len(every), dtype=np.int64)
-        return np.asarray((self.twice[-1] + self.twice[-2] - every[:, -2]) // 2 % 2)
+            return np.zeros(len(patterns), dtype=np.int64)
+        return np.asarray((self.twice[-1] + self.twice[-2] - patterns[:, -2]) // 2 % 2)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -80,29 +80,31 @@ class Scheme:
         electrons = [f"j{i + 1}" if i else "j" for i, spin in enumerate(self.spins) if spin.electron]
         nuclei = len(self.spins) - len(electrons)
         sums = [*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else [])]
-        of_total: list[str] = {0: [], 2: ["i_tot", "f"], 3: ["i_sym", "i_tot", "f"]}[self.equivalent]
-        return (*sums[: len(sums) - self.equivalent], *of_total)
+        total_names: list[str] = {0: [], 2: ["i_tot", "f"], 3: ["i_sym", "i_tot", "f"]}[self.equivalent]
+        return (*sums[: len(sums) - self.equivalent], *total_names)
 
     @property
     def half(self) -> tuple[bool, ...]:
-        """Which of them are half-integers."""
+        """Whether each sum is a half-integer."""
         halves = [bool(total % 2) for total in accumulate(self.twice)]
         last = halves[-1:]
-        of_total = {0: [], 2: [False, *last], 3: [False, sum(self.twice[-3:]) % 2 == 1, *last]}[self.equivalent]
-        return (*halves[: len(halves) - self.equivalent], *of_total)
+        total_halves = {0: [], 2: [False, *last], 3: [False, sum(self.twice[-3:]) % 2 == 1, *last]}[self.equivalent]
+        return (*halves[: len(halves) - self.equivalent], *total_halves)
 
     @property
     def conserved_columns(self) -> list[int]:
-        """Columns of the patterns that are conserved."""
+        """Columns of the patterns that hold conserved sums."""
         return [column for column, name in enumerate(("n", *self.names)) if name in self.conserved]
 
     def count_of(self, acting: tuple[int, ...]) -> int:
-        """How many equal operators, turned by 120° each, one that acts on these places stands for: 3 with one of three equivalent
-        spins, else 1."""
+        """Number of equal operators, turned by 120° each, that an operator on these places represents.
+
+        3 if it acts on one of three equivalent spins, else 1.
+        """
         return 3 if self.equivalent == 3 and max(acting, default=-1) >= len(self.spins) - 3 else 1
 
     def place(self, name: str) -> int:
-        """The place of a spin by its name."""
+        """The place of a spin in the order of coupling."""
         for place, spin in enumerate(self.spins):
             if spin.name == name:
                 return place
@@ -110,10 +112,10 @@ class Scheme:
 
 
 def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
-    """The spins of all effects, each once, electrons first; ValueError where two effects give one of them another size."""
-    found: dict[str, Spin] = {}
+    """The spins of all effects, each once, electrons first; ValueError if two effects differ in the size of a spin."""
+    spins: dict[str, Spin] = {}
     for spin in (spin for effect in effects for spin in effect.spins(top)):
-        if found.setdefault(spin.name, spin) != spin:
-            raise ValueError(f"spin {spin.name}: given as {found[spin.name].twice}/2 and as {spin.twice}/2")
+        if spins.setdefault(spin.name, spin) != spin:
+            raise ValueError(f"spin {spin.name}: given as {spins[spin.name].twice}/2 and as {spin.twice}/2")
     conserved = frozenset(name for effect in effects for name in effect.conserved_sums(top))
-    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)), conserved)
+    return Scheme(tuple(sorted(spins.values(), key=lambda spin: not spin.electron)), conserved)

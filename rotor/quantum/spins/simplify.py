@@ -1,10 +1,10 @@
-"""How spins are treated: exactly, with N as a good quantum number, or to first order; and what that neglects.
+"""Treatment of spins: exact, with N as a good quantum number, or to first order; and the error of each.
 
     exact           all N and all rotational states that a tensor connects
-    N-diagonal      elements between different N left out
-    first-order     elements between different rotational states left out too; several spins are still coupled with each other
+    N-diagonal      elements between different N neglected
+    first-order     elements between different rotational states neglected too; several spins are still coupled with each other
 
-Whose levels differ by how much from exact ones is bounded in `neglected`. A line may be off by as much for each of its two states.
+`neglected` bounds the shifts of levels. The error of a line is at most the sum for its two states.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from rotor.quantum.spins.neglected import largest_shifts
 
 
 def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[int]) -> Plan:
-    """A plan with the elements alone that the method asked for has; the plan itself where none was."""
-    asked = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
-    if asked is None:
+    """The plan with the elements of the requested treatment; unchanged if none is requested."""
+    requested = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
+    if requested is None:
         return plan
-    if plan.shared.scheme.equivalent == 3 and asked.method not in (EXACT, "auto"):
+    if plan.shared.scheme.equivalent == 3 and requested.method not in (EXACT, "auto"):
         raise ValueError(
-            f"method {asked.method} with a total spin of three nuclei: they are computed by the exact one alone"
+            f"method {requested.method} with a total spin of three nuclei: only the exact method computes them"
         )
-    if asked.method == EXACT or plan.shared.scheme.equivalent == 3:
-        return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz))
+    if requested.method == EXACT or plan.shared.scheme.equivalent == 3:
+        return plan.with_method(Used(EXACT, 0.0, requested.tolerance_mhz))
     other_n, same_n = largest_shifts(plan)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
-    chosen = asked.method
+    chosen = requested.method
     if chosen == "auto":
-        chosen = next(name for name, size in estimates.items() if size <= asked.tolerance_mhz)
-    used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
+        chosen = next(name for name, size in estimates.items() if size <= requested.tolerance_mhz)
+    used = Used(chosen, estimates[chosen], requested.tolerance_mhz)
     if chosen == EXACT:
         return plan.with_method(used)
-    return plan.with_method(used, [(_of_one_n(found, chosen), of) for found, of in plan.contracted])
+    return plan.with_method(used, [(_without_neglected(contracted, chosen), of) for contracted, of in plan.contracted])
 
 
-def _of_one_n(every: Sequence[Contracted], method: str) -> list[Contracted]:
-    """The same of operators in stacks."""
-    found = [one for one in every if not one.pairs.rise]
+def _without_neglected(contracted: Sequence[Contracted], method: str) -> list[Contracted]:
+    """Operators without elements that a treatment neglects."""
+    same_n = [entry for entry in contracted if not entry.pairs.rise]
     if method == N_DIAGONAL:
-        return found
-    alone = [one for one in found if one.up is one.low]
-    return [one._replace(matrices=one.matrices * np.eye(one.matrices.shape[1])) for one in alone]
+        return same_n
+    diagonal = [entry for entry in same_n if entry.up is entry.low]
+    return [entry._replace(matrices=entry.matrices * np.eye(entry.matrices.shape[1])) for entry in diagonal]

@@ -16,20 +16,20 @@ from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
 from rotor.quantum.wang.basis import WangBlock
 
-MOST_RANK = 2  # up to which there are closed forms for many N at once
+MOST_RANK = 2  # highest rank with closed forms for many N at once
 
 
 class Section(NamedTuple):
-    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, the parts of all N."""
+    """The functions of one state v and one kind of Wang block in a stack: basis of the largest N, rows, and the parts of all N."""
 
     v: int
     basis: WangBlock
     rows: slice
-    every: tuple[RotorPart, ...]
+    parts: tuple[RotorPart, ...]
 
 
 class Pairs(NamedTuple):
-    """Blocks of two stacks, the N' and N of each pair: places in the stacks and N as columns."""
+    """Pairs of blocks of two stacks: places in the stacks (pairs,), and N' and N as columns (pairs, 1)."""
 
     up: Ints
     low: Ints
@@ -38,17 +38,17 @@ class Pairs(NamedTuple):
 
     @property
     def rise(self) -> int:
-        """N' - N, the same of all."""
+        """N' - N, equal for all pairs."""
         return int(self.m[0, 0] - self.n[0, 0])
 
     def turned(self) -> Pairs:
-        """The other way round."""
+        """The pairs in the opposite order."""
         return Pairs(self.low, self.up, self.n, self.m)
 
 
 def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats:
     """½[Nz^2q, N₊^2n + N₋^2n]₊ over the functions of a section: (blocks, units, functions, functions)."""
-    bases = [part.basis for part in section.every if isinstance(part.basis, WangBlock)]
+    bases = [part.basis for part in section.parts if isinstance(part.basis, WangBlock)]
     matrices = np.zeros((len(bases), len(units), section.basis.size, section.basis.size))
     for d, diagonal in enumerate(unit_diagonals(bases, [basis.size for basis in bases], units) if units else ()):
         places = np.arange(max(diagonal.shape[1] - d, 0))
@@ -58,21 +58,22 @@ def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats
 
 
 def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    """Elements (pairs, functions', functions) of an operator between two sections; None where it does not act."""
     if isinstance(rotor, Cosines):
         tensor = tensor_of(rotor.components, rotor.rank, representation)
-        found = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
-        return -found if found is not None and rotor.rank == 1 else found
+        elements = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
+        return -elements if elements is not None and rotor.rank == 1 else elements
     if isinstance(rotor, CosinesWithN):
-        return _of_cosines_with_n(rotor, left, right, pairs, representation)
+        return _elements_with_n(rotor, left, right, pairs, representation)
     if isinstance(rotor, Scalar):
-        return _of_scalar(rotor, left, right, pairs)
+        return _scalar_elements(rotor, left, right, pairs)
     return _one_by_one(rotor, left, right, pairs, representation)
 
 
-def _of_cosines_with_n(
+def _elements_with_n(
     rotor: CosinesWithN, left: Section, right: Section, pairs: Pairs, representation: str
 ) -> Floats | None:
-    """See `CosinesWithN.elements`."""
+    """Elements of `CosinesWithN` between two sections."""
     m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
     rise = pairs.rise
     if abs(rise) > 1:
@@ -83,20 +84,20 @@ def _of_cosines_with_n(
         (stretch, tensor_of(rotor.components, 2, representation)),
         (change, axis_tensor(rotor.components, representation)),
     ]
-    found = [
+    terms = [
         (factor, tensor_elements_of_pairs(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None
     ]
-    acting = [factor * matrix for factor, matrix in found if matrix is not None]
+    acting = [factor * matrix for factor, matrix in terms if matrix is not None]
     scalar = float(np.trace(np.array(rotor.components))) / 3
     if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
         acting.append(scalar * length * np.eye(up.size, low.size))
     return np.asarray(sum(acting)) if acting else None
 
 
-def _of_scalar(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Floats | None:
-    """Powers of N, which act between equal Wang functions."""
+def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Floats | None:
+    """Elements of powers of N, which act between equal Wang functions."""
     bases = zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
-    alike = np.array([left.every[a].basis == right.every[b].basis for a, b in bases])
+    alike = np.array([left.parts[a].basis == right.parts[b].basis for a, b in bases])
     if not alike.any():
         return None
     units = sorted({(q, n) for (_, q, n), _ in rotor.operators})
@@ -104,26 +105,26 @@ def _of_scalar(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Fl
     for (p, q, n), factor in rotor.operators:
         factors[:, units.index((q, n))] += np.where(alike, factor * x**p, 0.0)
     matrices = power_matrices(left, units)[pairs.up]
-    found = np.zeros((len(alike), left.basis.size, right.basis.size))
-    size = min(found.shape[1:])
-    found[:, :size, :size] = np.einsum("bu,buij->bij", factors, matrices[:, :, :size, :size])
-    return found
+    elements = np.zeros((len(alike), left.basis.size, right.basis.size))
+    size = min(elements.shape[1:])
+    elements[:, :size, :size] = np.einsum("bu,buij->bij", factors, matrices[:, :, :size, :size])
+    return elements
 
 
 def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
-    """Any operator, pair by pair."""
+    """Elements of any operator, pair by pair."""
     total: Floats | None = None
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
-        found = rotor.elements(left.every[a].basis, right.every[b].basis, representation)
-        if found is not None:
+        element = rotor.elements(left.parts[a].basis, right.parts[b].basis, representation)
+        if element is not None:
             if total is None:
                 total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
-            total[place, : found.shape[0], : found.shape[1]] = found
+            total[place, : element.shape[0], : element.shape[1]] = element
     return total
 
 
 def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
-    """`tensors.block_elements` of all pairs: (pairs, up.size, low.size)."""
+    """`tensors.block_elements` for all pairs: (pairs, up.size, low.size)."""
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
@@ -133,25 +134,29 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
     if not closes.any():
         return None
     m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
-    by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
-    parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
-    found, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
+    by_n = [
+        tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)
+    ]  # phases depend on N modulo 4
+    parts = np.array([signed for _, signed in by_n])[n[:, 0] % 4]
+    elements, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
     for step in steps:
         source, target = overlap(up, low, step)
         if source.start < source.stop:
             rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
             first, count = low.first_k + 2 * source.start, source.stop - source.start
-            found[:, rows, columns] = _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
+            elements[:, rows, columns] = (
+                _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
+            )
     if rank > 1:
-        _add_folded(found, parts, up, low, (every_n, rise))
+        _add_folded(elements, parts, up, low, (every_n, rise))
     if closes.all():
-        return found
+        return elements
     out = np.zeros((len(closes), up.size, low.size))
-    out[closes] = found
+    out[closes] = elements
     return out
 
 
-@lru_cache(maxsize=512)  # of N up to 100 some 20 MB
+@lru_cache(maxsize=512)  # about 20 MB for N up to 100
 def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
     """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
 
@@ -160,14 +165,14 @@ def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_
     every_n : tuple of int
         N of the lower blocks.
     rise, rank, step : int
-        By how much N changes, rank of the tensor, by how much K changes.
+        Change of N, rank of the tensor, change of K.
     first_k, count : int
-        The lowest K and their number.
+        The lowest K and the number of K.
 
     Returns
     -------
     (N, K) array
-        0 where there is no such K; shared and read-only.
+        Zero where K exceeds N; shared and read-only.
     """
     n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
     m = n + rise
@@ -182,12 +187,12 @@ def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_
 
 
 def _add_folded(
-    found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[tuple[int, ...], int]
+    elements: Floats, parts: Floats, up: WangBlock, low: WangBlock, n_and_rise: tuple[tuple[int, ...], int]
 ) -> None:
-    """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (every_n, rise) = parts.shape[1] // 2, of_pairs
+    """Add the elements that connect K with -K', as in `tensors.bands_between`: s X(K', -K) for 1 ≤ K, K' and K + K' ≤ rank."""
+    rank, (every_n, rise) = parts.shape[1] // 2, n_and_rise
     for column, k in enumerate(low.k[:rank].tolist()):
         for row, k_up in enumerate(up.k[:rank].tolist()):
             if k and k_up and k + k_up <= rank:
                 turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
-                found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
+                elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]

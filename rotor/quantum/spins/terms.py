@@ -1,4 +1,4 @@
-"""What an effect says of spins: which there are, and the terms that couple them with the rotation and with each other."""
+"""Spins and their coupling terms, as effects declare them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rotor.quantum.spins.operators import (
 
 @dataclass(frozen=True)
 class Spin:
-    """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
+    """One spin: its name in parameters, twice its size (2I, an integer), and whether it is an electron spin.
 
-    One of size 0 holds a place in the order of coupling: it has a quantum number and splits nothing.
+    A spin of size 0 is a placeholder: it adds a quantum number but no splitting.
 
-    Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two or three nuclei
-    that have one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest. Of three, on
-    a threefold axis, the terms name the first alone, or the first and the second (see `three_equivalent`).
+    Spins are coupled in the order in which effects first name them, electrons before nuclei. total: two or three nuclei with an equal
+    name here, such as "I", are equivalent. They are coupled to a total spin first, which is coupled last. Terms of three equivalent nuclei
+    name only the first, or the first and the second (see `three_equivalent`).
     """
 
     name: str
@@ -33,11 +33,11 @@ class Spin:
 
 @dataclass(frozen=True)
 class SpinTerm:
-    """What a parameter of an effect multiplies, besides `factor`: X^K(N) · W^K of the spins named.
+    """The operator that a parameter multiplies: `factor` times X^K(N) · W^K of the spins.
 
-    name: of the parameter. spins: none, one (its vector), one twice (its quadrupole, T²(I, I)/(2I(2I-1))) or two (their product,
-    coupled to the rank of `rotor`). n2, nz2: powers of N² and Nz², ns: power of N·S1. bra, ket: the states v that it connects, h.c.
-    added where they differ; an operator that is odd under time reversal has the factor i there.
+    name: name of the parameter. spins: none, one (its vector), one twice (its quadrupole, T²(I, I)/(2I(2I-1))) or two (their product,
+    coupled to the rank of `rotor`). n2, nz2: powers of N² and Nz². ns: power of N·S1. bra, ket: the states v that it connects; where they
+    differ the conjugate is added, and an operator that is odd under time reversal has a factor i.
     """
 
     name: str

@@ -1,14 +1,14 @@
-"""Levels of each F with three equivalent nuclei on a threefold axis: the functions that the exchange of nuclei allows, and no others.
+"""Levels of each F with three equivalent nuclei about a threefold axis, over the functions that their exchange allows.
 
-A turn by 120° about the axis together with the cyclic exchange of the three spins leaves every function of a molecule unchanged (A1
-and A2 of D3; levels of E do not exist). Of |N K⟩ with K = 0, 3, 6, ... these are the functions W_s(K) of Wang times spin functions of
-species A1 and A2; of other K, with the functions x and y of species E (`three_spins`),
+A turn by 120° about the axis together with the cyclic exchange of the three spins leaves each function of a molecule unchanged (A1 and A2
+of D3; levels of E do not exist). For K = 0, 3, 6, ... these functions are Wang functions W_s(K) times spin functions of species A1 and A2.
+For other K they contain the spin functions x and y of species E (`three_spins`),
 
     [W_s(K) x + o W_-s(K) y]/√2,     o = 1 or -1 as a turn takes W_s(K) to + or -sin(2πK/3) W_-s(K)
 
-(H. M. Pickett, J. Mol. Spectrosc. 228, 659 (2004), in real functions). Between such functions the sum of an operator over the three
-nuclei is three times that of the first nucleus, X·I_1, so that the tensor of one nucleus says all; likewise for the pair of the second
-and third nuclei. What is odd under all half turns across the axis may mix A1 with A2, as in a molecule with the axis alone.
+(H. M. Pickett, J. Mol. Spectrosc. 228, 659 (2004), in real functions). Between such functions the sum of an operator over the three nuclei
+is three times that of the first nucleus, X·I_1, so that the tensor of one nucleus is enough; likewise for the pair of the second and third
+nuclei. Operators that are odd under all half turns across the axis may mix A1 with A2, as in a molecule with only the threefold axis.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axes_of
 
-_ZERO = 1e-12  # of the largest element: what connects less is round-off of sums that cancel
-_ROUND_OFF = 1e-13  # of coefficients, sums of products of a few numbers of size 1
-_OF_THE_AXIS = 1e-9  # of the largest element: round-off of products of eigenvectors is below
+_ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
+_ROUND_OFF = 1e-13  # round-off of coefficients, which are sums of products of a few numbers of size 1
+_OF_THE_AXIS = 1e-9  # limit of elements that break the threefold axis, relative to the largest; round-off is smaller
 
 
 class Row(NamedTuple):
-    """Where a Wang function stands: number of the solved block, place in it; v, N, K and sign s."""
+    """Place and labels of a Wang function: number of the solved block, place in it, v, N, K and sign s."""
 
     block: int
     place: int
@@ -50,10 +50,10 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Functions:
-    """The functions of one F, (n,) each: their first and second products of a Wang function and a pattern, by rows of either, and the
-    factors of these, of which the second may be 0; and the sub-block that names them.
+    """The allowed functions of one F, each a sum of two products of a Wang function and a pattern.
 
-    names, sizes: of all sub-blocks, as `blocks.names_of_parts` has them.
+    wang, pattern, factor: (n,) row of the Wang function, row of the pattern and factor (the second may be 0) for the first and the second
+    product. sub_block: sub-block that labels each function. names, sizes: of all sub-blocks, see `parts.names_of_parts`.
     """
 
     wang: tuple[Ints, Ints]
@@ -65,26 +65,26 @@ class Functions:
 
 
 def in_wang_functions(plan: Plan) -> Plan:
-    """The plan with the rotation left in Wang functions, since K is what the axis sees; its energies are operators then.
+    """The plan over Wang functions, since the threefold axis needs K; the rotational Hamiltonian becomes an operator.
 
     Raises ValueError for a rotation without a threefold axis.
     """
     blocks = []
     vectors = [block.vectors for block in plan.blocks]
     turned = {
-        (i, k): [(vectors[i] @ x @ vectors[k].T, channels) for x, channels in found]
-        for (i, k), found in plan.operators.items()
+        (i, k): [(vectors[i] @ x @ vectors[k].T, channels) for x, channels in operators]
+        for (i, k), operators in plan.operators.items()
     }
     for number, block in enumerate(plan.blocks):
-        own = (block.vectors * block.energies_mhz) @ block.vectors.T
-        _check_axis(block, own)
-        turned.setdefault((number, number), []).append((own, [ALONE]))
-        blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
-    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, given=turned)
+        hamiltonian = (block.vectors * block.energies_mhz) @ block.vectors.T
+        _check_axis(block, hamiltonian)
+        turned.setdefault((number, number), []).append((hamiltonian, [ALONE]))
+        blocks.append(RotorBlock(block.n, block.parts, np.diag(hamiltonian).copy(), np.eye(len(hamiltonian))))
+    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, replacement=turned)
 
 
 def _check_axis(block: RotorBlock, matrix: Floats) -> None:
-    """ValueError where the rotation connects K with K' other than ±K + 3n."""
+    """Raise ValueError if the rotation connects K with K' other than ±K + 3n."""
     k = np.concatenate([_wang(part).k for part in block.parts])
     apart = ((k[:, None] - k) % 3 != 0) & ((k[:, None] + k) % 3 != 0)
     if np.abs(matrix[apart]).max(initial=0.0) > _OF_THE_AXIS * np.abs(matrix).max():
@@ -97,15 +97,15 @@ def _check_axis(block: RotorBlock, matrix: Floats) -> None:
 def allowed_states(
     plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None
 ) -> tuple[list[Member], Iterator[States]]:
-    """The blocks of all F over allowed functions, those left out in which no level exists by `exist`, and their states."""
+    """The blocks of all F over allowed functions in which a level exists, and their states."""
     members, matrices = list[Member](), list[Floats]()
-    for f, every in patterns.items():
-        parts = _parts(plan, every)
+    for f, patterns_of_f in patterns.items():
+        parts = _parts(plan, patterns_of_f)
         rows = _rows(parts)
-        functions = _functions(plan, every, parts, rows)
+        functions = _functions(plan, patterns_of_f, parts, rows)
         if not len(functions.sub_block):
             continue
-        matrix = _matrix(plan, every, parts, rows, functions)
+        matrix = _matrix(plan, patterns_of_f, parts, rows, functions)
         for chosen in _connected(matrix, functions.sub_block):
             names, sizes = _names(functions, chosen)
             if exist is None or exist(names).any():
@@ -120,48 +120,52 @@ def allowed_states(
     return members, every_states
 
 
-def _parts(plan: Plan, every: Ints) -> list[SpinPart]:
-    """All solved blocks whose N couples to the F, each with all patterns of that N."""
-    found, start = [], 0
+def _parts(plan: Plan, patterns: Ints) -> list[SpinPart]:
+    """All solved blocks whose N couples to the F, each with all patterns of its N."""
+    parts, start = [], 0
     for number, block in enumerate(plan.blocks):
-        own = np.flatnonzero(every[:, 0] == 2 * block.n)
-        if len(own):
-            stop = start + len(own) * len(block.energies_mhz)
-            found.append(SpinPart(number, block, slice(int(own[0]), int(own[-1]) + 1), slice(start, stop)))
+        pattern_rows = np.flatnonzero(patterns[:, 0] == 2 * block.n)
+        if len(pattern_rows):
+            stop = start + len(pattern_rows) * len(block.energies_mhz)
+            parts.append(
+                SpinPart(number, block, slice(int(pattern_rows[0]), int(pattern_rows[-1]) + 1), slice(start, stop))
+            )
             start = stop
-    return found
+    return parts
 
 
 def _rows(parts: list[SpinPart]) -> list[Row]:
-    """Every Wang function of the parts, part by part."""
+    """All Wang functions of the parts, part by part."""
     out = []
     for place, part in enumerate(parts):
-        for own in part.rotor.parts:
-            basis = _wang(own)
-            for at, k in enumerate(basis.k.tolist(), own.place.start):
-                out.append(Row(place, at, own.v, basis.j, k, basis.sign))
+        for wang_part in part.rotor.parts:
+            basis = _wang(wang_part)
+            for at, k in enumerate(basis.k.tolist(), wang_part.place.start):
+                out.append(Row(place, at, wang_part.v, basis.j, k, basis.sign))
     return out
 
 
 def _wang(part: RotorPart) -> WangBlock:
+    """The Wang functions of a part; ValueError for a linear molecule."""
     if not isinstance(part.basis, WangBlock):
         raise ValueError("three equivalent nuclei need functions with K and a sign; a linear molecule has none")
     return part.basis
 
 
-def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) -> Functions:
+def _functions(plan: Plan, patterns: Ints, parts: list[SpinPart], rows: list[Row]) -> Functions:
+    """The allowed functions of one F."""
     partner = {(row.v, row.n, row.k, row.sign): place for place, row in enumerate(rows)}
-    row_of = {tuple(pattern): place for place, pattern in enumerate(every.tolist())}
+    row_of = {tuple(pattern): place for place, pattern in enumerate(patterns.tolist())}
     columns: list[tuple[int, int, float, int, int, float, int]] = []
     names: list[Ints] = []
     sizes: list[int] = []
     start = 0
     for part in parts:
-        for own in part.rotor.parts:
-            basis, along = _wang(own), own.names[:, _along(plan)]
+        for wang_part in part.rotor.parts:
+            basis, along = _wang(wang_part), wang_part.names[:, _along(plan)]
             orientation = 1.0 if phase(basis) == 1.0 else -1.0
             for p in range(part.patterns.start, part.patterns.stop):
-                kind = int(every[p, -3]) % STEP
+                kind = int(patterns[p, -3]) % STEP
                 if kind == ODD_E:
                     continue
                 for residue in (1, 2) if kind == EVEN_E else (0,):
@@ -170,12 +174,12 @@ def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) 
                         if not residue:
                             columns.append((at, p, 1.0, at, p, 0.0, len(sizes)))
                             continue
-                        row, other = rows[at], every[p].copy()
+                        row, other = rows[at], patterns[p].copy()
                         other[-3] += ODD_E - EVEN_E
                         o = orientation if residue == 1 else -orientation
                         second = partner[row.v, row.n, row.k, -row.sign]
                         columns.append((at, p, sqrt(0.5), second, row_of[tuple(other)], o * sqrt(0.5), len(sizes)))
-                    names.append(_names_of_sub_block(own, along % 3 == residue, every[p], residue))
+                    names.append(_names_of_sub_block(wang_part, along % 3 == residue, patterns[p], residue))
                     sizes.append(len(chosen))
             start += basis.size
     table = np.array(columns, dtype=float).reshape(-1, 7)
@@ -187,7 +191,7 @@ def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) 
 
 
 def _along(plan: Plan) -> int:
-    """Which of v, Ka and Kc is K: 1 or 2."""
+    """Column of K among v, Ka and Kc: 1 or 2."""
     axis = axes_of(plan.shared.representation)[2]
     if axis == "b":
         raise ValueError(
@@ -197,16 +201,16 @@ def _along(plan: Plan) -> int:
 
 
 def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: int) -> Ints:
-    """v, Ka, Kc and the pattern, in which x stands for E with K = 3n + 2 and y for E with K = 3n + 1."""
-    own = part.names[np.asarray(chosen, dtype=bool)]
+    """v, Ka, Kc and the pattern; in labels x stands for E with K = 3n + 2, y for E with K = 3n + 1."""
+    names = part.names[np.asarray(chosen, dtype=bool)]
     named = pattern.copy()
     if residue == 1:
         named[-3] += ODD_E - EVEN_E
-    return np.column_stack([own, np.tile(named, (len(own), 1))])
+    return np.column_stack([names, np.tile(named, (len(names), 1))])
 
 
-def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:
-    """The Hamiltonian over the functions: Σ_channels c(p', p) X(r', r), each product of two sums."""
+def _matrix(plan: Plan, patterns: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:
+    """The Hamiltonian over allowed functions, Σ_channels c(p', p) X(r', r)."""
     total = np.zeros((len(functions.sub_block), len(functions.sub_block)))
     by_channel: dict[Channel, list[tuple[int, int, Floats]]] = {}
     for i, up in enumerate(parts):
@@ -222,31 +226,32 @@ def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], fun
             if i != k:  # c(p', p) = (-1)^(N'-N) c(p, p'), and the product is symmetric
                 turned = (-1.0) ** (parts[i].rotor.n - parts[k].rotor.n) * element.T
                 rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] += turned
-        coupling = _coupling(plan, channel, every)
+        coupling = _coupling(plan, channel, patterns)
         for r, p, c in zip(functions.wang, functions.pattern, functions.factor, strict=True):
             for s, q, d in zip(functions.wang, functions.pattern, functions.factor, strict=True):
                 total += np.outer(c, d) * coupling[np.ix_(p, q)] * rotor[np.ix_(r, s)]
     return (total + total.T) / 2
 
 
-def _coupling(plan: Plan, channel: Channel, every: Ints) -> Floats:
-    """The coefficients of a channel without round-off: rotational energies times it would connect what symmetry keeps apart."""
+def _coupling(plan: Plan, channel: Channel, patterns: Ints) -> Floats:
+    """The coefficients of a channel without round-off, which times rotational energies would connect states of different symmetry."""
     if channel == ALONE:
-        return np.eye(len(every))
-    found = coefficients_of(plan.shared.scheme, channel, every)
-    return np.where(np.abs(found) > _ROUND_OFF, found, 0.0)
+        return np.eye(len(patterns))
+    values = coefficients_of(plan.shared.scheme, channel, patterns)
+    return np.where(np.abs(values) > _ROUND_OFF, values, 0.0)
 
 
 def _connected(matrix: Floats, sub_block: Ints) -> list[Ints]:
-    """The functions of each part of the matrix that is connected, sub-blocks as a whole."""
+    """The functions of each connected part of the matrix; sub-blocks are not divided."""
     scale = float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
     i, k = np.nonzero(np.abs(matrix) > _ZERO * scale)
     count = int(sub_block.max()) + 1
-    of_function = part_numbers(count, sub_block[i], sub_block[k])[sub_block]
-    return [np.flatnonzero(of_function == one) for one in np.unique(of_function)]
+    part_of_function = part_numbers(count, sub_block[i], sub_block[k])[sub_block]
+    return [np.flatnonzero(part_of_function == part) for part in np.unique(part_of_function)]
 
 
 def _names(functions: Functions, members: Ints) -> tuple[Ints, Ints]:
+    """Labels of the sub-blocks of these functions, and number of levels of each."""
     subs = np.unique(functions.sub_block[members])
     stops = np.cumsum(functions.sizes)
     names = [functions.names[stops[sub] - functions.sizes[sub] : stops[sub]] for sub in subs]
@@ -256,15 +261,12 @@ def _names(functions: Functions, members: Ints) -> tuple[Ints, Ints]:
 def _in_products(
     parts: list[SpinPart], rows: list[Row], functions: Functions, members: Ints
 ) -> tuple[tuple[SpinPart, ...], Floats]:
-    """The parts that take part, and the functions over their products of rotation and pattern."""
+    """The parts that these functions contain, and the functions in columns over products of rotational state and pattern."""
     table = np.array([(row.block, row.place) for row in rows])
     halves = [(table[r[members]], p[members], c[members]) for r, p, c in _halves(functions)]
     used = np.unique(np.concatenate([place[c != 0.0, 0] for place, _, c in halves]))
-    out, start, base = (
-        [],
-        0,
-        np.zeros((len(parts), 3), dtype=np.int64),
-    )  # start, first pattern, size of the solved block
+    out, start = [], 0
+    base = np.zeros((len(parts), 3), dtype=np.int64)  # start, first pattern, size of the solved block
     for i in used.tolist():
         part, size = parts[i], parts[i].place.stop - parts[i].place.start
         out.append(part._replace(place=slice(start, start + size)))
@@ -279,4 +281,5 @@ def _in_products(
 
 
 def _halves(functions: Functions) -> list[tuple[Ints, Ints, Floats]]:
+    """Rows of the Wang function and of the pattern, and factors, for the first and the second product."""
     return list(zip(functions.wang, functions.pattern, functions.factor, strict=True))

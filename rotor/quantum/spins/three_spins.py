@@ -1,4 +1,4 @@
-"""Three equivalent spins: their functions of one total spin by symmetry species, and their coupling to the rest of a chain.
+"""Functions of three equivalent spins with one total spin, by symmetry species, and their coupling to the other spins.
 
 The functions |((I_2 I_3)I_23, I_1) I_tot⟩ are even or odd under the exchange of spins 2 and 3 as 2I - I_23 is. The cyclic exchange P,
 1 → 2 → 3 → 1, has the elements
@@ -8,8 +8,8 @@ The functions |((I_2 I_3)I_23, I_1) I_tot⟩ are even or odd under the exchange 
 (A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 6.1.5). ½(P + P⁻¹) is 1 in functions of species A1 (even) and A2 (odd)
 and -½ in E, of which one function x is even and its partner y = (P - P⁻¹)x/√3 odd: P turns (x, y) by 120°.
 
-A pattern with a total is (N, ..., F', symmetry, I_tot, F), all doubled. symmetry: A1 0, A2 2, x 4, y 8, and 12 more for each
-further function of one species and total; the numbers 0, 1, 2, 4 are those of H. M. Pickett, J. Mol. Spectrosc. 228, 659 (2004).
+A pattern with a total is (N, ..., F', symmetry, I_tot, F), all doubled. symmetry: 0 for A1, 2 for A2, 4 for x, 8 for y, plus 12 for each
+further function of the same species and total; halved, 0, 1, 2, 4 are the numbers of H. M. Pickett, J. Mol. Spectrosc. 228, 659 (2004).
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from rotor.quantum.spins.coupling import patterns
 from rotor.quantum.wigner import six_j
 
 A1, A2, EVEN_E, ODD_E = 0, 2, 4, 8
-STEP = 12  # from one function to the next of its species
+STEP = 12  # between the numbers of successive functions of one species
 
 
 class SymmetricFunctions(NamedTuple):
-    """Of one total spin: the doubled I_23 (n,), the symmetry of every function (m,), and their amplitudes (n, m), n = m."""
+    """Functions with one total spin: doubled I_23 (n,), symmetry of each function (m,), and amplitudes (n, m), n = m."""
 
-    of_pair: Ints
+    pair_spins: Ints
     symmetry: Ints
     amplitudes: Floats
 
 
 class Allowed(NamedTuple):
-    """The functions of a block that exchange allows: in columns over its products of rotation and pattern, (products, n).
+    """Functions of a block that exchange allows, in columns over products of rotational function and pattern, (products, n).
 
-    sub_block: the number of the sub-block of each, from 0, rising. names, sizes: v, Ka, Kc and pattern that these give, as
-    `blocks.names_of_parts` has them.
+    sub_block: number of the sub-block of each function, from 0, rising. names, sizes: labels of the sub-blocks, see
+    `parts.names_of_parts`.
     """
 
     products: Floats
@@ -50,14 +50,14 @@ class Allowed(NamedTuple):
 
 
 def cyclic_exchange(twice_i: int, twice_total: int) -> tuple[Ints, Floats]:
-    """The doubled I_23 that couple with a third spin I to the total, and P over them.
+    """The doubled I_23 that couple with a third spin I to the total, and the matrix of P over them.
 
     >>> pairs, p = cyclic_exchange(1, 1)
     >>> pairs.tolist(), bool(abs(p @ p @ p - np.eye(2)).max() < 1e-15)
     ([0, 2], True)
     """
-    every = np.arange(0, 2 * twice_i + 1, 2)
-    pairs = every[(np.abs(every - twice_i) <= twice_total) & (twice_total <= every + twice_i)]
+    sums = np.arange(0, 2 * twice_i + 1, 2)
+    pairs = sums[(np.abs(sums - twice_i) <= twice_total) & (twice_total <= sums + twice_i)]
     a, b, i, total = pairs[:, None] / 2, pairs[None, :] / 2, twice_i / 2, twice_total / 2
     sign = np.where(pairs // 2 % 2, -1.0, 1.0)
     return pairs, np.asarray(sign * np.sqrt((2 * a + 1) * (2 * b + 1)) * six_j(i, i, a, i, total, b))
@@ -65,7 +65,7 @@ def cyclic_exchange(twice_i: int, twice_total: int) -> tuple[Ints, Floats]:
 
 @lru_cache(maxsize=64)
 def symmetric_functions(twice_i: int, twice_total: int) -> SymmetricFunctions:
-    """The functions of three spins I with one total, by species: A1, A2, then pairs x, y of E."""
+    """Functions of three spins I with one total, by species: A1, A2, then pairs x, y of E."""
     pairs, p = cyclic_exchange(twice_i, twice_total)
     even = (twice_i - pairs // 2) % 2 == 0
     mean, turn = (p + p.T) / 2, (p - p.T) / sqrt(3.0)
@@ -73,14 +73,14 @@ def symmetric_functions(twice_i: int, twice_total: int) -> SymmetricFunctions:
     for chosen, alone in ((even, A1), (~even, A2)):
         rows = np.flatnonzero(chosen)
         values, vectors = np.linalg.eigh(mean[np.ix_(rows, rows)])
-        found = np.zeros((len(pairs), len(rows)))
-        found[rows] = vectors * np.where(vectors.sum(axis=0) < 0, -1.0, 1.0)  # one sign of every function
-        single = values > 0.25  # 1, not -½
-        columns += list(found[:, single].T)
+        functions = np.zeros((len(pairs), len(rows)))
+        functions[rows] = vectors * np.where(vectors.sum(axis=0) < 0, -1.0, 1.0)  # fixes the sign of each function
+        single = values > 0.25  # eigenvalue 1 of A1 and A2, not -½ of E
+        columns += list(functions[:, single].T)
         names += [alone + STEP * m for m in range(int(single.sum()))]
         if alone == A1:
-            of_e = list(found[:, ~single].T)
-    for m, x in enumerate(of_e):
+            even_e = list(functions[:, ~single].T)
+    for m, x in enumerate(even_e):
         columns += [x, turn @ x]
         names += [EVEN_E + STEP * m, ODD_E + STEP * m]
     return SymmetricFunctions(pairs, np.array(names, dtype=np.int64), np.array(columns).reshape(-1, len(pairs)).T)
@@ -93,12 +93,12 @@ def patterns_of_three(spins: tuple[int, ...], f: int) -> Ints:
     [[0, 4, 1, 1], [0, 8, 1, 1], [2, 0, 3, 1], [2, 4, 1, 1], [2, 8, 1, 1], [4, 0, 3, 1]]
     """
     *others, i = spins[:-2]
-    found = []
+    rows = []
     for total in range(3 * i % 2, 3 * i + 1, 2):
         names = symmetric_functions(i, total).symmetry.tolist()
         for pattern in patterns((*others, total), f).tolist():
-            found += [(*pattern[:-1], name, total, pattern[-1]) for name in names]
-    return np.array(sorted(found), dtype=np.int64).reshape(-1, 1 + len(spins))
+            rows += [(*pattern[:-1], name, total, pattern[-1]) for name in names]
+    return np.array(sorted(rows), dtype=np.int64).reshape(-1, 1 + len(spins))
 
 
 def recoupling_of_three(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -> Floats:
@@ -110,18 +110,18 @@ def recoupling_of_three(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -
     i = spins[-1]
     left = one_by_one[:, None, :]
     out = np.zeros((len(one_by_one), len(total)))
-    for of_total in np.unique(total[:, -2]):
-        functions = symmetric_functions(i, int(of_total))
-        columns = np.flatnonzero(total[:, -2] == of_total)
+    for twice_total in np.unique(total[:, -2]):
+        functions = symmetric_functions(i, int(twice_total))
+        columns = np.flatnonzero(total[:, -2] == twice_total)
         right = total[columns][None, :, :]
         alike = (left[..., :-3] == right[..., :-3]).all(axis=-1)
         start, g, g2, f = (left[..., k] for k in (-4, -3, -2, -1))
         place = np.searchsorted(functions.symmetry, right[0, :, -3], sorter=np.argsort(functions.symmetry))
         amplitudes = functions.amplitudes[:, np.argsort(functions.symmetry)[place]]
-        for pair, amplitude in zip(functions.of_pair.tolist(), amplitudes, strict=True):
+        for pair, amplitude in zip(functions.pair_spins.tolist(), amplitudes, strict=True):
             first = _recoupled(g, i, g2, i, f, pair)
-            second = _recoupled(start, i, g, pair, f, of_total)
-            order = -1.0 if (i + pair - of_total) // 2 % 2 else 1.0
+            second = _recoupled(start, i, g, pair, f, twice_total)
+            order = -1.0 if (i + pair - twice_total) // 2 % 2 else 1.0
             out[:, columns] += np.where(alike, order * amplitude * first * second, 0.0)
     return out
 

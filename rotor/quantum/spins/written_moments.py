@@ -1,11 +1,11 @@
-"""Elements of moments that are written out as products of direction cosines and components of N (`rotor.quantum.moments.Written`).
+"""Elements of moments that are products of direction cosines and components of N (`rotor.quantum.moments.Written`).
 
-Over |N k⟩ each factor is a matrix: N_i of `j_operators`, φ_pi the reduced elements of `tensors`, so that a word is their product, with the
-components of N to the left at N' and those to the right at N. A component of N along an axis of the molecule does not change what is
-measured along an axis in space, so that the product is the reduced element of the word. Over Wang functions |J K s)) (`tensors`) a moment
-that time reversal leaves alone is i times a real matrix, one that it turns around is real.
+Over |N k⟩ each factor is a matrix: N_i of `j_operators`, and the reduced elements of φ_pi of `tensors`. A word is their product, with
+components of N to the left of φ taken at N' and those to the right at N. Molecule-fixed components of N commute with rotations in space, so
+the product is the reduced element of the word. Over Wang functions |J K s)) (`tensors`) a moment that is even under time reversal is i
+times a real matrix; an odd moment is real.
 
-From the first state to the second, the other way round, a moment acts as its Hermitian conjugate:
+In the opposite direction, between the same two states, a moment acts as its Hermitian conjugate:
 
     ⟨N k‖M†‖N'k'⟩ = (-1)^(N'-N) ⟨N'k'‖M‖N k⟩*
 """
@@ -28,14 +28,14 @@ from rotor.quantum.wang.j_operators import components
 def written_elements(
     moment: Written, up: Basis, low: Basis, representation: str, conjugate: bool = False
 ) -> Floats | None:
-    """The real elements of a moment between two bases, those of an electric one without their factor i; None where all are zero.
+    """Real elements of a moment between two bases, for an electric moment without the factor i; None where all are zero.
 
     Parameters
     ----------
     moment : Written
-        Its words along a, b, c.
+        Words along a, b, c.
     up, low : WangBlock or AxialState
-        Functions of N' (rows) and N (columns); of |N K⟩ those with K = 0 alone.
+        Functions of N' (rows) and N (columns); axial states only with K = 0.
     representation : str
         Which axes are x, y, z.
     conjugate : bool, optional
@@ -49,7 +49,7 @@ def written_elements(
     Raises
     ------
     ValueError
-        For |N K⟩ with K > 0, whose functions of K and -K are one here.
+        For axial states with K > 0, which represent both K and -K.
     """
     if abs(up.j - low.j) > 1:
         return None
@@ -58,12 +58,12 @@ def written_elements(
         between = -between if (up.j - low.j) % 2 else between
     else:
         between = _matrix(moment, up.j, low.j, representation)
-    own = functions_of(up).conj().T @ between @ functions_of(low)
-    found = own.imag if moment.electric and isinstance(up, WangBlock) else own.real
-    return np.asarray(found) if np.abs(found).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=1.0) else None
+    elements = functions_of(up).conj().T @ between @ functions_of(low)
+    real = elements.imag if moment.electric and isinstance(up, WangBlock) else elements.real
+    return np.asarray(real) if np.abs(real).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=1.0) else None
 
 
-_NOTHING = 1e-13  # of the largest element of |N k⟩: round-off of a product of a few numbers
+_NOTHING = 1e-13  # round-off of a product of a few numbers, relative to the largest element over |N k⟩
 
 
 @lru_cache(maxsize=512)
@@ -71,7 +71,7 @@ def _matrix(moment: Written, up: int, low: int, representation: str) -> Complexe
     """⟨N'k'‖M‖N k⟩ over all k' and k."""
     total = np.zeros((2 * up + 1, 2 * low + 1), dtype=np.complex128)
     for word in moment.words:
-        total += word.factor * _of_word(word, up, low, representation)
+        total += word.factor * _word_elements(word, up, low, representation)
     if moment.commutator:
         total *= (up * (up + 1.0) - low * (low + 1.0)) / 2
     if moment.of_k is not None:
@@ -80,7 +80,8 @@ def _matrix(moment: Written, up: int, low: int, representation: str) -> Complexe
     return total
 
 
-def _of_word(word: Word, up: int, low: int, representation: str) -> Complexes:
+def _word_elements(word: Word, up: int, low: int, representation: str) -> Complexes:
+    """Reduced elements of one word over all k' and k."""
     if not word.cosine:
         if up != low:
             return np.zeros((2 * up + 1, 2 * low + 1), dtype=np.complex128)
@@ -91,13 +92,14 @@ def _of_word(word: Word, up: int, low: int, representation: str) -> Complexes:
 
 @lru_cache(maxsize=512)
 def _cosine(axis: str, up: int, low: int, representation: str) -> Complexes:
-    along = [float(axis == one) for one in "abc"]
+    """Reduced elements of the direction cosine of one axis."""
+    along = [float(axis == letter) for letter in "abc"]
     return symmetric_top_elements(up, low, spherical_components(along, 1, representation))
 
 
 @lru_cache(maxsize=512)
 def _product(letters: str, j: int, representation: str) -> Complexes:
-    """N_i N_j ... of one N; the unit matrix of no letters."""
+    """N_i N_j ... within one N; the unit matrix for no letters."""
     if not letters:
         return np.eye(2 * j + 1, dtype=np.complex128)
     return np.asarray(components(j, representation)[letters[0]].matrix @ _product(letters[1:], j, representation))
