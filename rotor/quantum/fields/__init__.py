@@ -1,1 +1,1 @@
-"""Molecules in fields: states with M, the blocks that a field leaves apart, and maps of levels against its strength."""
+"""Molecules in fields: states with M, blocks that a field does not connect, and maps of levels against its strength."""

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AxialBlock(FieldBlock):
-    """States |J k M⟩ of one k and M of a linear or symmetric top, `step` 2 where J even and odd are apart.
+    """States |J k M⟩ of one k and M of a linear or symmetric top.
 
-    axis: 0 where the figure axis is a, 2 where it is c.
+    step: 2 where the field does not connect even with odd J, else 1. axis: 0 if the figure axis is a, 2 if it is c.
     """
 
     m: int
@@ -35,12 +35,12 @@ class AxialBlock(FieldBlock):
 
     @property
     def even_in_field(self) -> bool:
-        """Where K M is not 0 a reversed field exchanges K and -K."""
+        """Whether a reversed field leaves the energies unchanged; for K M ≠ 0 it exchanges K and -K."""
         return not self.k * self.m
 
     @property
     def label(self) -> str:
-        """k, and the parity of J where it is good."""
+        """k, and the parity of J where it is a good quantum number."""
         parity = "" if self.step == 1 else (" J odd" if int(self.j[0]) % 2 else " J even")
         return f"k={self.k}{parity}"
 
@@ -52,12 +52,12 @@ class AxialBlock(FieldBlock):
         bands = _cosines(contraction.rank, first, int(j[-1]), self.k, self.m)
         if contraction.rank == 1:
             return [size * band[skip:] for band in bands]
-        d, one, two = (band[skip:] for band in bands)
+        d, next_j, second_j = (band[skip:] for band in bands)
         main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
-        return [main, size * two[::2]] if self.step == 2 else [main, size * one, size * two]
+        return [main, size * second_j[::2]] if self.step == 2 else [main, size * next_j, size * second_j]
 
     def matrix(self, operator: FieldOperator) -> Floats:
-        """The operator over the states (n, n), real; that of a vector connects nothing where J even and odd are apart."""
+        """The operator over the states (n, n), real; a vector has no elements where even and odd J are separate."""
         if isinstance(operator, Magnet):
             return self._moment(operator.g)
         if self.step == 2 and operator.rank == 1:
@@ -69,7 +69,7 @@ class AxialBlock(FieldBlock):
         return out.reshape(size, size)
 
     def _moment(self, g: Floats) -> Floats:
-        """g⊥ M + (g∥ - g⊥) k cosθ."""
+        """The magnetic moment g⊥ M + (g∥ - g⊥) k cosθ."""
         across = (np.trace(g) - g[self.axis, self.axis]) / 2
         diagonal, beside = cosine_bands(self.j, self.k, self.m)
         chain = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
@@ -78,13 +78,13 @@ class AxialBlock(FieldBlock):
 
 @lru_cache(maxsize=4096)
 def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats, ...]:
-    """Bands of cosθ (power 1) or cos²θ (2) over J = first ... last."""
+    """Bands of cosθ (power 1) or cos²θ (power 2) over J = first ... last."""
     return (cosine_bands if power == 1 else cosine_squared_bands)(np.arange(first, last + 1), k, m)
 
 
 @dataclass(frozen=True)
 class AxialSpace(FieldSpace):
-    """Of a linear or symmetric top whose tensors have its axis; `oriented` where a vector connects J with J ± 1."""
+    """States of a linear or symmetric top with tensors along its axis; `oriented` if a vector connects J with J ± 1."""
 
     levels: FreeLevels = field(repr=False)
     jmax: int
@@ -93,7 +93,7 @@ class AxialSpace(FieldSpace):
     magnetic: bool = False
 
     def blocks(self, m: float) -> list[FieldBlock]:
-        """(k, M) is like (-k, -M); without a dipole like (-k, M) too, and in a magnetic field like (-k, M) alone."""
+        """The blocks of M. (k, M) has the energies of (-k, -M); without a dipole also of (-k, M), in a magnetic field only of (-k, M)."""
         out: list[FieldBlock] = []
         number = int(m)
         for k, rows in self._rows_by_k.items():
@@ -110,12 +110,13 @@ class AxialSpace(FieldSpace):
 
     @cached_property
     def _rows_by_k(self) -> dict[int, Ints]:
+        """Rows of the levels by k."""
         k = self.levels.quanta.get("k", np.zeros(len(self.levels), dtype=np.int64))
         return {int(value): np.flatnonzero(k == value) for value in np.unique(k)}
 
 
 def axial_levels(top: Top, jmax: int) -> FreeLevels:
-    """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
+    """Levels of a linear or symmetric top by K, then J; K and -K are separate levels."""
     solved = solve_levels(top, jmax)
     j, each = solved.rotational, solved.weight_per_component
     if top.kind == "linear":

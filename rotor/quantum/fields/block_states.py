@@ -1,4 +1,4 @@
-"""The lowest states of one block of a map at several fields, in a basis of the free states that is just large enough."""
+"""The lowest states of one block of a map at several fields, in the smallest sufficient basis of free states."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from rotor.quantum.fields.solver import DENSE, Matrix, solve_fields
 from rotor.quantum.fields.truncation import left_out_mhz
 
 FIRST_BASIS = 64
-PART_OF_TOLERANCE = 0.1  # for states below J max that a basis leaves out
+PART_OF_TOLERANCE = 0.1  # share of the tolerance for states below J max that a basis leaves out
 
 
 class BlockStates(NamedTuple):
     """The lowest states of one block.
 
-    rows: free levels (states,) that name them. energies: (fields, states), MHz. places: (n,) functions of the block over which the
-    vectors (fields, n, states) are. error: bound of what the basis leaves out of each energy (fields, states), MHz.
+    rows: free levels (states,) that label them. energies: (fields, states), MHz. places: (n,) functions of the block that form the basis of
+    the vectors (fields, n, states). error: bound of the truncation error of each energy (fields, states), MHz.
     """
 
     block: FieldBlock
@@ -32,18 +32,18 @@ class BlockStates(NamedTuple):
 
 
 def basis_order(block: FieldBlock, jmax: int) -> Ints:
-    """Places of the states up to J max in order of their free energies."""
+    """Places of the states up to J max, in order of their free energies."""
     order = block.free_order
     return order[block.j[order] <= jmax]
 
 
 def followed(block: FieldBlock, order: Ints, j_highest: int) -> int:
-    """How many of the lowest states of a basis hold all free levels up to J = `j_highest`."""
+    """Number of lowest states of a basis that contain all free levels up to J = `j_highest`."""
     return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
 
 
 def count_of(request: MapRequest, block: FieldBlock, order: Ints) -> int:
-    """States to be solved: those followed, and where labels are diabatic as many above as they may cross."""
+    """Number of states to solve: those of the map, and for diabatic labels as many above as they may cross."""
     count = followed(block, order, request.j_highest)
     return count if request.diabatic_gap_mhz is None else min(len(order), count + count // 2 + 4)
 
@@ -54,18 +54,18 @@ def block_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: i
     Parameters
     ----------
     request : MapRequest
-        What is solved.
+        Hamiltonian, fields and states of the map.
     block : FieldBlock
         A block of the space of `jmax + request.margin`.
     fields : (f,) array
-        In the unit of the request.
+        Fields in the unit of the request.
     jmax : int
         Highest J of the basis.
 
     Returns
     -------
     BlockStates
-        Energies (f, states) in MHz, and the states that they belong to.
+        Energies (f, states) in MHz, and the states.
     """
     return solve_block(request, block, request.problem(block), fields, jmax)
 
@@ -73,7 +73,7 @@ def block_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: i
 def solve_block(
     request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, jmax: int
 ) -> BlockStates:
-    """`block_states` with the matrices of the block at hand."""
+    """`block_states` with the matrices of the block, so that they are computed once."""
     order = basis_order(block, jmax)
     count = count_of(request, block, order)
     places, states = enough_states(problem, order, count, fields, request.tolerance_mhz)
@@ -87,7 +87,7 @@ def bounded_states(
     block: FieldBlock, problem: BlockProblem, order: Ints, places: Ints, energies: Floats, vectors: Matrix, error: Floats,
     fields: Floats,
 ) -> BlockStates:  # fmt: skip
-    """Solved states with their names, and the bound of what their basis leaves out added to the error of the solver."""
+    """Solved states with labels; the bound of the truncation error is added to the error of the solver."""
     error = error + left_out_mhz(problem, places, energies, vectors, fields)
     return BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, error)
 
@@ -95,7 +95,7 @@ def bounded_states(
 def enough_states(
     problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float
 ) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
-    """The lowest free states that suffice at the strongest field.
+    """The lowest free states that form a sufficient basis at the strongest field.
 
     Parameters
     ----------
@@ -104,18 +104,18 @@ def enough_states(
     order : (n,) array
         States of the basis by energy.
     count : int
-        How many of the lowest energies are computed.
+        Number of lowest energies that are computed.
     fields : (f,) array
-        In the unit of the request.
+        Fields in the unit of the request.
     tolerance_mhz : float
-        A tenth of it is the bound of what further states of the basis may change.
+        Further states of the basis may change an energy by a tenth of it.
 
     Returns
     -------
     places : (m,) array
         Places in the block, rising.
     states : tuple or None
-        The lowest states in them at the strongest field, as of `solve_fields`, where they were solved.
+        The lowest states in this basis at the strongest field, as from `solve_fields`; None if they were not solved.
     """
     size = max(FIRST_BASIS, 2 * count)
     rising = np.sort(order)

@@ -1,8 +1,8 @@
-"""States of a top with their M, in the blocks that fields connect, and the matrices of operators over them.
+"""States of a top with M, in the blocks that fields connect, and the matrices of operators over them.
 
-Blocks are those that the operators leave apart, found and not assumed: (M, k) for a molecule with one axis, with J even and J odd apart
-where nothing connects them (M = 0 or k = 0, no dipole); sets of solved blocks for all others, and at M = 0 the halves that its
-reflection separates. In fields along Z M is good; `rotor.quantum.fields.tilted_blocks` has the others.
+Blocks follow from the elements of the operators. For a molecule with one axis they are (M, k), with even and odd J separate where nothing
+connects them (M = 0 or k = 0, no dipole). For all others they are sets of solved blocks, divided at M = 0 by the reflection. In fields
+along Z, M is a good quantum number; for other directions see `rotor.quantum.fields.tilted_blocks`.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from rotor.quantum.fields.operators import FieldOperator
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 
-BEFORE_J = ("species", "vt", "v")  # quantum numbers that labels have first
+BEFORE_J = ("species", "vt", "v")  # quantum numbers at the head of a label
 
 
 @dataclass(frozen=True)
 class FreeLevels:
-    """Levels of the free top, each with 2J+1 values of M; a symmetric top has K and -K apart.
+    """Levels of the free top, each with 2J+1 values of M; K and -K of a symmetric top are separate levels.
 
     j (N with spins), energy_mhz: (n,). quanta: further quantum numbers by name (n,), those in `halves` doubled. weight: spin weight of one
     state (n,). family: levels of different families are never connected.
@@ -40,7 +40,7 @@ class FreeLevels:
 
     @classmethod
     def of(cls, levels: Levels) -> FreeLevels:
-        """Solved levels."""
+        """The free levels of a table of solved levels."""
         rotation = "n" if "n" in levels.quanta else "j"
         quanta = {name: column for name, column in levels.quanta.items() if name != rotation}
         return cls(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component, levels.halves)
@@ -58,8 +58,8 @@ class FreeLevels:
 class FieldBlock(ABC):
     """States |level, M⟩ that the operators of a `FieldSpace` connect among themselves.
 
-    m: M of all states. copies: how many such blocks there are with the same matrices (M and -M). rows: (n,) of the levels,
-    rising in J. A matrix is real where the block has real phases, else complex and Hermitian.
+    m: M of all states. copies: number of blocks with the same matrices (M and -M). rows: (n,) of the levels, rising in J. A matrix is
+    real where the block has real phases, else complex and Hermitian.
     """
 
     m: float
@@ -70,11 +70,11 @@ class FieldBlock(ABC):
     @property
     @abstractmethod
     def label(self) -> str:
-        """Which block of its M it is."""
+        """Name of the block among those of its M."""
 
     @property
     def levels(self) -> FreeLevels:
-        """The levels whose rows the states are of."""
+        """The free levels to which the rows refer."""
         return self.space.levels
 
     @property
@@ -89,12 +89,15 @@ class FieldBlock(ABC):
 
     @property
     def even_in_field(self) -> bool:
-        """Whether a reversed electric field leaves all energies: half a turn about an axis across it and time reversal keep K and M."""
+        """Whether a reversed electric field leaves all energies unchanged.
+
+        A half turn about an axis across the field, combined with time reversal, conserves K and M.
+        """
         return True
 
     @cached_property
     def free_order(self) -> Ints:
-        """Places of the states in order of their free energies, J deciding between equal ones (n,)."""
+        """Places of the states in order of free energy, then J (n,)."""
         return np.lexsort((self.j, np.round(self.energies_mhz, 9)))
 
     @property
@@ -107,16 +110,16 @@ class FieldBlock(ABC):
 
     @abstractmethod
     def matrix(self, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states (n, n), Hermitian; large ones of mixed M are sparse."""
+        """The operator over the states (n, n), Hermitian; large matrices of mixed M are sparse."""
 
     def dense(self, operator: FieldOperator) -> NDArray[Any]:
-        """The same, never sparse."""
+        """The operator over the states as a dense matrix (n, n)."""
         matrix: Any = self.matrix(operator)
         return np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
 
 
 class FieldSpace(ABC):
-    """The levels of a top up to J max, and the blocks into which operators along Z divide them with their M."""
+    """The levels of a top up to J max, and the blocks with M into which operators along Z divide them."""
 
     levels: FreeLevels
     jmax: int
@@ -124,4 +127,4 @@ class FieldSpace(ABC):
 
     @abstractmethod
     def blocks(self, m: float) -> list[FieldBlock]:
-        """The blocks of M = ±m, m ≥ 0; `copies` says how many like it there are. In a magnetic field those of M = m."""
+        """The blocks of M = ±m, m ≥ 0, where `copies` counts equal blocks; in a magnetic field the blocks of M = m."""

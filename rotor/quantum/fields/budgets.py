@@ -1,8 +1,8 @@
 """Error budgets of maps of levels in a field (`rotor.requests.budget`).
 
-H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F, F the strength of the field (theorem of Hellmann and
-Feynman): a relative error of the dipole moves an energy by so much of the field times its slope. A static field also polarizes the
-molecule, which maps leave out: by definition of the polarizability -½ α F², with α/4πε0 a volume.
+H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F at a field of strength F (theorem of Hellmann and Feynman).
+A relative error of the dipole therefore shifts an energy by this error times F ∂E/∂F. Maps neglect the polarization of the molecule by a
+static field, -½ α F² by definition of the polarizability, with α/4πε0 a volume.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e10 / units.PLANCK_J_S * 1e-6
 ESTIMATED_DIPOLE_D = (
     0.2 / 0.6745
-)  # half of the estimates are off by more than 0.2 D: a normal distribution with this standard deviation
+)  # standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
 
 
 def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
@@ -51,7 +51,7 @@ def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
 
 
 def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorTerm:
-    """One standard deviation of the free levels up to a J by the uncertainty of the constants."""
+    """One standard deviation of the free levels up to J = `j` from the uncertainties of the constants."""
     levels = solve_levels(top, j, effects=effects) if effects else solve_levels(top, j)
     parameters = parameter_names(top, levels)
     covariance = known_covariance(top, parameters)
@@ -62,7 +62,7 @@ def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorT
 
 
 def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:
-    """One standard deviation of the energies by the error of an estimated dipole; others have no stated uncertainty."""
+    """One standard deviation of the energies from the error of an estimated dipole; other dipoles have no stated uncertainty."""
     dipole = float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
     moved = np.abs(states.field * states.slope) * units.MHZ_PER_DEBYE_KV_PER_CM
     if not moved.any():
@@ -74,21 +74,23 @@ def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:
 
 
 def joined_data(*terms: ErrorTerm) -> ErrorTerm:
-    """Independent standard deviations together, largest first; not estimated where one of them is not.
+    """Quadratic sum of independent standard deviations; not estimated if one of them is not.
 
     >>> joined_data(ErrorTerm(3.0, "dipole"), ErrorTerm(4.0, "constants")).text("MHz")
     '5 MHz (constants; dipole)'
     >>> joined_data(ErrorTerm(None, "the dipole has no stated uncertainty"), ErrorTerm(4.0, "constants")).source
     'the dipole has no stated uncertainty; constants 4 MHz'
     """
-    known = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
-    unknown = [term.source for term in terms if term.value is None]
-    if unknown:
-        return ErrorTerm(None, "; ".join([*unknown, *(f"{term.source} {term.value:.2g} MHz" for term in known)]))
-    if not known:
+    estimated = sorted((term for term in terms if term.value), key=lambda term: -(term.value or 0.0))
+    not_estimated = [term.source for term in terms if term.value is None]
+    if not_estimated:
+        return ErrorTerm(
+            None, "; ".join([*not_estimated, *(f"{term.source} {term.value:.2g} MHz" for term in estimated)])
+        )
+    if not estimated:
         return ErrorTerm(0.0, "; ".join(term.source for term in terms) or NO_UNCERTAINTIES)
-    value = math.hypot(*(term.value or 0.0 for term in known))
-    return ErrorTerm(value, "; ".join(term.source for term in known), known[0].remedy)
+    value = math.hypot(*(term.value or 0.0 for term in estimated))
+    return ErrorTerm(value, "; ".join(term.source for term in estimated), estimated[0].remedy)
 
 
 def map_budget(states: FieldMap, limits: Sequence[Limit], data: ErrorTerm) -> ErrorBudget:
@@ -97,16 +99,16 @@ def map_budget(states: FieldMap, limits: Sequence[Limit], data: ErrorTerm) -> Er
     Parameters
     ----------
     states : FieldMap
-        With the bounds of each energy.
+        The map, with bounds of each energy.
     limits : sequence of Limit
-        What the calculation leaves out, at the highest J that is followed and in the strongest field.
+        Neglected effects, at the highest J of the map and in the strongest field.
     data : ErrorTerm
-        By constants and moments.
+        Errors from constants and moments.
 
     Returns
     -------
     ErrorBudget
-        In MHz, the largest over all states and fields.
+        Errors in MHz, the largest over all states and fields.
     """
     return ErrorBudget(
         of="energies",

@@ -1,17 +1,17 @@
 """The lowest states of real tridiagonal matrices at many fields at once: a linear or symmetric top in a static field.
 
-Energies at some fields, by LAPACK, are joined by curves of fifth order through energies, slopes and curvatures,
+Energies at some fields, from LAPACK, are interpolated by quintics through energies, slopes and curvatures,
 
     E' = ⟨i|H'|i⟩,   E'' = ⟨i|H''|i⟩ + 2 Σ_j |⟨j|H'|i⟩|²/(E_i - E_j).
 
-At every other field they are improved with the eigenvectors of a twisted factorisation, T - λ = N D N^T with N lower triangular
-above row k and upper triangular below it,
+At all other fields they are improved with eigenvectors from a twisted factorisation, T - λ = N D N^T with N lower triangular above row k
+and upper triangular below it,
 
     z_k = 1,   z_i = -b_i z_(i+1)/d⁺_i (i < k),   z_i = -b_(i-1) z_(i-1)/d⁻_i (i > k),   λ ← λ + γ_k/|z|²,
 
-k where γ_k = d⁺_k + d⁻_k - (a_k - λ) is smallest: the iteration of the Rayleigh quotient, which converges with the third power (it is
-derived by multiplying out). The number of negative d⁺ is that of the energies below λ (Sylvester), so
-that a state of another rank is noticed; then LAPACK does it all.
+k where γ_k = d⁺_k + d⁻_k - (a_k - λ) is smallest. This is Rayleigh quotient iteration, which converges cubically (derived by multiplying
+out). The number of negative d⁺ equals the number of energies below λ (Sylvester), which reveals convergence to a wrong state; LAPACK
+then solves all fields.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 
-Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and how many of its lowest states
+Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and the number of its lowest states to solve
 
-ANCHORS = 13  # fields that LAPACK solves, of many
-DENSER = 1.5  # power by which they are denser where the field is weak and energies bend most
-SWEEPS = 4  # of the Rayleigh quotient at most
-CONVERGED = 1e-8  # of the smallest gap: the last change of an energy, and by how much vectors are wrong; of the energy the square is left
+ANCHORS = 13  # fields solved by LAPACK
+DENSER = 1.5  # power of their spacing: they are denser at weak fields, where energies bend most
+SWEEPS = 4  # most Rayleigh quotient iterations
+CONVERGED = 1e-8  # last change of an energy relative to the smallest gap; vectors have an error of this size, energies of its square
 OFF_ZERO = (
-    1e-15  # of the largest element: by which energies are moved before a sweep, so that no pivot is 0 at zero field
+    1e-15  # shift of energies before a sweep, relative to the largest element, so that no pivot is 0 at zero field
 )
-TOGETHER = 1 << 19  # numbers of a sweep held at once where several chains are solved together
+TOGETHER = 1 << 19  # most numbers in memory where several chains are solved together
 
 
 def is_chain(terms: tuple[NDArray[np.generic], ...]) -> bool:
-    """Whether matrices are real and have no elements beyond the diagonals beside the main one."""
+    """Whether matrices are real and tridiagonal."""
     if len(terms[0]) < 3 or any(np.iscomplexobj(term) for term in terms):
         return False
     return not any(np.triu(term, 2).any() for term in terms)
 
 
 def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, Floats]] | None:
-    """Energies (fields, count) and vectors (fields, n, count) of the lowest states of each chain; None where that went astray.
+    """Energies (fields, count) and vectors (fields, n, count) of the lowest states of each chain; None if the iteration fails.
 
-    Chains of several sizes are filled up to one size with states far above, which nothing connects to the others.
+    Chains of several sizes are padded to one size with unconnected states of high energy.
     """
     size = max(len(terms[0]) for terms, _ in chains)
     if len(chains) > 1 and size * len(fields) * sum(count for _, count in chains) > TOGETHER:
@@ -64,9 +64,9 @@ def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, 
 
 
 def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Floats, scale: float) -> Floats | None:
-    """Eigenvectors (n, fields, states), the energies (fields, states) improved in place; None where that went astray.
+    """Eigenvectors (n, fields, states) by Rayleigh quotient iteration, which improves `energies` (fields, states) in place.
 
-    Where an energy has stood still it is left out of the next sweep.
+    Converged energies are left out of the next sweep. None if an energy does not converge to the state of its rank.
     """
     shape, flat = energies.shape, energies.reshape(-1)
     bands = main.reshape(len(main), -1), beside.reshape(len(beside), -1)
@@ -75,8 +75,8 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
     for sweep in range(SWEEPS):
         moved = flat[moving] - OFF_ZERO * scale
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            of_moving = tuple(band[:, moving] for band in bands) if sweep else bands
-            turned, change, below = twisted(of_moving[0], of_moving[1], moved)
+            moving_bands = tuple(band[:, moving] for band in bands) if sweep else bands
+            turned, change, below = twisted(moving_bands[0], moving_bands[1], moved)
         flat[moving] = moved + change
         if sweep:
             vectors[:, moving] = turned
@@ -92,7 +92,7 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
 
 
 def _apart(chains: Sequence[Chain], energies: Floats, vectors: Floats) -> list[tuple[Floats, Floats]]:
-    """What belongs to each chain, the states that filled it up left out."""
+    """Energies and vectors of each chain, without the padding states."""
     ends = np.cumsum([count for _, count in chains])
     places = [slice(end - count, end) for end, (_, count) in zip(ends.tolist(), chains, strict=True)]
     return [
@@ -115,7 +115,7 @@ def _padded(chains: Sequence[tuple[Floats, ...]], size: int, strongest: float) -
 
 
 def _between_anchors(padded: Floats, fields: Floats, of: Ints, rank: Ints) -> tuple[Floats, Floats]:
-    """Energies (fields, states) from curves through those at a few fields, and the least gap there (states,)."""
+    """Energies (fields, states) interpolated between anchor fields, and the smallest gap at these (states,)."""
     places = np.unique(((len(fields) - 1) * np.linspace(0, 1, ANCHORS) ** DENSER).astype(int))
     at, count = fields[places], int(rank.max()) + 1
     powers = at[:, None] ** np.arange(padded.shape[1])
@@ -145,7 +145,7 @@ def _derivatives(padded: Floats, at: Floats, values: Floats, vectors: Floats, co
 
 
 def _joined(at: Floats, values: Floats, slopes: Floats, bends: Floats, fields: Floats) -> Floats:
-    """Curves of fifth order through values, slopes and curvatures (points, states) at `at`, (fields, states)."""
+    """Quintic interpolation of values, slopes and curvatures (points, states) at `at`: (fields, states)."""
     place = np.clip(np.searchsorted(at, fields, "right") - 1, 0, len(at) - 2)
     width = (at[place + 1] - at[place])[:, None]
     t = (fields - at[place])[:, None] / width
@@ -160,9 +160,9 @@ def _joined(at: Floats, values: Floats, slopes: Floats, bends: Floats, fields: F
 
 
 def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Floats, Ints]:
-    """Normalised vectors (n, s), corrections of energies (s,), and how many energies lie below each (s,).
+    """Normalised vectors (n, s), corrections of energies (s,), and number of energies below each (s,).
 
-    main: (n, s). beside: (n - 1, s). energies: (s,), approximate; at the energy of a free state itself a pivot is 0.
+    main: (n, s). beside: (n - 1, s). energies: (s,), approximate; a pivot is 0 at the exact energy of a free state.
     """
     size, step = len(main), np.empty_like(energies)
     shifted = main - energies
@@ -178,7 +178,7 @@ def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Flo
     place, states = np.abs(gamma, out=shifted).argmin(axis=0), np.arange(len(energies))
     change = gamma[place, states]
 
-    vectors, lower = up, shifted  # the same memory: to clear more of it would take as long as a sweep
+    vectors, lower = up, shifted  # memory is reused, since clearing new arrays would take as long as a sweep
     vectors.fill(0.0)
     lower.fill(0.0)
     vectors[place, states] = lower[place, states] = 1.0

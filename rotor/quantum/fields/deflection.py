@@ -1,7 +1,7 @@
-"""Effective dipoles as a table that programs for deflection and deceleration read: one column for each state, even fields.
+"""Table of effective dipoles for programs of deflection and deceleration: one column for each state, evenly spaced fields.
 
-The force on a molecule in a static field is μ_eff(E) grad E, with μ_eff = -dE/dE of its state; a trajectory needs nothing else of the
-molecule. A state keeps its label while the field changes slowly (adiabatic following); its population is that of the free level.
+The force on a molecule in a static field is μ_eff(E) grad E, with μ_eff = -dE/dE of its state; trajectories need nothing else. A state
+keeps its label while the field changes slowly (adiabatic following); its population is that of the free level.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
 from rotor.units import MHZ_PER_K
 
-EVEN_WITHIN = 1e-9  # of the step
+EVEN_WITHIN = 1e-9  # largest deviation of a step, relative to the step
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeflectionTable(Table):
-    """Effective dipoles in D against even fields, one column for each state, such as `mu_eff_debye 1 0 1 M1`.
+    """Effective dipoles in D against evenly spaced fields, one column for each state, such as `mu_eff_debye 1 0 1 M1`.
 
-    fields_kv_per_cm: (n,). states: names. mu_eff_debye: (states, n). copies, weight, free_mhz: of each state (states,), the energies
-    those of the free levels.
+    fields_kv_per_cm: (n,). states: names. mu_eff_debye: (states, n). copies, weight: of each state (states,). free_mhz: energy of its free
+    level (states,).
     """
 
     fields_kv_per_cm: Floats
@@ -37,13 +37,13 @@ class DeflectionTable(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """field_kv_per_cm, then the states."""
+        """field_kv_per_cm, then one column for each state."""
         each = {f"mu_eff_debye {name}": row for name, row in zip(self.states, self.mu_eff_debye, strict=True)}
         return {"field_kv_per_cm": self.fields_kv_per_cm, **each}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Names, numbers of coinciding states, spin weights and energies of the free levels, in the order of the columns."""
+        """States, numbers of coinciding states, spin weights and energies of the free levels, in the order of the columns."""
         return {
             "states": list(self.states),
             "copies": self.copies.tolist(),
@@ -52,7 +52,7 @@ class DeflectionTable(Table):
         }
 
     def populations(self, temperature_k: float) -> Floats:
-        """Share of each state (with its copies) among those of the table at a temperature without field, (states,)."""
+        """Population of each state (with its copies) relative to all states of the table, without field, (states,)."""
         if not temperature_k > 0:
             raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
         above = (self.free_mhz - self.free_mhz.min()) / (temperature_k * MHZ_PER_K)
@@ -61,9 +61,9 @@ class DeflectionTable(Table):
 
 
 def deflection_table(states: FieldMap) -> DeflectionTable:
-    """The effective dipoles of a map of a static field along Z as one column for each state.
+    """The effective dipoles of a map of a static field along Z, one column for each state.
 
-    Raises ValueError for a map of other fields, fields that are not even, and fewer than two of them.
+    Raises ValueError for a map of another field, and for fewer than two or unevenly spaced fields.
 
     >>> from rotor.quantum.effects.stark import stark_map
     >>> from rotor.tops.top import Top
@@ -87,7 +87,7 @@ def deflection_table(states: FieldMap) -> DeflectionTable:
 
 
 def _unique(names: list[str]) -> tuple[str, ...]:
-    """Names with a number behind those that occur more than once (+K M and -K M)."""
+    """Names, with a number after those that occur more than once (+K M and -K M)."""
     seen: dict[str, int] = {}
     out = []
     for name in names:

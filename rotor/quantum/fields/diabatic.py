@@ -1,10 +1,10 @@
-"""Diabatic labels of levels in a field: neighbours that nearly cross exchange their names where the gap is below a threshold.
+"""Diabatic labels of levels in a field: two levels exchange labels at an avoided crossing whose gap is below a threshold.
 
-Where two neighbouring levels of one block come closest, their gap has a minimum, and the slopes dE/dx, which the theorem of Hellmann
-and Feynman gives without differences, exchange. A minimum inside an interval of fields shows in the slopes at its ends: the gap
-falls at the first and rises at the second. Intervals are halved until the cubic through energies and slopes at their ends predicts
-their middle, so that no crossing, however narrow, is stepped over; what is found then does not depend on the grid asked for. A
-minimum is located by minimising the gap; below the threshold the two labels are exchanged for all fields beyond, one for one.
+Where two neighbouring levels of one block come closest, their gap has a minimum and their slopes dE/dx (theorem of Hellmann and Feynman)
+exchange. An interval of fields contains a minimum if the gap falls at its first end and rises at its second. Intervals are halved until the
+cubic through energies and slopes at the ends predicts the middle. No crossing is missed, however narrow, and the result does not depend on
+the grid of fields. Each minimum is located by minimising the gap. If it is below the threshold, the labels are exchanged at all fields
+beyond.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from rotor.arrays import Floats, Ints
 
 Solve = Callable[[Floats], tuple[Floats, Floats]]  # fields (f,) -> energies and slopes dE/dx (f, states)
 
-PREDICTED = 0.1  # of the threshold: how well the cubic must predict the middle of an interval
-DEEPEST = 24  # halvings of an interval
+PREDICTED = 0.1  # largest error of the cubic in the middle of an interval, relative to the threshold
+DEEPEST = 24  # most halvings of an interval
 
 
 def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> Ints:
-    """The adiabatic rank at the first field whose name each state has at each field.
+    """For each state at each field, the adiabatic rank at the first field of the state whose label it has.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> 
     fields : (f,) array
         Rising fields, in any unit.
     count : int
-        How many states, the lowest ones, are named.
+        Number of lowest states to label.
     gap_mhz : float
-        Crossings with a smallest gap below it are passed diabatically, in MHz.
+        Avoided crossings with a smaller gap (MHz) are passed diabatically.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> 
     Raises
     ------
     ValueError
-        For a gap not above 0.
+        If the gap is not above 0.
     """
     if not gap_mhz > 0:
         raise ValueError(f"diabatic gap {gap_mhz} MHz: a number above 0 is expected")
@@ -61,7 +61,7 @@ def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> 
 
 
 def crossings(solve: Solve, fields: Floats, gap_mhz: float) -> list[tuple[float, int]]:
-    """(field, rank of the lower state) of every near crossing with a gap below `gap_mhz`."""
+    """(field, rank of the lower state) of each avoided crossing with a gap below `gap_mhz`."""
     x, energies, slopes = _resolved(solve, fields, gap_mhz)
     gaps, changes = np.diff(energies, axis=1), np.diff(slopes, axis=1)
     out = []
@@ -73,7 +73,7 @@ def crossings(solve: Solve, fields: Floats, gap_mhz: float) -> list[tuple[float,
 
 
 def _resolved(solve: Solve, fields: Floats, gap_mhz: float) -> tuple[Floats, Floats, Floats]:
-    """Fields with energies and slopes, close enough for a cubic to predict each middle where levels are near each other."""
+    """Fields with energies and slopes, refined until a cubic predicts the middle of each interval where levels come close."""
     x, (energies, slopes) = fields, solve(fields)
     fresh = np.ones(len(x) - 1, dtype=bool)
     for _ in range(DEEPEST):
@@ -83,19 +83,19 @@ def _resolved(solve: Solve, fields: Floats, gap_mhz: float) -> tuple[Floats, Flo
         middle = (x[where] + x[where + 1]) / 2
         step = (x[where + 1] - x[where])[:, None]
         predicted = (energies[where] + energies[where + 1]) / 2 + step * (slopes[where] - slopes[where + 1]) / 8
-        solved, found_slopes = solve(middle)
+        solved, solved_slopes = solve(middle)
         wrong = (np.abs(predicted - solved) > PREDICTED * gap_mhz).any(axis=1)
         order = np.argsort(np.concatenate([x, middle]), kind="stable")
         is_new = np.zeros(len(x) - 1, dtype=bool)
         is_new[where[wrong]] = True
         fresh = np.repeat(is_new, np.where(np.isin(np.arange(len(x) - 1), where), 2, 1))
         x = np.concatenate([x, middle])[order]
-        energies, slopes = np.concatenate([energies, solved])[order], np.concatenate([slopes, found_slopes])[order]
+        energies, slopes = np.concatenate([energies, solved])[order], np.concatenate([slopes, solved_slopes])[order]
     return x, energies, slopes
 
 
 def _may_cross(x: Floats, energies: Floats, slopes: Floats, gap_mhz: float) -> Floats:
-    """Intervals in which some neighbours can come within the threshold: the gap less what the steeper of the slopes takes away."""
+    """Whether levels can come within the threshold in each interval, estimated from gaps and largest slopes at its ends."""
     step = np.diff(x)[:, None]
     gaps, changes = np.diff(energies, axis=1), np.abs(np.diff(slopes, axis=1))
     spread = np.abs(np.diff(slopes, axis=0))
@@ -104,7 +104,7 @@ def _may_cross(x: Floats, energies: Floats, slopes: Floats, gap_mhz: float) -> F
 
 
 def _closest(solve: Solve, first: float, last: float, lower: int) -> tuple[float, float]:
-    """Where between two fields the gap above state `lower` is smallest, and the gap."""
+    """The field between two others at which the gap above state `lower` is smallest, and the gap."""
     from scipy.optimize import minimize_scalar
 
     def gap(x: float) -> float:

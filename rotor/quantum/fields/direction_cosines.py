@@ -3,8 +3,8 @@
     ⟨J-1 k M|cosθ|J k M⟩ = √[(J²-k²)(J²-M²)] / (J √(4J²-1)),     ⟨J k M|cosθ|J k M⟩ = kM / (J(J+1))
 
 (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, table 4.4; Condon-Shortley phases in space, ⟨J k±1|Jx ∓ iJy|J k⟩
-positive in the molecule). k = 0 are the functions of a linear molecule. cos²θ is the square of the matrix of cosθ, one J longer
-than what is asked for, and so exact in the J that are.
+positive in the molecule). k = 0 gives the functions of a linear molecule. cos²θ is the square of a matrix of cosθ with one more J, which
+makes it exact for the requested J.
 """
 
 from __future__ import annotations
@@ -34,5 +34,5 @@ def cosine_squared_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats, Float
     """
     longer = np.append(j, j[-1] + 1)
     d, b = cosine_bands(longer, k, m)
-    below = np.concatenate([[0.0], b[:-1]])  # J - 1 to J; none below the first, where it is 0 by itself
+    below = np.concatenate([[0.0], b[:-1]])  # J - 1 to J; zero for the first J
     return d[:-1] ** 2 + below**2 + b**2, (b * (d[:-1] + d[1:]))[:-1], (b[:-1] * b[1:])[:-1]

@@ -1,13 +1,13 @@
 """Energies of a top against a field: maps of levels with M, their labels, dipoles and cosines.
 
-H(x) = H0 + F + x V over every exact block of states, x the field that is varied, F what else acts (the light of a laser beside a
-static field). Each block is solved for all fields, its lowest states only, in the smallest basis of free states whose bound of what
-it leaves out (`rotor.quantum.fields.truncation`) is within the tolerance: J max is chosen first, then the states up to it.
-The bound and the population of the highest J stand beside each state at each field.
+H(x) = H0 + F + x V over each exact block of states; x is the varied field, F a constant one (such as laser light). Only the lowest states
+of each block are solved, at all fields, in the smallest basis of free states whose truncation error is within the tolerance
+(`rotor.quantum.fields.truncation`): J max is chosen first, then the states up to it. The map lists the bound and the population of the
+highest J for each state and field.
 
-Labels. Inside an exact symmetry block levels do not cross, so the state of rank r at any field is named after the free level of
-rank r in that block: adiabatic labels, which no grid of fields can change. Labels by overlap do depend on the grid. Diabatic ones
-swap where two neighbours come closer than a stated gap (`rotor.quantum.fields.diabatic`).
+Labels: inside an exact symmetry block levels do not cross, so the state of rank r at any field is labelled by the free level of rank r in
+that block. These adiabatic labels do not depend on the grid of fields, unlike labels by overlap. Diabatic labels are exchanged where two
+neighbours come closer than a stated gap (`rotor.quantum.fields.diabatic`).
 """
 
 from __future__ import annotations
@@ -51,20 +51,19 @@ Of = TypeVar("Of")
 EDGE = 2  # the highest values of J whose population is leakage
 HIGHEST_J = 300
 STEP_J = 6
-ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of the norm of a matrix
+ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to the norm of the matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldMap(Table):
-    """States in a field as columns of equal length: all fields of one state after each other.
+    """States in a field as columns (n,): all fields of one state, then those of the next.
 
-    field: (n,) in the unit that `field_name` names. m, rank: M, and the order in energy inside its exact block. block: which block.
-    energy_mhz: E/h. label: the free level of that rank. slope: -dE/dfield, in `slope_name`. cosines: expectation values by name.
-    edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
-    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. truncation_mhz: bound of what the basis
-    leaves out of each energy; NaN for states listed for their diabatic label alone. round_off_mhz: of each energy, a few units in
-    the last place of the largest one of its matrix. block_number: place of the block in `blocks_of_map`. request:
-    what the map was made from.
+    field: in the unit that `field_name` names. m: M. rank: order in energy inside the exact block. block: label of the block.
+    energy_mhz: E/h. label: the free level of this rank. slope: -dE/dfield in the unit of `slope_name`. cosines: expectation values by name.
+    edge_population: of the two highest J. copies: number of coinciding states (M and -M). diabatic_label: or None. free_row, free_mhz,
+    weight: row, energy and spin weight (of one state) of the free level. jmax: of the basis. truncation_mhz: bound of the truncation error
+    of each energy; NaN for states listed only for their diabatic label. round_off_mhz: round-off of each energy. block_number: place of the
+    block in `blocks_of_map`. request: the request of the map.
     """
 
     field_name: str
@@ -112,13 +111,13 @@ class FieldMap(Table):
 
     @property
     def accuracy_mhz(self) -> float:
-        """Bound of the numerical error of every energy: what the basis leaves out, and round-off."""
+        """Bound of the numerical error of all energies: truncation of the basis and round-off."""
         here = np.isfinite(self.truncation_mhz)
         return float((self.truncation_mhz + self.round_off_mhz)[here].max(initial=0.0))
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """J max and what was found about accuracy."""
+        """J max and the accuracy of the energies."""
         return {
             "jmax": self.jmax,
             "accuracy_mhz": self.accuracy_mhz,
@@ -128,7 +127,7 @@ class FieldMap(Table):
 
     @property
     def fields(self) -> Floats:
-        """The fields, each once."""
+        """The distinct fields, rising."""
         return np.unique(self.field)
 
     def curves(self) -> list[slice]:
@@ -137,20 +136,20 @@ class FieldMap(Table):
         return [slice(first, first + count) for first in range(0, len(self), count)]
 
     def curve(self, label: str, m: int) -> slice:
-        """Rows of the state with a label and |M|; ValueError where there is none."""
+        """Rows of the state with this label and M; ValueError if there is none."""
         for rows in self.curves():
             if self.label[rows.start] == label and self.m[rows.start] == m:
                 return rows
-        known = sorted({(str(self.label[rows.start]), int(self.m[rows.start])) for rows in self.curves()})
+        present = sorted({(str(self.label[rows.start]), int(self.m[rows.start])) for rows in self.curves()})
         raise ValueError(
-            f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in known)}"
+            f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in present)}"
         )
 
 
 class _Solved(NamedTuple):
-    """A block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,).
+    """States of a block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, free rows (states,).
 
-    error: bound of what the basis leaves out (fields, states), round_off: of an energy, MHz.
+    error: bound of the truncation error (fields, states), MHz. round_off: of an energy, MHz.
     """
 
     energies: Floats
@@ -164,13 +163,12 @@ class _Solved(NamedTuple):
 
 
 def field_map(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> FieldMap:
-    """The map that a request asks for.
+    """The map of a request.
 
-    jmax: of the basis; by default the lowest whose bound of each energy is within the tolerance, and with which no state has more of
-    its population in the two highest J than the request allows.
-    executor: blocks are spread over it.
+    jmax: highest J of the basis. By default the lowest J for which the bounds of all energies are within the tolerance and no state has
+    more population in the two highest J than the request allows. executor: solves blocks in parallel.
 
-    Raises ValueError where a given J max is too small for either, and where J of 300 would not be enough.
+    Raises ValueError if `jmax` is too small, or if J of 300 is not enough.
     """
     chosen = smallest_jmax(request, executor) if jmax is None else _checked_jmax(request, jmax)
     while True:
@@ -186,6 +184,7 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
 
 
 def _checked_jmax(request: MapRequest, jmax: int) -> int:
+    """J max, or ValueError if it is too low for the states of the map."""
     if jmax < request.j_highest + EDGE:
         raise ValueError(
             f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
@@ -194,7 +193,7 @@ def _checked_jmax(request: MapRequest, jmax: int) -> int:
 
 
 def _too_small(request: MapRequest, jmax: int, error: float, leaked: float) -> str:
-    """Why a J max that was given does not serve."""
+    """Message that explains why J max is too small."""
     reason = (
         f"the error of an energy may be {error:.3g} MHz, more than {request.tolerance_mhz:g}"
         if error > request.tolerance_mhz
@@ -204,29 +203,30 @@ def _too_small(request: MapRequest, jmax: int, error: float, leaked: float) -> s
 
 
 def _check_highest(jmax: int) -> None:
+    """Raise ValueError beyond J of 300."""
     if jmax > HIGHEST_J:
         raise ValueError(f"the field needs J beyond {HIGHEST_J}: it is too strong for this top")
 
 
 def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
-    """The lowest J max whose bound of each energy at the strongest field is within the tolerance.
+    """The lowest J max for which the bounds of all energies at the strongest field are within the tolerance.
 
     Parameters
     ----------
     request : MapRequest
-        What is solved.
+        Hamiltonian, fields and states of the map.
     executor : Executor, optional
-        Blocks are spread over it.
+        Solves blocks in parallel.
 
     Returns
     -------
     int
-        At most 300.
+        J max, at most 300.
 
     Raises
     ------
     ValueError
-        Where that is not enough.
+        If J max of 300 is not enough.
     """
     lowest = _lowest_jmax(request)
     highest = lowest + STEP_J
@@ -239,7 +239,10 @@ def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
 
 
 def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: Executor | None) -> int:
-    """The lowest J max between two that is enough for all blocks, each begun where the one before ended; `highest` + 1 where none is."""
+    """The lowest sufficient J max from `lowest` to `highest` for all blocks, `highest` + 1 if none is.
+
+    Without an executor each block begins at the J max of the block before.
+    """
     if executor is not None:
         enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
         return max(enough, default=lowest)
@@ -251,7 +254,7 @@ def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: 
 
 
 def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: FieldBlock) -> int:
-    """The lowest J max between two that is enough for a block, by bisection; `highest` + 1 where none is."""
+    """The lowest sufficient J max from `lowest` to `highest` for a block, by bisection; `highest` + 1 if none is."""
     problem = request.problem(block)
     strongest = request.fields[np.argmax(np.abs(request.fields))][None]
 
@@ -276,7 +279,7 @@ def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: Fi
 
 
 def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
-    """Blocks with states of a map, in its order, over J up to J max and the margin that bounds need."""
+    """Blocks with states of a map, in its order, with J up to J max plus the margin that bounds need."""
     space = request.space(jmax + request.margin)
     return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
 
@@ -284,13 +287,13 @@ def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
 def each_block(
     request: MapRequest, jmax: int, run: Callable[[FieldBlock], Of], executor: Executor | None = None
 ) -> list[Of]:
-    """What `run`, which is picklable, makes of each block that holds states of the map, in the order of `blocks_of_map`."""
+    """Results of `run` (picklable) for each block of the map, in the order of `blocks_of_map`."""
     blocks = blocks_of_map(request, jmax)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
 
 def _lowest_jmax(request: MapRequest) -> int:
-    """The J beyond which all free levels lie above those that are followed; they would shift the ranks."""
+    """The lowest J max whose basis contains all free levels below those of the map, which their ranks count."""
     jmax = request.j_highest + STEP_J
     while jmax <= HIGHEST_J:
         levels = request.space(jmax).levels
@@ -306,12 +309,13 @@ def _lowest_jmax(request: MapRequest) -> int:
 
 
 def _solve_block(request: MapRequest, jmax: int, block: FieldBlock) -> _Solved:
+    """The states of one block at all fields."""
     problem = request.problem(block)
     return _measured(request, jmax, problem, solve_block(request, block, problem, request.fields, jmax))
 
 
 def _solve_blocks(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[_Solved]:
-    """All blocks in this process, in one go where they are chains."""
+    """The states of all blocks in this process, together where they are chains."""
     parts = []
     for block in blocks:
         problem, order = request.problem(block), basis_order(block, jmax)
@@ -326,7 +330,7 @@ def _solve_blocks(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) 
 
 
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
-    """Whether all blocks are chains that one sweep holds together: milliseconds, which other processes would not shorten."""
+    """Whether all blocks are chains small enough for one sweep, which takes milliseconds and gains nothing from other processes."""
     states = sum(count_of(request, block, block.free_order) for block in blocks)
     chains = all(isinstance(block, AxialBlock) for block in blocks)
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
@@ -336,7 +340,10 @@ def _measured(request: MapRequest, jmax: int, problem: BlockProblem, states: Blo
     """Slopes, cosines and leakage of the states of a block."""
     block, fields, vectors = states.block, request.fields, states.vectors
     slopes = -derivatives(problem.terms(states.places), fields, vectors)
-    cosines = {name: expectation(over(made(), states.places), vectors) for name, made in problem.observables.items()}
+    cosines = {
+        name: expectation(over(observable(), states.places), vectors)
+        for name, observable in problem.observables.items()
+    }
     edge = (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1)
     return _Solved(
         states.energies, slopes, edge, cosines, states.rows, block, states.error, _round_off(problem, fields)
@@ -344,13 +351,14 @@ def _measured(request: MapRequest, jmax: int, problem: BlockProblem, states: Blo
 
 
 def _round_off(problem: BlockProblem, fields: Floats) -> float:
-    """Of eigenvalues at any field: LAPACK's are those of a matrix that is off by a few last places of |H|, and move by no more."""
+    """Round-off (MHz) of eigenvalues at any field: LAPACK's are exact for a matrix that differs by a few units in the last place of |H|."""
     strongest = float(np.abs(fields).max())
     norms = [strongest**n * np.abs(coefficient).sum(axis=1).max() for n, coefficient in enumerate(problem.coefficients)]
     return ROUND_OFF * float(sum(norms))
 
 
 def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> FieldMap:
+    """The map with J max of the basis, by block and rank."""
     blocks = blocks_of_map(request, jmax)
     if executor is None or _is_small(request, blocks):
         solved = _solve_blocks(request, jmax, blocks)
@@ -398,13 +406,13 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
 
 
 def _truncation(request: MapRequest, solved: _Solved, rank: int) -> Floats:
-    """Bound of what the basis leaves out (fields,); NaN for states listed for their diabatic label alone."""
+    """Bound of the truncation error (fields,); NaN for states listed only for their diabatic label."""
     is_followed = solved.block.levels.j[solved.rows[rank]] <= request.j_highest
     return solved.error[:, rank] if is_followed else np.full(len(solved.error), np.nan)
 
 
 def _diabatic_ranks(request: MapRequest, jmax: int, states_of_block: _Solved) -> Ints:
-    """Whose name each state of a block has at each field, (fields, states)."""
+    """The rank whose label each state of a block has at each field, (fields, states)."""
     from rotor.quantum.fields.diabatic import diabatic_ranks
 
     count, gap = states_of_block.energies.shape[1], request.diabatic_gap_mhz or 0.0
@@ -419,17 +427,18 @@ def _diabatic_ranks(request: MapRequest, jmax: int, states_of_block: _Solved) ->
 def _diabatic_labels(
     solved: Sequence[_Solved], named: Sequence[Ints | None], rows: list[tuple[_Solved, int]]
 ) -> NDArray[np.str_] | None:
+    """Diabatic labels of all rows of a map, or None."""
     if not rows or named[0] is None:
         return None
-    of_block = {}
+    labels_of_block = {}
     for each, names in zip(solved, named, strict=True):
         labels = np.array([each.block.levels.label(int(row)) for row in each.rows])
-        of_block[id(each)] = labels[names]
-    return np.concatenate([of_block[id(each)][:, rank] for each, rank in rows])
+        labels_of_block[id(each)] = labels[names]
+    return np.concatenate([labels_of_block[id(each)][:, rank] for each, rank in rows])
 
 
 def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Terms:
-    """The Hamiltonian of a block in a basis for its lowest states at all fields."""
+    """The Hamiltonian of a block in a small basis for its lowest states at all fields."""
     problem = request.problem(block)
     terms = problem.terms(
         enough_states(problem, basis_order(block, jmax), count, request.fields, request.tolerance_mhz)[0]
@@ -442,6 +451,6 @@ def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Ter
 
 
 def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floats, Floats]:
-    """Of the lowest states at fields (f,): energies and dE/dx (f, count)."""
+    """Energies and dE/dx (f, count) of the lowest states at fields (f,)."""
     energies, vectors = np.linalg.eigh(at_fields(terms, fields))
     return energies[:, :count], derivatives(terms, fields, vectors[:, :, :count])

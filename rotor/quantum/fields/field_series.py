@@ -1,4 +1,4 @@
-"""Energies as power series in a field about zero field: E(x) = E0 + c1 x + c2 x² + ..., levels that coincide included.
+"""Energies as power series in a field about zero field, E(x) = E0 + c1 x + c2 x² + ..., for degenerate levels too.
 
 H(x) = Σ x^n H_n. P projects on the states of one energy E0, Q on all others. The wave operator 1 + X, with X from P to Q, maps P to
 the space of the perturbed states, and (Bloch's equation; C. Brouder et al., arXiv:1011.1751, section 2)
@@ -6,9 +6,9 @@ the space of the perturbed states, and (Bloch's equation; C. Brouder et al., arX
     H_QP + H_QQ X - X H_PP - X H_PQ X = 0,      H_eff = H_PP + H_PQ X                                                  (1)
 
 are solved order by order: X_n (E0 - E_Q) = the terms of order n. With S = 1 + X†X, S^½ H_eff S^-½ = E0 + x A_1 + x² A_2 + ... is
-Hermitian and has the same eigenvalues. A single state has c_n = A_n. Of several, c1 are the eigenvalues of A_1, and those that
-coincide there are separated by A_2, A_3 in the same way: the eigenvalues of A_1 + x A_2 + ... are a problem of the same form
-(reduction process; T. Kato, Perturbation Theory for Linear Operators, section II.2.3).
+Hermitian and has the same eigenvalues. For a single state c_n = A_n. For a degenerate level, c1 are the eigenvalues of A_1; equal ones are
+split by A_2, A_3, ... in the same way, since the eigenvalues of A_1 + x A_2 + ... are a problem of the same form (reduction process;
+T. Kato, Perturbation Theory for Linear Operators, section II.2.3).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.solver import Matrix, Terms
 
-EQUAL = 1e-11  # of the size of the operators of one order: eigenvalues nearer than this coincide
-ROUND_OFF = 8 * float(np.finfo(np.float64).eps)  # of the largest free energy
+EQUAL = 1e-11  # eigenvalues closer than this, relative to the operators of one order, count as equal
+ROUND_OFF = 8 * float(np.finfo(np.float64).eps)  # of free energies, relative to the largest
 
 Series = list[Matrix]  # coefficients of x^0, x^1, ...
 
@@ -50,12 +50,12 @@ def field_series(terms: Terms, count: int, orders: int, even: bool = False) -> F
     orders : int
         Highest power.
     even : bool, optional
-        Whether reversing the field changes no energy: odd coefficients of a single state are 0 then.
+        Whether reversing the field changes no energy; odd coefficients of a single state are then 0.
 
     Returns
     -------
     FieldSeries
-        In MHz per power of the unit of the field.
+        Coefficients in MHz per power of the unit of the field.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def field_series(terms: Terms, count: int, orders: int, even: bool = False) -> F
 
 
 def _free_states(terms: Terms, count: int, orders: int) -> tuple[Floats, Terms]:
-    """Energies at zero field, rising, and H_1, H_2, ... over those states that the lowest `count` reach up to the highest order."""
+    """Energies at zero field, rising, and H_1, H_2, ... over the states that the lowest `count` reach up to the highest order."""
     fixed = terms[0]
     if not np.any(fixed - np.diag(np.diag(fixed))):
         energies = np.diag(fixed).real
@@ -96,7 +96,7 @@ def _free_states(terms: Terms, count: int, orders: int) -> tuple[Floats, Terms]:
 
 
 def _clusters(values: Floats, tolerance: float) -> list[Ints]:
-    """Places of rising values that coincide with their neighbours."""
+    """Groups of places of rising values whose neighbours coincide."""
     return np.split(np.arange(len(values)), np.flatnonzero(np.diff(values) > tolerance) + 1)
 
 
@@ -112,7 +112,7 @@ def _cluster_series(energies: Floats, terms: Terms, places: Ints, orders: int, e
 
 
 def _split(operators: Series, sizes: Sequence[float]) -> Floats:
-    """Eigenvalues of A_1 + x A_2 + ... as series (states, orders); sizes: of what each A_n was summed from."""
+    """Eigenvalues of A_1 + x A_2 + ... as series (states, orders); sizes: size of the terms in each A_n."""
     first, vectors = np.linalg.eigh(operators[0])
     rest = tuple(vectors.conj().T @ term @ vectors for term in operators[1:])
     parts = []
@@ -130,7 +130,7 @@ def _split(operators: Series, sizes: Sequence[float]) -> Floats:
 
 
 def _effective(energies: Floats, terms: Terms, places: Ints, orders: int) -> tuple[Series, list[float]]:
-    """A_1 ... over the states at `places`, Hermitian, and the size of the products of which each is the sum (equation 1)."""
+    """A_1 ... over the states at `places`, Hermitian, and the size of the terms of each (equation 1)."""
     outside = np.setdiff1d(np.arange(len(energies)), places)
     gaps = energies[places].mean() - energies[outside]
     empty = np.zeros_like(terms[0])
@@ -156,7 +156,7 @@ def _norm(matrix: Matrix) -> float:
 
 
 def _hermitian(effective: Series, waves: Series) -> Series:
-    """S^½ H_eff S^-½ with S = 1 + X†X, all as series; effective: from the first power on."""
+    """S^½ H_eff S^-½ with S = 1 + X†X, all as series; `effective` begins with the first power."""
     if len(effective[0]) == 1:
         return effective
     orders = len(effective)

@@ -1,4 +1,4 @@
-"""The knob of maps of levels in a field: the tolerance of the energies, from which J max of the basis follows."""
+"""The accuracy setting of maps of levels in a field: the tolerance of the energies, from which J max follows."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ def largest_difference(first: Any, other: Any) -> float:
 
 
 def _with_tolerance(request: Any, name: str, value: Any) -> Any:
-    """Energies alone decide: the population at the edge of the basis, which cosines need, is reported and not limited."""
+    """The request with a tolerance of energies; the population at the edge of the basis, which affects only cosines, is not limited."""
     free = {"most_at_edge": 1.0} if hasattr(request, "most_at_edge") else {}
     return replace(request, **{name: value}, **free)
 
 
 def _energies_alone(request: Any) -> Any:
-    """The request whose basis is to be seen failing."""
+    """The request without criteria other than energies, so that a small basis is not refused."""
     changes = {"diabatic_gap_mhz": None, "most_at_edge": 1.0}
     return replace(request, **{name: value for name, value in changes.items() if hasattr(request, name)})
 
 
 def _finest(request: Any) -> float:
+    """Tolerance of the reference: a hundredth of the finest one that is compared."""
     return float(max(1e-2 * min(*TOLERANCES_MHZ, request.tolerance_mhz), LEAST_MHZ))
 
 

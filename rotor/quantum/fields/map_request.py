@@ -1,4 +1,4 @@
-"""What a map of levels in a field is of: the matrices of a block, the fields, the states, checked."""
+"""Request of a map of levels in a field: matrices of a block, fields and states."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
 from rotor.quantum.fields.solver import Matrix, Terms
 
-MOST_AT_EDGE = 1e-6  # of the population of a state, in the highest J of the basis: cosines are wrong by about as much
+MOST_AT_EDGE = (
+    1e-6  # largest population of a state in the two highest J of the basis; the error of cosines is about as large
+)
 
 
 class BlockProblem(NamedTuple):
-    """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
+    """Matrices (n, n) over a block of H(x) = fixed + x slope + x² curvature.
 
-    fixed: MHz. slope: MHz per unit of field. observables: by name, made when called.
+    fixed: MHz. slope: MHz per unit of field. observables: functions that compute matrices, by name. curvature: None without a
+    quadratic term.
     """
 
     fixed: Matrix
@@ -33,27 +36,27 @@ class BlockProblem(NamedTuple):
         return (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
 
     def terms(self, states: Ints) -> Terms:
-        """The coefficients of H(x) over some of the states, which rise."""
+        """The coefficients of H(x) over a rising selection of states."""
         return tuple(over(coefficient, states) for coefficient in self.coefficients)
 
     def over(self, states: Ints) -> BlockProblem:
-        """The problem over some of the states, which rise; without observables."""
+        """The problem over a rising selection of states, without observables."""
         curvature = None if self.curvature is None else over(self.curvature, states)
         return BlockProblem(over(self.fixed, states), over(self.slope, states), {}, curvature)
 
 
 def over(matrix: Matrix, states: Ints) -> Matrix:
-    """A matrix over some of the states, which rise; the matrix itself where these are all of them."""
+    """A matrix over a rising selection of states; not copied if the selection is complete."""
     return matrix if len(states) == len(matrix) else np.asarray(matrix[np.ix_(states, states)])
 
 
 @dataclass(frozen=True)
 class MapRequest:
-    """What a map is of.
+    """Hamiltonian, fields, states and accuracy of a map.
 
-    space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
-    followed. m_values: |M|, with signs in a magnetic field. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
-    most_at_edge: the population that a state may have in the two highest J. reach: the largest change of J that a field makes.
+    space: makes the states up to a J max. problem: makes the matrices of a block. fields: rising. j_highest: highest J of the free levels
+    in the map. m_values: |M|, with signs in a magnetic field. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
+    most_at_edge: largest population of a state in the two highest J. reach: the largest change of J by the field.
     """
 
     space: Callable[[int], FieldSpace]
@@ -71,31 +74,31 @@ class MapRequest:
 
     @property
     def margin(self) -> int:
-        """How many J beyond the basis the matrices need for a bound of what the basis leaves out."""
+        """Number of J beyond the basis that a bound of the truncation error needs."""
         return 2 * self.reach
 
 
 class KnownSpaces:
-    """Makes the space of a J max; the last two stay known, since a map is solved at the J max that was tried last but one."""
+    """Makes the space of a J max and caches the last two: the search ends one J max beyond the one that is used."""
 
     def __init__(self, make: Callable[[int], FieldSpace]) -> None:
         self._make = make
-        self._known: dict[int, FieldSpace] = {}
+        self._cache: dict[int, FieldSpace] = {}
 
     def __call__(self, jmax: int) -> FieldSpace:
-        if jmax not in self._known:
-            self._known = {**dict(list(self._known.items())[-1:]), jmax: self._make(jmax)}
-        return self._known[jmax]
+        if jmax not in self._cache:
+            self._cache = {**dict(list(self._cache.items())[-1:]), jmax: self._make(jmax)}
+        return self._cache[jmax]
 
     def __reduce__(self) -> tuple[type[KnownSpaces], tuple[Callable[[int], FieldSpace]]]:
         return KnownSpaces, (self._make,)
 
 
-FIELDS = {"kV/cm": "fields_kv_per_cm", "T": "fields_tesla"}  # of requests, by their unit
+FIELDS = {"kV/cm": "fields_kv_per_cm", "T": "fields_tesla"}  # name of the field in requests, by unit
 
 
 def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
-    """Fields (n,) that rise, finite and within ±`highest`; ValueError where they are not."""
+    """Fields (n,) in rising order; ValueError unless they are finite and within ±`highest`."""
     values = np.unique(np.atleast_1d(np.asarray(fields, dtype=np.float64)))
     if not len(values) or not np.isfinite(values).all():
         raise ValueError(f"fields must be finite numbers of {unit}; got {np.asarray(fields).tolist()!r}")
@@ -108,7 +111,7 @@ def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
 
 
 def checked_tolerance_mhz(tolerance_mhz: float) -> float:
-    """A tolerance of energies above zero, or ValueError."""
+    """The tolerance of energies; ValueError unless it is finite and above zero."""
     if not (math.isfinite(tolerance_mhz) and tolerance_mhz > 0):
         raise ValueError(f"tolerance {tolerance_mhz} MHz: a finite number above 0 is expected")
     return float(tolerance_mhz)

@@ -1,4 +1,4 @@
-"""Accuracy and plans of levels in a field: J max of the basis, beside the knob of the tolerance."""
+"""Accuracy sweeps (J max of the basis) and plans of levels in a field."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from rotor.requests.knob import Measure, Setting, Sweep, Sweeps, ladder
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
 
-MORE_J = 6  # in the reference
-SHORT_FIELDS = (2, 20)  # of the calibration
+MORE_J = 6  # values of J that the reference has beyond the basis
+SHORT_FIELDS = (2, 20)  # numbers of fields from which the cost is extrapolated
 
 
 def sweeps_of_stark(request: Any) -> Sweeps:
-    """J max of the basis of levels in an electric field."""
-    # energies alone decide on a basis that is to be seen failing
+    """Sweep of J max of the basis of levels in an electric field."""
+    # without other criteria, so that a small basis is not refused
     plain = replace(request, diabatic_gap_mhz=None, most_at_edge=1.0)
     jmax = int(answer_stark(plain).states.jmax)
     basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda number: (plain, int(number)))
@@ -36,7 +36,7 @@ def sweeps_of_stark(request: Any) -> Sweeps:
 
 
 def sweeps_of_zeeman(request: Any) -> Sweeps:
-    """J max of the basis of levels in a magnetic field, where it is given."""
+    """Sweep of J max of the basis of levels in a magnetic field, if the request has one."""
     if request.jmax is None:
         return Sweeps(())
     beyond = replace(request, jmax=request.jmax + MORE_J)
@@ -45,23 +45,24 @@ def sweeps_of_zeeman(request: Any) -> Sweeps:
 
 
 def _energies(setting: tuple[Any, int]) -> Any:
-    """Energies of all states of a map with one J max of the basis, however small: a map itself refuses one that is too small."""
+    """Energies of all states of a map with a J max of the basis, even one that a map would refuse as too small."""
     request, jmax = setting
-    of_map = map_request(
+    request_of_map = map_request(
         request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
         request.direction, request.tolerance_mhz, None, request.effects,
     )  # fmt: skip
-    parts = each_block(of_map, jmax, partial(_of_block, of_map, jmax))
+    parts = each_block(request_of_map, jmax, partial(_energies_of_block, request_of_map, jmax))
     return np.concatenate([part.ravel() for part in parts])
 
 
-def _of_block(request: Any, jmax: int, block: Any) -> Any:
+def _energies_of_block(request: Any, jmax: int, block: Any) -> Any:
+    """Energies of the states of a block."""
     states = block_states(request, block, request.fields, jmax)
     return states.energies[:, block.levels.j[states.rows] <= request.j_highest]
 
 
 def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: dict[str, str]) -> Plan:
-    """The plan of levels in a field: J max and the error are those at the ends of the fields. name: of the request's fields."""
+    """The plan of levels in a field, with J max and error at the ends of the fields; name: attribute of the request that has the fields."""
     fields, top, j = getattr(request, name), request.top, max(request.j_highest, 1)
 
     def at(values: tuple[float, ...]) -> Any:
@@ -72,9 +73,11 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
     cost = Growth(lambda n: at(tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
     described = of_top(top, j, request.effects or SEMI_RIGID)
-    known = {one.name for one in described["left_out"]}
-    of_field = [
-        LeftOut(one["name"], one["size_mhz"], "MHz", one["text"]) for one in facts["limits"] if one["name"] not in known
+    known_names = {limit.name for limit in described["left_out"]}
+    field_limits = [
+        LeftOut(limit["name"], limit["size_mhz"], "MHz", limit["text"])
+        for limit in facts["limits"]
+        if limit["name"] not in known_names
     ]
     acts = words["acts"].format(max(map(abs, fields)))
     error = f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off"
@@ -91,12 +94,13 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
         seconds=cost.seconds,
         memory_mb=cost.memory_mb,
         left_out=largest_first(
-            [*of_field, *(part for part in described["left_out"] if part.name != words.get("within"))]
+            [*field_limits, *(part for part in described["left_out"] if part.name != words.get("within"))]
         ),
     )
 
 
 def _plan_of_stark(request: Any) -> Plan:
+    """The plan of levels in an electric field."""
     words = {
         "kind": "stark",
         "acts": "dipole in the field, up to {:g} kV/cm",
@@ -108,6 +112,7 @@ def _plan_of_stark(request: Any) -> Plan:
 
 
 def _plan_of_zeeman(request: Any) -> Plan:
+    """The plan of levels in a magnetic field."""
     words = {"kind": "zeeman", "acts": "magnetic moments in the field, up to {:g} T", "good": "M"}
     return plan_in_field(request, answer_zeeman, "fields_tesla", words)
 

@@ -1,10 +1,10 @@
-"""What a field does to a top: an operator fixed in the molecule, contracted with something fixed in space.
+"""Interaction of a top with a field: a molecule-fixed vector or tensor contracted with a space-fixed one.
 
     Σ_F E_F μ_F     (vector with vector),        Σ_FG S_FG α_FG     (symmetric tensor with symmetric tensor),
 
-and so are the cosines: cosθ of a body axis g and Z is the contraction of the unit vectors g and Z, cos²θ that of gg and ZZ.
-A `Contraction` holds both as Cartesian arrays; in spherical components it is tr·tr/3 and Σ_p S^K_p* T^K_p with the elements of
-`rotor.quantum.tensors`. A `Magnet` is what a magnetic field along Z acts on,
+Cosines have this form too: cosθ of a body axis g and Z is the contraction of the unit vectors g and Z, cos²θ that of gg and ZZ. A
+`Contraction` holds both as Cartesian arrays; in spherical components it is tr·tr/3 and Σ_p S^K_p* T^K_p with the elements of
+`rotor.quantum.tensors`. A `Magnet` is the magnetic moment on which a field along Z acts,
 
     ½ Σ g_ij {Φ_Zi, N_j} + Σ_spins g_I I_Z,        times -μ_N B.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.tensors import Tensors, body_tensor
 
-ROUND_OFF = 1e-9  # of the largest element: what a tensor may miss of being axial
+ROUND_OFF = 1e-9  # smaller deviations from axial symmetry, relative to the largest element, are ignored
 
 Key = tuple[Any, ...]
 
@@ -30,8 +30,8 @@ Key = tuple[Any, ...]
 class Contraction:
     """A body vector (3,) with a space vector (3,), or a symmetric body tensor (3, 3) with a symmetric space tensor (3, 3).
 
-    body: along a, b, c, of the state v = 0. space: along X, Y, Z. states: the body parts by pairs (v', v) where there are several states;
-    by default each state has the same and none acts between them.
+    body: along a, b, c, for the state v = 0. space: along X, Y, Z. states: body parts by pairs (v', v) of several states; by default all
+    states have the same and none acts between them.
 
     >>> Contraction([1.0, 0, 0], [0, 0, 1.0]).rank  # cosθ of the a axis
     1
@@ -56,16 +56,16 @@ class Contraction:
 
     @property
     def rank(self) -> int:
-        """1 of vectors, 2 of tensors (their traces are a number besides)."""
+        """1 for vectors, 2 for tensors (whose traces give a scalar besides)."""
         return int(self.body.ndim)
 
     @cached_property
     def key(self) -> Key:
-        """The part fixed in the molecule, by which its elements are known."""
+        """Identifies the molecule-fixed part, whose elements are cached."""
         return (self.body.tobytes(), *sorted(self.states.items()))
 
     def tensors(self, states: tuple[int, ...], representation: str) -> Tensors:
-        """T^K of each state, and between them."""
+        """T^K by pairs of states (v', v)."""
         bodies = dict(self.states) if self.states else {(v, v): self.body for v in states}
         return {pair: body_tensor(body, self.rank, representation) for pair, body in bodies.items() if np.any(body)}
 
@@ -80,7 +80,7 @@ class Contraction:
 
     @cached_property
     def size(self) -> float:
-        """The component q = 0 of the space part: of T^1_0 = Z, or T^2_0 = (2ZZ - XX - YY)/√6."""
+        """The component q = 0 of the space part: T^1_0 = Z, or T^2_0 = (2ZZ - XX - YY)/√6."""
         space = self.space
         return float(space[2]) if self.rank == 1 else float((2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6))
 
@@ -92,7 +92,7 @@ class Contraction:
 
 @dataclass(frozen=True)
 class Magnet:
-    """The rotational g tensor (3, 3) along a, b, c, alike in all states, and g of nuclei by the names of their spins."""
+    """The rotational g tensor (3, 3) along a, b, c, equal in all states, and g of nuclei by the names of their spins."""
 
     g: Floats
     nuclei: Mapping[str, float] = field(default_factory=dict)
@@ -104,7 +104,7 @@ class Magnet:
 
     @cached_property
     def key(self) -> Key:
-        """By which its elements are known."""
+        """Identifies the moment, whose elements are cached."""
         return ("magnet", self.g.tobytes(), *self.nuclei.items())
 
 
@@ -112,6 +112,7 @@ FieldOperator = Contraction | Magnet
 
 
 def _axial(array: Floats, axis: int) -> bool:
+    """Whether a vector or tensor is symmetric about an axis."""
     others = [i for i in range(3) if i != axis]
     if array.ndim == 1:
         rest = array[others]

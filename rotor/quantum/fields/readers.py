@@ -8,11 +8,11 @@ from typing import Any
 
 from rotor.units import parse_quantity
 
-MOST_J = 500  # of the basis: a minute's work for an asymmetric top
+MOST_J = 500  # highest J of a basis: about a minute for an asymmetric top
 
 
 def highest_j(raw: Any) -> int:
-    """The J of `J<=2`, or of the number alone.
+    """The J in `J<=2` or `2`.
 
     >>> highest_j("J <= 2"), highest_j("3"), highest_j(4)
     (2, 3, 4)
@@ -36,7 +36,7 @@ def read_m(raw: Any) -> tuple[float, ...]:
 
 
 def read_direction(raw: Any) -> tuple[float, float, float]:
-    """Three components; or, of an angle, the direction in the plane of X and Z at that angle with Z, exactly Z for 0."""
+    """Three components from a list, or the direction in the plane XZ at an angle (degrees) with Z; exactly Z for 0."""
     if isinstance(raw, str | int | float):
         try:
             angle = parse_quantity(raw, "deg")

@@ -1,8 +1,8 @@
-"""Reduced elements of operators between solved states of any kind, made when first used.
+"""Reduced elements of operators between solved states of any kind, computed at first use.
 
-Solved states are those of `solve_levels`: Wang blocks, connected states, F blocks with spins, internal rotation with or without spins.
-Elements of tensors fixed in the molecule are those of `rotor.quantum.reduced`. The magnetic moment is ½ Σ g_ij {Φ_i, N_j} of the rotation
-in every state, and g_I I of the spins.
+The states come from `solve_levels`: Wang blocks, interacting states, F blocks with spins, internal rotation with or without spins. Elements
+of molecule-fixed tensors come from `rotor.quantum.reduced`. The magnetic moment is ½ Σ g_ij {Φ_i, N_j} of the rotation in each state, plus
+g_I I of the spins.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 class ReducedElements:
     """Elements between the blocks of levels.
 
-    Those of odd rank that keep their sign under time reversal stand for i times themselves where functions are combined to real ones.
+    Where functions are combined to real ones, operators of odd rank that are even under time reversal are stored without their factor i.
     """
 
     def __init__(self, levels: Levels) -> None:
@@ -40,14 +40,14 @@ class ReducedElements:
         self.blocks: tuple[AnyBlock, ...] = levels.blocks
         quanta = levels.quanta
         self.states = tuple(np.unique(quanta["v"]).tolist()) if "v" in quanta else (0,)
-        self._known: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
+        self._cache: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
         self._pairs: dict[Key, list[Pair]] = {}
         self._tensors: dict[Key, Tensors] = {}
         self._moments: dict[Key, SpinMoments] = {}
 
     @property
     def representation(self) -> str:
-        """That of the functions."""
+        """Representation of the functions."""
         return str(self.levels.representation)
 
     @cached_property
@@ -57,7 +57,7 @@ class ReducedElements:
 
     @cached_property
     def paired(self) -> list[bool]:
-        """Whether the states of each block stand for their mirror images too: K and -K, σ and -σ."""
+        """Whether the states of each block represent their mirror images too: K and -K, σ and -σ."""
         return [block.paired for block in self.blocks]
 
     def connected(self, operator: FieldOperator) -> list[Pair]:
@@ -67,6 +67,7 @@ class ReducedElements:
         return self._pairs[operator.key]
 
     def _connected(self, operator: FieldOperator) -> Iterator[Pair]:
+        """Pairs of blocks between which the operator has elements."""
         if isinstance(operator, Contraction):
             tensors = self._tensors_of(operator)
             number = {block.start: i for i, block in enumerate(self.blocks)}
@@ -81,6 +82,7 @@ class ReducedElements:
                     yield up, low
 
     def _tensors_of(self, operator: Contraction) -> Tensors:
+        """Spherical tensors of a contraction, computed once."""
         if operator.key not in self._tensors:
             self._tensors[operator.key] = operator.tensors(self.states, self.representation)
         return self._tensors[operator.key]
@@ -88,11 +90,12 @@ class ReducedElements:
     def between(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
         """Elements (n_up, n_low) of a pair of blocks, F' ≥ F; None where all are 0."""
         key = operator.key, (up, low)
-        if key not in self._known:
-            self._known[key] = self._made(operator, up, low)
-        return self._known[key]
+        if key not in self._cache:
+            self._cache[key] = self._computed(operator, up, low)
+        return self._cache[key]
 
-    def _made(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
+    def _computed(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
+        """Elements of a pair of blocks, computed anew."""
         first, second = self.blocks[up], self.blocks[low]
         if isinstance(operator, Magnet):
             moment = self._moment(operator, first, second)
@@ -106,12 +109,13 @@ class ReducedElements:
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
 
     def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
+        """Elements of the magnetic moment; None where they are zero."""
         if isinstance(up, MomentBlock):
             raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
         if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
         if isinstance(up, SolvedBlock | CoupledBlock):
-            return _of_rotation(magnet.g, up, low, self.representation)
+            return _rotational_moment(magnet.g, up, low, self.representation)
         if magnet.key not in self._moments:
             self._moments[magnet.key] = _spin_moments(magnet, self.states, low.shared)
         moment: Floats = self._moments[magnet.key].amplitudes(up, low)
@@ -119,11 +123,12 @@ class ReducedElements:
 
 
 def _matrix(g: Floats) -> Any:
+    """A matrix as nested tuples."""
     return tuple(tuple(row) for row in g.tolist())
 
 
 def _spin_moments(magnet: Magnet, states: Sequence[int], shared: Shared) -> SpinMoments:
-    """½ Σ g_ij {Φ_i, N_j} and g_I I of every state."""
+    """½ Σ g_ij {Φ_i, N_j} and g_I I for each state."""
     from rotor.quantum.spins.moments import SpinMoments
 
     scheme, g = shared.scheme, _matrix(magnet.g)
@@ -133,7 +138,7 @@ def _spin_moments(magnet: Magnet, states: Sequence[int], shared: Shared) -> Spin
     return SpinMoments(tuple(moments), scheme, shared.representation)
 
 
-def _of_rotation(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
+def _rotational_moment(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
     """Elements of ½ Σ g_ij {Φ_i, N_j} between solved blocks of the rotation."""
     from rotor.quantum.spins.operators import CosinesWithN
 

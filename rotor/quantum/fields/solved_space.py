@@ -1,9 +1,9 @@
 """Solved states of any Hamiltonian in a field along Z: sets of solved blocks that operators connect, for one M.
 
-A sector is a solved block of one total angular momentum, or what of it belongs to one torsional state. The matrix between two sectors is
-their reduced elements (`rotor.quantum.fields.reduced_elements`) times the factor of M (`rotor.quantum.in_field`), made once for all M,
-fields and constants that only multiply it. No static field connects torsional species; elements between states of different v_t, whose
-overlaps are small, are left out: levels move by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
+A sector is a solved block of one total angular momentum, or its states of one torsional state. The matrix between two sectors is that of
+reduced elements (`rotor.quantum.fields.reduced_elements`) times a factor of M (`rotor.quantum.in_field`); reduced elements are computed
+once for all M and fields. No static field connects torsional species. Elements between states of different v_t, whose overlaps are small,
+are neglected: levels shift by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 class Sector(NamedTuple):
-    """States of a solved block: its number, the places of the states in it (None: all), their rows among the levels, and twice F."""
+    """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F."""
 
     block: int
     places: Ints | None
@@ -42,10 +42,10 @@ class Sector(NamedTuple):
 
 @dataclass(frozen=True)
 class SolvedFieldBlock(FieldBlock):
-    """States |F τ M⟩ of the sectors `members`, with the colour 0 or 1 of each: its states times 1 or i.
+    """States |F τ M⟩ of the sectors `members`, each multiplied by 1 or i according to its colour 0 or 1.
 
-    real: whether all matrices are real then. paired: whether each state stands for its mirror image too (K and -K, σ and -σ), so that
-    M and -M differ in an electric field.
+    real: whether this makes all matrices real. paired: whether each state represents its mirror image too (K and -K, σ and -σ), so that M
+    and -M differ in an electric field.
     """
 
     m: float
@@ -64,12 +64,12 @@ class SolvedFieldBlock(FieldBlock):
 
     @property
     def even_in_field(self) -> bool:
-        """A reversed field exchanges mirror images of one M."""
+        """Whether a reversed field leaves the energies unchanged; with M ≠ 0 it exchanges mirror images."""
         return not (self.paired and self.m)
 
     @property
     def label(self) -> str:
-        """Species of Wang functions, K where it is good, else the lowest level."""
+        """Species of Wang functions, K where it is a good quantum number, else the lowest level."""
         blocks = [self.space.elements.blocks[self.space.sectors[i].block] for i in self.members]
         if isinstance(blocks[0], SolvedBlock):
             return "+".join(sorted({block.basis.species for block in blocks}))
@@ -78,12 +78,12 @@ class SolvedFieldBlock(FieldBlock):
 
     @cached_property
     def starts(self) -> Ints:
-        """Where the states of each sector begin, and the number of states."""
+        """First place of the states of each sector, and the number of states."""
         return np.cumsum([0, *(len(self.space.sectors[i].rows) for i in self.members)])
 
     @cached_property
     def signs(self) -> Ints:
-        """(-1)^(F + c) of the states but for one sign (n,), by which v(-M) differs from v(M)* (see `rotor.quantum.in_field`)."""
+        """(-1)^(F + c) of the states (n,), up to a common sign: v(-M) is v(M)* times it (see `rotor.quantum.in_field`)."""
         sectors = [self.space.sectors[i] for i in self.members]
         odd = [(sector.twice_f - sectors[0].twice_f) // 2 + c for sector, c in zip(sectors, self.colours, strict=True)]
         return np.repeat(np.where(np.array(odd) % 2, -1, 1), np.diff(self.starts))
@@ -102,7 +102,7 @@ class SolvedFieldBlock(FieldBlock):
         return out
 
     def _elements(self, operator: FieldOperator) -> Iterator[tuple[int, int, NDArray[Any]]]:
-        """Places of two members, F' ≥ F, and the elements between their states in the phases of their colours."""
+        """Places of two members, F' ≥ F, and the elements between their states with the phases of their colours."""
         space, place = self.space, {sector: i for i, sector in enumerate(self.members)}
         for i, up in enumerate(self.members):
             for low, odd in space.below(operator).get(up, ()):
@@ -137,7 +137,7 @@ class SolvedFieldBlock(FieldBlock):
 
 
 def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
-    """i^turns times a matrix, real where that is real."""
+    """i^turns times a matrix; real if the factor is ±1."""
     if turns % 4 == 0:
         return matrix
     return -matrix if turns % 4 == 2 else np.asarray((1j if turns % 4 == 1 else -1j) * matrix)
@@ -145,7 +145,7 @@ def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class SolvedSpace(FieldSpace):
-    """Solved blocks up to J max and the operators that act on them; a magnet makes M and -M differ."""
+    """Solved blocks up to J max and the operators that act on them; with a magnet M and -M differ."""
 
     levels: FreeLevels = field(repr=False)
     jmax: int
@@ -155,7 +155,7 @@ class SolvedSpace(FieldSpace):
     _below: dict[Key, dict[int, list[tuple[int, int]]]] = field(default_factory=dict, repr=False)
 
     def blocks(self, m: float) -> list[FieldBlock]:
-        """Connected sets of sectors: of ±M in an electric field, of M and of -M where states are paired; of M in a magnetic one."""
+        """Connected sets of sectors: in an electric field for ±M (M and -M apart where states are paired), in a magnetic one for M."""
         twice_m = round(2 * m)
         nodes = [i for i, sector in enumerate(self.sectors) if sector.twice_f >= abs(twice_m)]
         edges = [
@@ -178,7 +178,7 @@ class SolvedSpace(FieldSpace):
         return out
 
     def below(self, operator: FieldOperator) -> dict[int, list[tuple[int, int]]]:
-        """By sector those of equal or lower F that an operator connects, with 1 where elements stand for i times themselves, else 0."""
+        """For each sector, those of equal or lower F that an operator connects, with 1 where elements lack a factor i, else 0."""
         if operator.key not in self._below:
             pairs: dict[int, list[tuple[int, int]]] = {}
             for up, low, odd in self._pairs(operator):
@@ -187,6 +187,7 @@ class SolvedSpace(FieldSpace):
         return self._below[operator.key]
 
     def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
+        """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0."""
         for up, low in self.elements.connected(operator):
             odd = int(operator.rank % 2 and not operator.time_odd and self.elements.combined[low])
             for a in self._sectors_of[up]:
@@ -195,6 +196,7 @@ class SolvedSpace(FieldSpace):
                         yield a, b, odd
 
     def _same_torsion(self, a: int, b: int) -> bool:
+        """Whether two sectors belong to the same v_t."""
         vt = self.levels.quanta.get("vt")
         if vt is None or self.sectors[a].places is None:
             return True
@@ -202,13 +204,14 @@ class SolvedSpace(FieldSpace):
 
     @cached_property
     def _sectors_of(self) -> dict[int, list[int]]:
+        """Sectors by the number of their solved block."""
         out: dict[int, list[int]] = {}
         for number, sector in enumerate(self.sectors):
             out.setdefault(sector.block, []).append(number)
         return out
 
     def factor(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int = 0) -> float:
-        """The factor of M between two sectors, for q = 0 times the size of the operator in space."""
+        """The factor of M between two sectors; for q = 0 it includes the size of the operator in space."""
         factor = space_factor(self.sectors[up].twice_f, self.sectors[low].twice_f, operator.rank, twice_m, q)
         return factor if q else operator.size * factor
 
@@ -224,10 +227,9 @@ class SolvedSpace(FieldSpace):
 def solved_space(
     top: Top, levels: Levels, jmax: int, operators: Sequence[FieldOperator], together: bool = False
 ) -> SolvedSpace:
-    """The space of solved levels for fields along Z; with `together` states of all v_t of a species in one block.
+    """The space of solved levels for fields along Z; `together` joins the states of all v_t of a species.
 
-    Raises ValueError for a symmetric top whose spins leave K good, with operators that do not have its axis, and for g of a spin that
-    there is not.
+    Raises ValueError for a symmetric top with spins and good K if an operator is not axial, and for g of an unknown spin.
     """
     elements = ReducedElements(levels)
     _refuse_across_axis(top, elements, operators)
@@ -246,7 +248,7 @@ def solved_space(
 
 
 def _sectors(levels: Levels, by_vt: bool) -> Iterator[Sector]:
-    """Solved blocks, those of a torsion by v_t."""
+    """Sectors of solved blocks, divided by v_t if there is a torsion."""
     vt = levels.quanta.get("vt") if by_vt else None
     for number, block in enumerate(levels.blocks):
         rows = np.arange(block.start, block.start + len(block.energies_mhz))
@@ -259,6 +261,7 @@ def _sectors(levels: Levels, by_vt: bool) -> Iterator[Sector]:
 
 
 def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
+    """Raise ValueError if K of a symmetric top is good and an operator is not axial."""
     axis = {"prolate": 0, "oblate": 2}.get(top.kind)
     if axis is None or not any(elements.paired):
         return
@@ -270,17 +273,18 @@ def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence
 
 
 def _refuse_unknown_nuclei(elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
+    """Raise ValueError for g of a spin that the effects do not have."""
     nuclei = {name for operator in operators if isinstance(operator, Magnet) for name in operator.nuclei}
     if not nuclei:
         return
     shared = getattr(elements.blocks[0], "shared", None)
-    known = [] if shared is None else [spin.name for spin in shared.scheme.spins]
-    if unknown := sorted(nuclei - set(known)):
-        raise ValueError(f"g of {', '.join(unknown)}: the spins of these effects are {', '.join(known) or 'none'}")
+    spin_names = [] if shared is None else [spin.name for spin in shared.scheme.spins]
+    if unknown := sorted(nuclei - set(spin_names)):
+        raise ValueError(f"g of {', '.join(unknown)}: the spins of these effects are {', '.join(spin_names) or 'none'}")
 
 
 def solved_levels(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> Levels:
-    """All levels up to J max (N with spins) with eigenvectors: those of `effects`, by default of the constants without spins."""
+    """All levels up to J max (N with spins) with eigenvectors; by default with all effects of the top except spins."""
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.wang.rotation import solve_rotation
 

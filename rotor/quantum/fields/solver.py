@@ -1,8 +1,7 @@
 """The lowest states of a Hamiltonian that is a polynomial in a field, H(x) = Σ x^n H_n, at many fields.
 
-Small matrices are solved for all fields at once. Large ones are solved in full at a few fields; the eigenvectors there, a few more than
-are asked for, span a small space that holds those at the fields between, and an error estimate says where another field has to be
-solved in full.
+Small matrices are solved for all fields at once. Large ones are solved in full at a few fields. Their eigenvectors, a few more than
+requested, span a small space for the fields between, and an error estimate shows where another field must be solved in full.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from rotor.quantum.fields.chains import chain_states, is_chain
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
 
-DENSE = 48  # matrices up to this size are solved whole, all fields at once
-MANY_FIELDS = 40  # from which on chains are solved from a few of them
-FIRST_ANCHORS = 5  # fields solved in full at first, of many
-SPANNED = 101  # fields at which a basis for many is tested while it is made
-BUFFER = 4  # further states in the basis of a map
-PART_OF_TOLERANCE = 0.1  # that the basis of a map may take
-DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
+DENSE = 48  # matrices up to this size are solved in full, all fields at once
+MANY_FIELDS = 40  # with at least so many fields, chains are interpolated between a few
+FIRST_ANCHORS = 5  # fields that are solved in full first
+SPANNED = 101  # fields at which a basis for diabatic labels is tested
+BUFFER = 4  # further states in a reduced basis
+PART_OF_TOLERANCE = 0.1  # share of the tolerance for the error of a reduced basis
+DEPENDENT = 1e-7  # directions of a basis with smaller singular values, relative to the largest, are left out
 
 
 def derivatives(terms: Terms, fields: Floats, vectors: Matrix) -> Floats:
@@ -44,9 +43,11 @@ def at_fields(terms: Terms, fields: Floats) -> Matrix:
 
 
 def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
-    """⟨v|O|v⟩ of vectors (fields, n, states), (fields, states)."""
+    """⟨v|O|v⟩ (fields, states) of vectors (fields, n, states)."""
     fields, size, states = vectors.shape
-    columns = vectors.transpose(1, 0, 2).reshape(size, fields * states)  # one product instead of one for every field
+    columns = vectors.transpose(1, 0, 2).reshape(
+        size, fields * states
+    )  # one matrix product instead of one for each field
     means = np.einsum("nk,nk->k", columns.conj(), matrix @ columns).real
     return np.asarray(means.reshape(fields, states))
 
@@ -54,8 +55,8 @@ def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
 def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float = 0.0) -> tuple[Floats, Matrix, Floats]:
     """The lowest `count` states of Σ x^n H_n at many fields x.
 
-    Small matrices are solved for all fields at once, large ones one by one or, at many fields, in a basis of their own
-    eigenvectors at a few fields (`reduced_basis`).
+    Small matrices are solved for all fields at once, large ones one by one or, at many fields, in a basis of eigenvectors at a few fields
+    (`reduced_basis`).
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
     count : int
         How many states.
     tolerance_mhz : float, optional
-        Largest error of an energy in the reduced basis; 0 solves every field in full.
+        Largest error of an energy in the reduced basis; 0 solves all fields in full.
 
     Returns
     -------
@@ -75,7 +76,7 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
     vectors : (f, n, count) array
         Eigenvectors in columns.
     error : (f, count) array
-        Of energies in a reduced basis, MHz; 0 for full solutions.
+        Error of energies in a reduced basis, MHz; 0 for full solutions.
     """
     if len(fields) >= MANY_FIELDS and is_chain(terms):
         states = chain_states([(terms, count)], fields)
@@ -93,7 +94,7 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
 def solve_together(
     blocks: Sequence[tuple[Terms, int]], fields: Floats, tolerance_mhz: float
 ) -> list[tuple[Floats, Matrix, Floats]]:
-    """`solve_fields` of several blocks, each with its number of states; those that are chains are solved in one go."""
+    """`solve_fields` for several blocks, each with its number of states; chains are solved together."""
     if len(fields) >= MANY_FIELDS and all(is_chain(terms) for terms, _ in blocks):
         states = chain_states(blocks, fields)
         if states is not None:
@@ -102,16 +103,18 @@ def solve_together(
 
 
 def _exact(energies: Floats, vectors: Matrix) -> tuple[Floats, Matrix, Floats]:
-    """A full solution with its error of 0."""
+    """A full solution with error 0."""
     return energies, vectors, np.zeros(energies.shape)
 
 
 def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
+    """Full solutions field by field."""
     solved = [_lowest(at_fields(terms, fields[place : place + 1])[0], count) for place in range(len(fields))]
     return _exact(np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved]))
 
 
 def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
+    """The lowest eigenvalues and eigenvectors of a matrix."""
     from scipy.linalg import eigh
 
     chosen = (0, min(count, len(matrix)) - 1)
@@ -122,7 +125,7 @@ def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
 def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix, Floats]:
     """The lowest states at many fields from full solutions at a few.
 
-    Where no small basis serves, or the error in it exceeds the tolerance, each field is solved in full.
+    If no small basis is found, or its error exceeds the tolerance, each field is solved in full.
 
     Parameters
     ----------
@@ -153,9 +156,9 @@ def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float
 def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
     """A basis for the lowest states at all fields, from eigenvectors at a few of them.
 
-    The eigenvectors at some fields, a few more than are asked for, span a space that holds those at the fields between. In it
-    the matrices are small. An energy is wrong by |residual|²/gap, the gap reaching to the highest of the further states; the field
-    where that is largest is solved in full and joins, until it is below a tenth of the tolerance everywhere.
+    The eigenvectors at some fields, a few more than requested, span a small space for the fields between. The error of an energy is
+    |residual|²/gap, where the gap reaches to the highest of the further states. The field with the largest error is solved in full and
+    added, until the error is below a tenth of the tolerance at all fields.
 
     Parameters
     ----------
@@ -171,7 +174,7 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
     Returns
     -------
     (n, r) array or None
-        Orthonormal columns; None where it would be as large as half of the matrix.
+        Orthonormal columns; None if there would be more than half the size of the matrix.
     """
     spanned = _spanned(terms, fields, count, tolerance_mhz)
     return None if spanned is None else spanned[0]
@@ -180,7 +183,7 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
 def _spanned(
     terms: Terms, fields: Floats, count: int, tolerance_mhz: float
 ) -> tuple[Matrix, tuple[Floats, Matrix, Floats]] | None:
-    """The basis, and the states in it at all fields; errors are looked at half-way between fields solved in full before all of them."""
+    """The basis, and the states in it at all fields; errors are tested between full solutions first, then at all fields."""
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
     full = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
     while True:
@@ -202,7 +205,7 @@ def _spanned(
 
 
 def _orthonormal(vectors: Matrix) -> Matrix:
-    """An orthonormal basis (n, r) of what vectors (n, many) span, dependent directions left out."""
+    """An orthonormal basis (n, r) of the space of vectors (n, many), without dependent directions."""
     left, sizes, _ = np.linalg.svd(vectors, full_matrices=False)
     return np.ascontiguousarray(left[:, sizes > DEPENDENT * sizes[0]])
 

@@ -1,4 +1,4 @@
-"""The states of a top that a field or a pulse connects: the cheapest basis for what acts on it."""
+"""The states of a top that a field or a pulse connects, in the cheapest basis for the operators."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ if TYPE_CHECKING:
 def field_space(
     top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
 ) -> FieldSpace:
-    """The states of a top up to `jmax` and the blocks that operators leave apart.
+    """The states of a top up to `jmax` and the blocks that operators do not connect.
 
     Parameters
     ----------
     top : Top
         Constants, kind and spin weights.
     jmax : int
-        The highest J, of N with spins.
+        Highest J (N with spins).
     operators : sequence of FieldOperator
-        Everything that will act.
+        All operators that will act.
     effects : sequence of QuantumEffect, optional
-        The Hamiltonian without the field; by default all that the top has but spins.
+        The Hamiltonian without the field; by default all effects of the top except spins.
 
     Returns
     -------
     FieldSpace
-        Closed forms of linear and symmetric tops, else solved states of the Hamiltonian.
+        Closed forms for linear and symmetric tops, else solved states of the Hamiltonian.
 
     Raises
     ------

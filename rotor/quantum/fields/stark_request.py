@@ -1,4 +1,4 @@
-"""A request for levels in a static electric field, and what answers it."""
+"""Request of levels in a static electric field, and its answer."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ if TYPE_CHECKING:
     from rotor.quantum.estimates.beyond import Limit
     from rotor.tops.top import Top
 
-POINTS = 201  # of a range of fields without a count
+POINTS = 201  # number of fields of a range without a count
 
 
 @dataclass(frozen=True)
 class StarkRequest:
-    """A map of levels in a field to compute; every field is checked when the request is made.
+    """A map of levels in an electric field; all values are checked when the request is made.
 
-    top: with its dipole. fields_kv_per_cm: of any order. j_highest: free levels up to this J are followed. m_values: |M|; None: all.
-    intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: of the basis; None: what tolerance_mhz needs.
-    diabatic_gap_mhz: None: no diabatic labels. hyperfine: with the spins of the top's constants; m_values are |M_F| then.
-    most_at_edge: population that a state may have in the two highest J of the basis; cosines are wrong by about as much.
+    top: with its dipole. fields_kv_per_cm: in any order. j_highest: highest J of the free levels in the map. m_values: |M|; None for all.
+    intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: highest J of the basis; None for what tolerance_mhz needs.
+    diabatic_gap_mhz: None for no diabatic labels. hyperfine: include the spins of the top's constants; m_values are then |M_F|.
+    most_at_edge: largest population of a state in the two highest J of the basis; the error of cosines is about as large.
     """
 
     top: Top
@@ -109,7 +109,7 @@ class StarkRequest:
 
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
-        """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
+        """Effects with spins if these are requested; empty for the default Hamiltonian."""
         return effects_of(self.top, True) if self.hyperfine else ()
 
     @property
@@ -120,7 +120,7 @@ class StarkRequest:
 
 @dataclass(frozen=True, repr=False)
 class StarkAnswer(TextOf):
-    """The map that a request asked for."""
+    """The map of a request."""
 
     shown = "states"
 
@@ -129,14 +129,14 @@ class StarkAnswer(TextOf):
 
     @cached_property
     def further_limits(self) -> list[Limit]:
-        """What of the field the map leaves out."""
+        """Neglected effects of the field."""
         from rotor.quantum.fields.budgets import static_polarization
 
         return static_polarization(self.request.top, float(np.abs(self.states.fields).max()))
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the energies can be trusted."""
+        """Error budget of the energies."""
         from rotor.quantum.fields.budgets import constants_term, dipole_term, joined_data, map_budget
 
         request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
@@ -172,7 +172,7 @@ class StarkAnswer(TextOf):
 
 
 def answer_stark(request: StarkRequest, executor: Executor | None = None) -> StarkAnswer:
-    """The map of a request. executor: blocks of states are spread over it.
+    """The map of a request. executor: solves blocks of states in parallel.
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))

@@ -1,14 +1,13 @@
-"""Blocks of a top in fields of any direction: M is mixed, and takes part like K.
+"""Blocks of a top in fields of any direction, which mix M as asymmetry mixes K.
 
-A contraction of a body tensor T with a space tensor S is Σ_pq S^K_p* T^K_q D^K*_pq, in which M and space stand like k and body:
+In the contraction Σ_pq S^K_p* T^K_q D^K*_pq of a body tensor T with a space tensor S, M and space play the part of k and body:
 
     ⟨J'k'M'|...|J k M⟩ = ⟨J'k'‖T^K‖J k⟩ ⟨J'M'‖S^K*‖J M⟩ / √((2J'+1)(2J+1)).
 
-The first factor is that of `rotor.quantum.fields.reduced_elements`, of one or more states, the second comes from
-`rotor.quantum.tensors` over Wang functions of M, so that the matrix of two
-J is a Kronecker product, real in the phases of that module: for an odd rank both factors are i times real, and their product -1
-times real. Light whose polarization has principal axes along X, Y, Z leaves the D2 species of M apart, as a diagonal polarizability
-those of k: together up to 16 blocks.
+The first factor comes from `rotor.quantum.fields.reduced_elements`, for one or more states; the second from `rotor.quantum.tensors` over
+Wang functions of M. The matrix between two J is a Kronecker product, real in the phases of that module: for an odd rank both factors are i
+times real, and their product is -1 times real. Light polarized along principal axes X, Y, Z does not connect the D2 species of M, nor does
+a diagonal polarizability those of k: together up to 16 blocks.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 NO_M = -1  # in place of M where it is mixed
-SPARSE_ABOVE = 600  # states
+SPARSE_ABOVE = 600  # matrices over more states are sparse
 _SPACE_AXES = "IIIr"  # x, y, z of a representation are a, b, c: those of space are X, Y, Z
 
 
@@ -57,7 +56,7 @@ class TiltedBlock(FieldBlock):
 
     @property
     def label(self) -> str:
-        """Which block it is."""
+        """Name of the block."""
         return self.species
 
     def matrix(self, operator: FieldOperator) -> Any:
@@ -65,7 +64,7 @@ class TiltedBlock(FieldBlock):
         from scipy.sparse import csr_array
 
         if isinstance(operator, Magnet):
-            raise ValueError("a magnetic field is solved along Z alone")
+            raise ValueError("a magnetic field is solved along Z only")
 
         edges = np.cumsum([0, *(self.space.size(pair) for pair in self.members)])
         place = {pair: i for i, pair in enumerate(self.members)}
@@ -94,7 +93,7 @@ class TiltedBlock(FieldBlock):
 
 @dataclass(frozen=True, eq=False)
 class TiltedSpace(FieldSpace):
-    """Solved blocks up to J max, Wang blocks of M of each J, and everything that will act."""
+    """Solved blocks up to J max, Wang blocks of M for each J, and the contractions that act."""
 
     m_is_good: ClassVar[bool] = False
 
@@ -104,10 +103,10 @@ class TiltedSpace(FieldSpace):
     contractions: tuple[Contraction, ...]
 
     def blocks(self, m: float) -> list[FieldBlock]:
-        """All blocks, for m = 0; none for others, since each block holds every M."""
+        """All blocks, for m = 0; none for other m, since each block contains all M."""
         if m:
             return []
-        nodes = [(i, k) for i, j in enumerate(self._j) for k in range(len(self._of_m[j]))]
+        nodes = [(i, k) for i, j in enumerate(self._j) for k in range(len(self._wang[j]))]
         number = {pair: n for n, pair in enumerate(nodes)}
         edges = [
             (number[up], number[low]) for contraction in self.contractions for up, low in self._connected(contraction)
@@ -116,19 +115,20 @@ class TiltedSpace(FieldSpace):
         return [self._block(n, [nodes[i] for i in members]) for n, members in enumerate(parts)]
 
     def _block(self, number: int, members: list[tuple[int, int]]) -> TiltedBlock:
+        """The block of these pairs (solved block, Wang block of M)."""
         rows, abs_m = [], []
         for i, k in members:
-            block, of_m = self.elements.blocks[i], self._of_m[self._j[i]][k]
+            block, wang = self.elements.blocks[i], self._wang[self._j[i]][k]
             size = len(block.energies_mhz)
-            rows.append(np.tile(np.arange(block.start, block.start + size), of_m.size))
-            abs_m.append(np.repeat(of_m.k, size))
+            rows.append(np.tile(np.arange(block.start, block.start + size), wang.size))
+            abs_m.append(np.repeat(wang.k, size))
         return TiltedBlock(
             NO_M, f"block {number}", 1, tuple(members), np.concatenate(rows), np.concatenate(abs_m), self
         )
 
     def size(self, pair: tuple[int, int]) -> int:
         """States of a pair of blocks."""
-        return len(self.elements.blocks[pair[0]].energies_mhz) * self._of_m[self._j[pair[0]]][pair[1]].size
+        return len(self.elements.blocks[pair[0]].energies_mhz) * self._wang[self._j[pair[0]]][pair[1]].size
 
     @cached_property
     def _j(self) -> list[int]:
@@ -136,14 +136,15 @@ class TiltedSpace(FieldSpace):
         return [block.twice_total // 2 for block in self.elements.blocks]
 
     @cached_property
-    def _of_m(self) -> dict[int, list[WangBlock]]:
+    def _wang(self) -> dict[int, list[WangBlock]]:
+        """Wang blocks of M by J."""
         return {j: wang_blocks(j, _SPACE_AXES) for j in range(self.jmax + 1)}
 
     def _connected(self, contraction: Contraction) -> list[tuple[tuple[int, int], tuple[int, int]]]:
         """Pairs (up, low) of nodes that a contraction connects, J' ≥ J; each pair once where both nodes share the solved block."""
         space, out = self._tensor(contraction), []
         for up, low in self.elements.connected(contraction):
-            ups, lows = self._of_m[self._j[up]], self._of_m[self._j[low]]
+            ups, lows = self._wang[self._j[up]], self._wang[self._j[low]]
             out += [
                 ((up, a), (low, b))
                 for a in range(len(ups))
@@ -153,7 +154,7 @@ class TiltedSpace(FieldSpace):
         return out
 
     def _tensor(self, contraction: Contraction) -> BodyTensor:
-        """The complex conjugate of the space tensor, which is that of its mirror image y → -y."""
+        """The complex conjugate of the space tensor, equal to the tensor of its mirror image y → -y."""
         mirror = np.array([1.0, -1.0, 1.0])
         space = contraction.space * mirror if contraction.rank == 1 else contraction.space * np.outer(mirror, mirror)
         return body_tensor(space, contraction.rank, _SPACE_AXES)
@@ -161,7 +162,7 @@ class TiltedSpace(FieldSpace):
     def between(
         self, contraction: Contraction, members: dict[tuple[int, int], int]
     ) -> list[tuple[tuple[int, int], tuple[int, int], Floats]]:
-        """(up, low, real elements) of every connected pair among `members`, M running slower than the solved states."""
+        """(up, low, real elements) of each connected pair among `members`; M varies more slowly than the solved states."""
         space = self._tensor(contraction)
         sign = -1.0 if contraction.rank == 1 else 1.0
         out = []
@@ -172,9 +173,9 @@ class TiltedSpace(FieldSpace):
             if reduced is None:
                 continue
             j_up, j_low = self._j[up[0]], self._j[low[0]]
-            of_m = block_elements(self._of_m[j_up][up[1]], self._of_m[j_low][low[1]], space)
+            space_elements = block_elements(self._wang[j_up][up[1]], self._wang[j_low][low[1]], space)
             root = np.sqrt((2.0 * j_up + 1) * (2 * j_low + 1))
-            out.append((up, low, np.kron(of_m * (sign / root), reduced)))
+            out.append((up, low, np.kron(space_elements * (sign / root), reduced)))
         return out
 
 
@@ -207,10 +208,7 @@ def elements_of_mixed(up: TiltedBlock, low: TiltedBlock, dipole: Contraction) ->
 def tilted_space(
     top: Top, jmax: int, contractions: Sequence[Contraction], effects: Sequence[QuantumEffect] = ()
 ) -> TiltedSpace:
-    """The space of a top for fields of any direction.
-
-    Raises ValueError for a spherical top, and for spins and internal rotation.
-    """
+    """The space of a top for fields of any direction; ValueError for a spherical top, spins or internal rotation."""
     if top.kind == "spherical":
         raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
     if any(effect.spins(top) for effect in effects):

@@ -2,10 +2,10 @@
 
     ⟨F'τ'M'|μ_q|F τ M⟩ = (-1)^(F'-M') (F' 1 F; -M' q M) ⟨F'τ'‖μ‖F τ⟩,      q = M' - M.
 
-μ_0 = μ_Z, and where M' = M + 1 the squares of μ_X and of μ_Y are each half of that of μ_1. A field along Z has the same energies for M and
--M, and by its reflections the same squares for (M, M') and (-M, -M'), so that only M, M' ≥ 0 are looked at, and of half-integers -½ and ½;
-states that are paired with their mirror images have both signs of M in the map. States of mixed M have the elements of μ_X, μ_Y and μ_Z
-between any two blocks (`tilted_blocks`).
+μ_0 = μ_Z; for M' = M + 1 the squares of μ_X and of μ_Y are each half of that of μ_1. A field along Z has the same energies for M and -M,
+and by reflection the same squares for (M, M') and (-M, -M'). Only M, M' ≥ 0 are therefore computed, and -½ to ½ for half-integers; states
+that are paired with their mirror images have both signs of M in the map. States of mixed M have elements of μ_X, μ_Y and μ_Z between any
+two blocks (`tilted_blocks`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rotor.quantum.symmetric_top_elements import coupling
 
 
 class BlockPair(NamedTuple):
-    """Places of two blocks between which μ_q acts, q = 0 or 1, and how many pairs with the same elements there are."""
+    """Places of two blocks between which μ_q acts, q = 0 or 1; copies: number of pairs with the same elements."""
 
     up: int
     low: int
@@ -38,7 +38,7 @@ class BlockPair(NamedTuple):
 
 
 def states_of_both_signs(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> list[BlockStates]:
-    """The states of a block, and of M = ½ those of M = -½ that it stands for, which μ_1 connects with them."""
+    """The states of a block; for M = ½ also those of M = -½, which the block represents and μ_1 connects with it."""
     here = block_states(request, block, fields, jmax)
     if not isinstance(block, SolvedFieldBlock) or block.paired or block.twice_m != 1:
         return [here]
@@ -67,11 +67,12 @@ def pairs_of_blocks(blocks: Sequence[FieldBlock]) -> Iterator[BlockPair]:
 
 
 def _is_paired(block: FieldBlock) -> bool:
+    """Whether the states of a block represent their mirror images too."""
     return isinstance(block, SolvedFieldBlock) and block.paired
 
 
 def _same_k(up: FieldBlock, low: FieldBlock) -> bool:
-    """Whether K is the same; at M = 0 the block of K stands for that of -K too."""
+    """Whether K is the same; at M = 0 the block of K represents that of -K too."""
     if isinstance(up, AxialBlock) and isinstance(low, AxialBlock):
         return abs(up.k) == abs(low.k) if low.m == 0 else up.k == low.k
     return _is_paired(up) == _is_paired(low)
@@ -80,13 +81,14 @@ def _same_k(up: FieldBlock, low: FieldBlock) -> bool:
 def dipole_elements(up: FieldBlock, low: FieldBlock, dipole: Contraction) -> NDArray[Any]:
     """⟨up|μ_q|low⟩ over the free states of two blocks (n_up, n_low), in D; q = M' - M."""
     if isinstance(up, AxialBlock) and isinstance(low, AxialBlock):
-        return _of_axial(up, low if low.k == up.k else replace(low, k=up.k), float(dipole.body[up.axis]))
+        return _axial_elements(up, low if low.k == up.k else replace(low, k=up.k), float(dipole.body[up.axis]))
     assert isinstance(up, SolvedFieldBlock)
     assert isinstance(low, SolvedFieldBlock)
     return up.between(dipole, low)
 
 
-def _of_axial(up: AxialBlock, low: AxialBlock, dipole: float) -> Floats:
+def _axial_elements(up: AxialBlock, low: AxialBlock, dipole: float) -> Floats:
+    """Elements of μ_q between functions |J k M⟩."""
     out = np.zeros((len(up), len(low)))
     place = {int(j): row for row, j in enumerate(up.j)}
     for column, j in enumerate(low.j.tolist()):

@@ -1,16 +1,16 @@
-"""Bounds of the energy that a basis in a field leaves out.
+"""Bounds of the truncation error of energies in a field.
 
-The functions of an exact block are divided into those of the basis (1) and the rest (2), H = [[H11, R†], [R, H22]]. An eigenvalue E of H
-lies below that of H11 by the lowering that the residual r = R v makes,
+The functions of an exact block are divided into those of the basis (1) and the rest (2), H = [[H11, R†], [R, H22]]. The residual r = R v
+lowers an eigenvalue E of H below that of H11 by
 
     δE = r† (H22 - E)⁻¹ r ≤ Σ_k |r_k|²/d_k,     d_k = H_kk - Σ_l≠k |H_kl| - E,     k, l of the rest,
 
-since H22 - diag(H_kk - Σ_l |H_kl|) is diagonally dominant with a diagonal above zero, hence not negative (Gershgorin). Where
-d_k is small, |r|²/(d/2 + √(d²/4 + |r|²)) replaces |r|²/d; it is never more than |r| (C.-K. Li and R.-C. Li, A note on eigenvalues of
-perturbed Hermitian matrices, doi 10.1016/j.laa.2004.08.026, abstract). The lowering is a positive operator, so that it
-mixes two states i, j of the basis by at most √(δ_i δ_j), which adds min(δ_i δ_j/|E_i - E_j|, √(δ_i δ_j)).
+since H22 - diag(H_kk - Σ_l |H_kl|) is diagonally dominant with a positive diagonal, hence not negative (Gershgorin). Where d_k is small,
+|r|²/(d/2 + √(d²/4 + |r|²)) replaces |r|²/d; it never exceeds |r| (C.-K. Li and R.-C. Li, A note on eigenvalues of perturbed Hermitian
+matrices, doi 10.1016/j.laa.2004.08.026, abstract). The lowering is a positive operator; it mixes two states i, j of the basis by at most
+√(δ_i δ_j), which adds min(δ_i δ_j/|E_i - E_j|, √(δ_i δ_j)).
 
-The block reaches twice as far in J beyond the basis as H connects: Σ_l is then complete for every r_k that is not zero.
+The block reaches twice as far in J beyond the basis as H connects, so that Σ_l is complete for each r_k that is not zero.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.map_request import BlockProblem
 from rotor.quantum.fields.solver import Matrix
 
-HELD = 1 << 22  # numbers in a temporary array
+HELD = 1 << 22  # most numbers in a temporary array
 
 
 def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors: Matrix, fields: Floats) -> Floats:
-    """How far the functions of a block that a basis leaves out can lower each energy.
+    """Bound of the lowering of each energy by functions of a block outside the basis.
 
     Parameters
     ----------
@@ -34,11 +34,11 @@ def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors:
     places : (n,) array
         Functions of the basis, rising.
     energies : (f, s) array
-        Of the lowest states in the basis, MHz.
+        Energies of the lowest states in the basis, MHz.
     vectors : (f, n, s) array
-        Their eigenvectors.
+        Eigenvectors of these states.
     fields : (f,) array
-        In the unit of the problem.
+        Fields in the unit of the problem.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def _lowering(
     vectors: Matrix,
     fields: Floats,
 ) -> Floats:
-    """`left_out_mhz` of a few fields: couplings (t, n), diagonals (t,) and radii (t,) for each power of the field."""
+    """`left_out_mhz` at a few fields; couplings (t, n), diagonals (t,) and radii (t,) for each power of the field."""
     powers = [fields**n for n in range(len(couplings))]
     lowest = np.transpose(powers) @ np.array(diagonals) - np.abs(np.transpose(powers)) @ np.array(radii)  # (f, t)
     distance = np.maximum(lowest[:, :, None] - energies[:, None, :], 0.0)  # (f, t, s)
@@ -85,7 +85,7 @@ def _lowering(
 
 
 def _with_mixing(energies: Floats, lowering: Floats) -> Floats:
-    """Lowerings (f, s) with what states of nearly equal energy can add to each other."""
+    """Lowerings (f, s), increased by the mixing of states of nearly equal energy."""
     both = np.sqrt(lowering[:, :, None] * lowering[:, None, :])
     gaps = np.abs(energies[:, :, None] - energies[:, None, :])
     states = np.arange(energies.shape[1])

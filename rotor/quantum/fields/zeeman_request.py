@@ -1,4 +1,4 @@
-"""A request for levels in a static magnetic field, and what answers it."""
+"""Request of levels in a static magnetic field, and its answer."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-POINTS = 51  # of a range of fields without a count
+POINTS = 51  # number of fields of a range without a count
 
 
 @dataclass(frozen=True)
 class ZeemanRequest:
-    """A map of levels in a magnetic field to compute; every field is checked when the request is made.
+    """A map of levels in a magnetic field; all values are checked when the request is made.
 
-    top: with its g tensor in `magnetic`. fields_tesla: of any order. j_highest: free levels up to this J are followed. jmax: of the
-    basis; None: what tolerance_mhz needs. hyperfine: with the spins of the top's constants. nuclear_g: g = μ/(μ_N I) by the names of
-    spins; those left out are nuclei with the g of their isotope, an electron spin must be here.
+    top: with its g tensor in `magnetic`. fields_tesla: in any order. j_highest: highest J of the free levels in the map. jmax: highest J of
+    the basis; None for what tolerance_mhz needs. hyperfine: include the spins of the top's constants. nuclear_g: g = μ/(μ_N I) by the names
+    of spins; by default that of the isotope. An electron spin needs a value.
     """
 
     top: Top
@@ -92,7 +92,7 @@ class ZeemanRequest:
 
     @property
     def magnetic(self) -> MagneticTensors:
-        """The tensors of the top; ValueError where they are not known."""
+        """The tensors of the top; ValueError if they are not known."""
         if self.top.magnetic is None:
             raise ValueError(
                 f"the rotational g tensor of {self.top.name or 'this top'} is not known: give one, in principal axes"
@@ -101,42 +101,43 @@ class ZeemanRequest:
 
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
-        """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
+        """Effects with spins if these are requested; empty for the default Hamiltonian."""
         return effects_of(self.top, True) if self.hyperfine else ()
 
     @property
     def spin_g(self) -> dict[str, float]:
-        """g of every spin, given or that of its isotope; ValueError where one is not known."""
+        """g of each spin, from the request or the isotope; ValueError if it is not known."""
         constants = self.top.spin_constants
         if not self.hyperfine or constants is None:
             return {}
-        given = dict(self.nuclear_g or {})
-        if unknown := sorted(given.keys() - constants.twice.keys()):
+        requested = dict(self.nuclear_g or {})
+        if unknown := sorted(requested.keys() - constants.twice.keys()):
             raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
-        return {name: _finite(name, given[name]) if name in given else _g_of(name) for name in constants.twice}
+        return {name: _finite(name, requested[name]) if name in requested else _g_of(name) for name in constants.twice}
 
 
 def _finite(name: str, value: float) -> float:
+    """The value; ValueError unless it is finite."""
     if not math.isfinite(value):
         raise ValueError(f"nuclear_g: {name} = {value}: a finite number is expected")
     return float(value)
 
 
 def _g_of(name: str) -> float:
-    """g of the isotope that a spin is called after, such as 35Cl_1."""
+    """g of the isotope after which a spin is named, such as 35Cl_1."""
     label = name.partition("_")[0]
     try:
-        found = isotope(label).g_factor
+        g = isotope(label).g_factor
     except ValueError:
-        found = None
-    if found is None:
+        g = None
+    if g is None:
         raise ValueError(f"nuclear_g: the g of {name} is not known; give it")
-    return found
+    return g
 
 
 @dataclass(frozen=True, repr=False)
 class ZeemanAnswer(TextOf):
-    """The map that a request asked for."""
+    """The map of a request."""
 
     shown = "states"
 
@@ -145,7 +146,7 @@ class ZeemanAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the energies can be trusted."""
+        """Error budget of the energies."""
         from rotor.quantum.fields.budgets import constants_term, joined_data, map_budget
 
         request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
@@ -182,29 +183,29 @@ class ZeemanAnswer(TextOf):
 
 
 def magnetic_limits(request: ZeemanRequest) -> list[Limit]:
-    """What of the field a request leaves out: moments of the nuclei without their spins, the magnetisability that is not known.
+    """Neglected effects of the field: moments of nuclei without hyperfine structure, and an unknown magnetisability.
 
     >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
-    >>> [one.name for one in magnetic_limits(ZeemanRequest(rod, (0.0, 1.0)))]
+    >>> [limit.name for limit in magnetic_limits(ZeemanRequest(rod, (0.0, 1.0)))]
     ['magnetisability']
     """
-    found, strongest = [], max(abs(field) for field in request.fields_tesla)
+    limits, strongest = [], max(abs(field) for field in request.fields_tesla)
     nuclei = () if request.top.molecule is None else request.top.molecule.nuclei
-    moments = {one.label: abs(one.g_factor or 0.0) * one.spin for one in nuclei if one.spin > 0}
+    moments = {nucleus.label: abs(nucleus.g_factor or 0.0) * nucleus.spin for nucleus in nuclei if nucleus.spin > 0}
     if moments and not request.hyperfine:
         size = max(moments.values()) * NUCLEAR_MAGNETON_MHZ_PER_T * strongest
         text = f"{', '.join(sorted(moments))}: energies in {strongest:g} T, not lines between states of one orientation"
-        found.append(Limit("magnetic moments of nuclei", size, text))
+        limits.append(Limit("magnetic moments of nuclei", size, text))
     if request.magnetic.magnetisability is None:
         text = f"levels shift with the square of the field, up to {strongest:g} T"
-        found.append(Limit("magnetisability", None, text))
-    return found
+        limits.append(Limit("magnetisability", None, text))
+    return limits
 
 
 def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> ZeemanAnswer:
-    """The map of a request. executor: blocks of states are spread over it.
+    """The map of a request. executor: solves blocks of states in parallel.
 
     >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
     >>> from rotor.tops.top import Top

@@ -301,7 +301,7 @@ def test_what_is_refused():
         solve_levels(Top(Constants(A=9.0, B=3.0, C=2.0)), 2, effects=(*SEMI_RIGID, *_effects(1)))
     with pytest.raises(ValueError, match="only the exact method"):
         solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *_effects(2), HyperfineMethod("first-order", 1.0, tuple(three))))
-    with pytest.raises(ValueError, match="no products"):
+    with pytest.raises(ValueError, match="not products"):
         unmixed_levels(PROLATE, (*SEMI_RIGID, *_effects(1)), [1])
 
 
