@@ -151,7 +151,7 @@ def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, s
     ----------
     scheme : Scheme
         Which spins are coupled.
-    every : dict of int to (n, columns) array
+    patterns : dict of int to (n, columns) array
         Coupling patterns by doubled F.
     rank, step : int
         Rank of the tensor, and the doubled change of F.
