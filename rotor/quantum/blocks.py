@@ -16,7 +16,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,17 +31,12 @@ from rotor.quantum.solvers.dominated import dominated_states, is_dominated
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
 
 
-@dataclass(frozen=True, eq=False)
-class Stack:
-    """Blocks of one size: rows of their functions (blocks, size), and where their matrices stand in the flat array of all."""
+class Entries(NamedTuple):
+    """Elements of operators between two blocks: row and column in each block, and values (operators, entries)."""
 
-    functions: Ints
-    place: slice
-
-    @property
-    def size(self) -> int:
-        """Functions in one block."""
-        return int(self.functions.shape[1])
+    rows: Ints
+    columns: Ints
+    values: NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +45,8 @@ class LinearBlocks:
 
     names: of the terms. labels: quantum numbers of the functions. rows, columns, values: elements (terms, entries) of the lower triangles
     in the order of functions in a block. block, rank: (functions,) number of each function's block, and its place in it; -1 for functions
-    of blocks that are left out. stacks: the blocks by size.
+    of blocks that are left out. stacks: by size, rising, the rows of the functions of each block (blocks, size). Elements stand in the
+    order of these blocks; _position: the place of each in the flat matrices of its stack.
     """
 
     names: tuple[str, ...]
@@ -59,7 +56,7 @@ class LinearBlocks:
     values: NDArray[Any]
     block: Ints
     rank: Ints
-    stacks: tuple[Stack, ...]
+    stacks: tuple[Ints, ...]
     _position: Ints
 
     def solve(self, coefficients: ArrayLike) -> SolvedBlocks:
@@ -70,57 +67,76 @@ class LinearBlocks:
         """Of each block the states with the largest shares in some of the functions (functions,), as many as these; or all."""
         values = np.asarray(coefficients, dtype=float) @ self.values
         return SolvedBlocks(
-            self, tuple(self._dominated_or_all(stack, values, by[stack.functions]) for stack in self.stacks)
+            self,
+            tuple(
+                self._dominated(stack, bounds, values, by[stack]) or eigenstates(self._dense(stack, bounds, values))
+                for stack, bounds in zip(self.stacks, self._bounds, strict=True)
+            ),
         )
 
-    def _dominated_or_all(
-        self, stack: Stack, values: NDArray[Any], chosen: NDArray[np.bool_]
-    ) -> tuple[Floats, NDArray[Any]]:
-        """Energies and vectors of the states of each block of a stack that lie in chosen functions (blocks, size), or of all."""
+    def _dominated(
+        self, stack: Ints, bounds: Ints, values: NDArray[Any], chosen: NDArray[np.bool_]
+    ) -> tuple[Floats, NDArray[Any]] | None:
+        """Energies and vectors of the states of each block of a stack that lie in chosen functions (blocks, size), where this is faster."""
         from scipy.sparse import csr_array
 
-        counts = chosen.sum(axis=1)
+        counts, size = chosen.sum(axis=1), stack.shape[1]
+        if (counts != counts[0]).any() or not is_dominated(size, int(counts[0])):
+            return None
         few: list[tuple[Floats, NDArray[Any]]] = []
-        if (counts == counts[0]).all() and is_dominated(stack.size, int(counts[0])):
-            for block, functions in zip(self.block[stack.functions[:, 0]].tolist(), chosen, strict=True):
-                here = self._by_block.get(block, slice(0, 0))
-                places = self.rank[self.rows[here]], self.rank[self.columns[here]]
-                lower = csr_array((values[here], places), shape=(stack.size, stack.size))
-                states = dominated_states(lower, np.flatnonzero(functions))
-                if states is None:
-                    break
-                few.append(states)
-        if len(few) == len(chosen):
-            return np.stack([energies for energies, _ in few]), np.stack([vectors for _, vectors in few])
-        return eigenstates(self._dense(stack, values))
+        for (start, stop), functions in zip(pairwise(bounds.tolist()), chosen, strict=True):
+            places = self.rank[self.rows[start:stop]], self.rank[self.columns[start:stop]]
+            lower = csr_array((values[start:stop], places), shape=(size, size))
+            states = dominated_states(lower, np.flatnonzero(functions))
+            if states is None:
+                return None
+            few.append(states)
+        return np.stack([energies for energies, _ in few]), np.stack([vectors for _, vectors in few])
 
     @cached_property
-    def _by_block(self) -> dict[int, slice]:
-        """Where the elements of each block stand: they are sorted by block."""
-        numbers, starts = np.unique(self.block[self.rows], return_index=True)
-        stops = np.append(starts[1:], len(self.rows))
-        return {int(n): slice(int(a), int(b)) for n, a, b in zip(numbers, starts, stops, strict=True)}
+    def _bounds(self) -> list[Ints]:
+        """Of each stack where the elements of its blocks begin, and where the last ones end."""
+        counts, bounds, first = np.bincount(self.block[self.rows], minlength=len(self.block)), [], 0
+        for stack in self.stacks:
+            ends = first + np.cumsum(counts[self.block[stack[:, 0]]])
+            bounds.append(np.append(first, ends))
+            first = int(ends[-1])
+        return bounds
 
-    def _dense(self, stack: Stack, values: NDArray[Any]) -> NDArray[Any]:
+    def _dense(self, stack: Ints, bounds: Ints, values: NDArray[Any]) -> NDArray[Any]:
         """The matrices (blocks, size, size) of one stack from the values of all elements."""
-        flat = np.zeros(stack.place.stop - stack.place.start, dtype=values.dtype)
-        for block in self.block[stack.functions[:, 0]].tolist():
-            here = self._by_block.get(block, slice(0, 0))
-            flat[self._position[here] - stack.place.start] = values[here]
-        return flat.reshape(-1, stack.size, stack.size)
+        (count, size), here = stack.shape, slice(bounds[0], bounds[-1])
+        flat = np.zeros(count * size * size, dtype=values.dtype)
+        flat[self._position[here]] = values[here]
+        return flat.reshape(count, size, size)
+
+    def between_blocks(self, elements: Elements, blocks: Ints | None = None) -> dict[tuple[int, int], Entries]:
+        """Elements of operators between the functions of blocks, by default of all, by the numbers of the blocks of rows and columns."""
+        taken = self.block >= 0 if blocks is None else np.isin(self.block, blocks)
+        here = np.flatnonzero(taken[elements.rows] & taken[elements.columns])
+        up, low = self.block[elements.rows[here]], self.block[elements.columns[here]]
+        pair = up * len(self.block) + low
+        order = np.argsort(pair, kind="stable")
+        bounds = [*np.flatnonzero(np.diff(pair[order], prepend=-1)).tolist(), len(order)]
+        entries = {}
+        for start, stop in pairwise(bounds):
+            chosen = here[order[start:stop]]
+            rows, columns = self.rank[elements.rows[chosen]], self.rank[elements.columns[chosen]]
+            key = int(up[order[start]]), int(low[order[start]])
+            entries[key] = Entries(rows, columns, elements.values[:, chosen])
+        return entries
 
     def energies(self, coefficients: ArrayLike) -> Floats:
         """Energies (functions,) at coefficients (terms,), without vectors; nan for blocks that are left out."""
         energies = np.full(len(self.block), np.nan)
         for stack, matrices in zip(self.stacks, self.matrices(coefficients), strict=True):
-            energies[stack.functions] = eigenvalues(matrices)
+            energies[stack] = eigenvalues(matrices)
         return energies
 
     def matrices(self, coefficients: ArrayLike) -> list[NDArray[Any]]:
         """The matrices (blocks, size, size) of each stack at coefficients (terms,), their lower triangles."""
-        flat = np.zeros(self.stacks[-1].place.stop if self.stacks else 0, dtype=self.values.dtype)
-        flat[self._position] = np.asarray(coefficients, dtype=float) @ self.values
-        return [flat[stack.place].reshape(-1, stack.size, stack.size) for stack in self.stacks]
+        values = np.asarray(coefficients, dtype=float) @ self.values
+        return [self._dense(stack, bounds, values) for stack, bounds in zip(self.stacks, self._bounds, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,32 +151,23 @@ class SolvedBlocks:
         """Energies (functions,) at the row of the function of the same rank; nan for states that were not solved."""
         energies = np.full(len(self.linear.block), np.nan)
         for stack, (values, _) in zip(self.linear.stacks, self.states, strict=True):
-            energies[stack.functions[:, : values.shape[1]]] = values
+            energies[stack[:, : values.shape[1]]] = values
         return energies
 
     def vectors(self, block: int) -> tuple[Ints, NDArray[Any]]:
         """The rows of a block's functions, and its eigenvectors in columns."""
         stack, place = self._places[block]
-        return self.linear.stacks[stack].functions[place], self.states[stack][1][place]
+        return self.linear.stacks[stack][place], self.states[stack][1][place]
 
     def slopes_of(self, elements: Elements, levels: Ints) -> Floats:
         """⟨ψ|O|ψ⟩ (levels, operators) of the levels at these rows, of Hermitian operators between the functions of these blocks."""
         linear = self.linear
-        slopes = np.zeros((len(levels), len(elements.values)))
-        blocks, entry_blocks = linear.block[levels], linear.block[elements.rows]
-        entry_blocks = np.where(
-            linear.block[elements.columns] == entry_blocks, entry_blocks, -1
-        )  # blocks of H may be finer
-        order = np.argsort(entry_blocks, kind="stable")
-        for block in np.unique(blocks).tolist():
-            chosen = np.flatnonzero(blocks == block)
-            _, vectors = self.vectors(block)
-            vectors = vectors[:, linear.rank[levels[chosen]]]
-            first, last = np.searchsorted(entry_blocks[order], [block, block + 1])
-            entries = order[first:last]
-            rows, columns = linear.rank[elements.rows[entries]], linear.rank[elements.columns[entries]]
-            density = vectors[rows].conj() * vectors[columns]
-            slopes[chosen] = (elements.values[:, entries] @ density).real.T
+        slopes, blocks = np.zeros((len(levels), len(elements.values))), linear.block[levels]
+        for (up, low), (rows, columns, values) in linear.between_blocks(elements, np.unique(blocks)).items():
+            if up == low:  # blocks of H may be finer than those of O
+                chosen = np.flatnonzero(blocks == up)
+                vectors = self.vectors(up)[1][:, linear.rank[levels[chosen]]]
+                slopes[chosen] = (values @ (vectors[rows].conj() * vectors[columns])).real.T
         return slopes
 
     @cached_property
@@ -169,7 +176,7 @@ class SolvedBlocks:
         return {
             int(number): (i, place)
             for i, stack in enumerate(self.linear.stacks)
-            for place, number in enumerate(block[stack.functions[:, 0]].tolist())
+            for place, number in enumerate(block[stack[:, 0]].tolist())
         }
 
 
@@ -216,19 +223,22 @@ def blocks_of_elements(
     rank[order] = np.arange(len(order)) - np.repeat(starts, counts)
     size[order] = np.repeat(counts, counts)
     block = np.where(present, part, -1)
-    stacks, offsets, start = [], np.zeros(int(part.max(initial=0)) + 1, dtype=np.int64), 0
+    stacks, in_stack = (
+        [],
+        np.zeros((2, int(part.max(initial=0)) + 1), dtype=np.int64),
+    )  # number of blocks before, and in the stack
     for width in np.unique(counts).tolist():
         members = np.flatnonzero(counts == width)
-        stop = start + width * width * len(members)
-        offsets[numbers[members]] = np.arange(start, stop, width * width)
-        stacks.append(Stack(order[starts[members][:, None] + np.arange(width)], slice(start, stop)))
-        start = stop
+        places = np.arange(len(members))
+        in_stack[:, numbers[members]] = sum(map(len, stacks)) + places, places
+        stacks.append(order[starts[members][:, None] + np.arange(width)])
     lower = np.flatnonzero((rank[elements.rows] >= rank[elements.columns]) & present[elements.rows])
-    lower = lower[np.argsort(block[elements.rows[lower]], kind="stable")]
+    before, place = in_stack[:, block[elements.rows[lower]]]
+    lower, place = (array[np.argsort(before, kind="stable")] for array in (lower, place))
     rows, columns, values = elements.rows[lower], elements.columns[lower], elements.values[:, lower]
     if np.iscomplexobj(values) and np.abs(values.imag).max(initial=0.0) <= ROUND_OFF * np.abs(values).max(initial=0.0):
         values = np.ascontiguousarray(values.real)
-    position = offsets[block[rows]] + size[rows] * rank[rows] + rank[columns]
+    position = size[rows] * (size[rows] * place + rank[rows]) + rank[columns]
     return LinearBlocks(
         tuple(names), {name: np.asarray(column) for name, column in labels.items()}, rows, columns, values, block, rank,
         tuple(stacks), position,

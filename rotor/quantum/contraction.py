@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, product
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,22 +141,12 @@ def _between_blocks(
     linear: LinearBlocks, states: Sequence[tuple[Ints, NDArray[Any]]], number: Mapping[int, int], elements: Elements
 ) -> dict[Pair, NDArray[Any]]:
     """V† O V of each pair of blocks that an operator connects."""
-    rows, columns, values = elements.rows, elements.columns, elements.values[0]
-    taken = np.isin(linear.block, list(number))
-    retained = taken[rows] & taken[columns]
-    rows, columns, values = rows[retained], columns[retained], values[retained]
-    pair = linear.block[rows] * (int(linear.block.max()) + 1) + linear.block[columns]
-    order = np.argsort(pair, kind="stable")
-    bounds = np.flatnonzero(np.diff(pair[order], prepend=-1, append=-1))
     blocks = {}
-    for start, stop in pairwise(bounds.tolist()):
-        entries = order[start:stop]
-        up = number[int(linear.block[rows[entries[0]]])]
-        low = number[int(linear.block[columns[entries[0]]])]
-        left, right = states[up][1], states[low][1]
+    for (up, low), (rows, columns, values) in linear.between_blocks(elements, np.array([*number])).items():
+        left, right = states[number[up]][1], states[number[low]][1]
         matrix = np.zeros((len(left), len(right)), dtype=values.dtype)
-        matrix[linear.rank[rows[entries]], linear.rank[columns[entries]]] = values[entries]
-        blocks[up, low] = left.conj().T @ (matrix @ right)
+        matrix[rows, columns] = values[0]
+        blocks[number[up], number[low]] = left.conj().T @ (matrix @ right)
     return blocks
 
 

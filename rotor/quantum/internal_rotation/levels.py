@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.blocks import Entries
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
@@ -29,14 +30,6 @@ if TYPE_CHECKING:
 TurningTops = RamModel | TwoTops
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
-
-
-class Entries(NamedTuple):
-    """Elements of an operator between two blocks: row and column in each block, and values."""
-
-    rows: Ints
-    columns: Ints
-    values: NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +54,9 @@ class SpeciesMoments:
         return np.asarray(slopes[:, [constants.index(name) for name in names]])
 
     def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
-        linear = self.levels.solved.linear
         turned = _turned(np.array(components), self.model.angle)
         elements = self.levels.functions.elements([[Product(body_tensor(turned))]], rank, half=True)
-        pair = linear.block[elements.rows] * (int(linear.block.max()) + 1) + linear.block[elements.columns]
-        order = np.argsort(pair, kind="stable")
-        starts = np.flatnonzero(np.diff(pair[order], prepend=-1))
-        blocks = {}
-        for start, stop in zip(starts, np.append(starts[1:], len(order)), strict=True):
-            here = order[start:stop]
-            rows, columns = elements.rows[here], elements.columns[here]
-            key = int(linear.block[rows[0]]), int(linear.block[columns[0]])
-            blocks[key] = Entries(linear.rank[rows], linear.rank[columns], elements.values[0, here])
-        return blocks
+        return self.levels.solved.linear.between_blocks(elements)
 
 
 def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
@@ -131,11 +114,11 @@ class TorsionBlock(MomentBlock):
         shape = len(self.vectors), len(low.vectors)
         if shape[0] * shape[1] <= FEW:
             matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
-            matrix[entries.rows, entries.columns] = entries.values
+            matrix[entries.rows, entries.columns] = entries.values[0]
         else:
             from scipy.sparse import csr_array
 
-            matrix = csr_array((entries.values, (entries.rows, entries.columns)), shape=shape)
+            matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
         return np.asarray(self.vectors.conj().T @ (matrix @ low.vectors))
 
     def slopes(self, names: Sequence[str]) -> Floats:
