@@ -171,6 +171,12 @@ function floats({ start, scale, steps, base64 }) { // numbers of an exported pag
   return Float64Array.from(new Float32Array(bytes.buffer), (value) => start + value * scale);
 }
 
+function bokehLoaded() { // an exported page and a notebook have BokehJS before this module
+  if (globalThis.Bokeh) return Promise.resolve();
+  const script = document.querySelector("script[src='bokeh.js']");
+  return new Promise((done, fail) => { script.onload = done; script.onerror = () => fail(new Error("BokehJS could not be loaded")); });
+}
+
 const thin = (text) => text.replace(/\d+/, (whole) => (whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, "\u2009") : whole));
 function spaced() { // frequencies at the ticks: 17 990 with a thin space
   const formatter = new Bokeh.BasicTickFormatter({ use_scientific: false }), plain = formatter.doFormat.bind(formatter);
@@ -214,7 +220,7 @@ class Plot {
     }
     for (const grid of f.center) if ("grid_line_color" in grid) grid.grid_line_color = pen.grid;
   }
-  get box() { return this.view.frame.bbox; }
+  get box() { return this.view?.frame.bbox ?? { left: 0, top: 0, width: 0, height: 0 }; } // 0 until it is shown
   at(event) { // data coordinates of a pointer
     const place = this.place.getBoundingClientRect(), box = this.box;
     const [sx, sy] = [event.clientX - place.left - box.left, event.clientY - place.top - box.top];
@@ -302,7 +308,7 @@ class SpectrumWindow extends Plot {
     const span = clamp(last - first, least, most), middle = clamp((first + last) / 2, low, high);
     this.first = middle - span / 2; this.last = middle + span / 2;
     this.figure.x_range.setv({ start: this.first, end: this.last });
-    this.load();
+    this.loading = this.load();
     this.app.placed(this);
   }
   async load() { // one request at a time; the last wish counts
@@ -535,17 +541,19 @@ export class App {
     transport.onstatus = (text) => this.lostText(text);
     transport.onnotes = (notes) => notes.forEach((note) => this.say(note));
   }
-  async start() {
-    await this.transport.open();
-    this.info = await this.transport.call({ do: "hello" });
+  async start() { // the spectrum first; the server answers while the browser loads BokehJS
+    const answer = this.transport.open().then(() => this.transport.call({ do: "hello" }));
+    [this.info] = await Promise.all([answer, bokehLoaded()]);
     this.take(this.info.session);
     this.build();
-    const [low, high] = this.info.band_mhz;
-    await this.addWindow(low, high);
+    const [low, high] = this.info.band_mhz, spectrum = await this.addWindow(low, high);
+    await spectrum.loading;
+    await frame();
+    this.root.dataset.drawn = "yes";
     this.residuals = new ResidualPlot(this, this.residualPlace);
     this.wood = new LoomisWood(this, this.woodPlace);
     await Promise.all([this.residuals.show(), this.wood.show()]);
-    this.refresh();
+    this.panels();
     for (const note of this.session.warnings) this.say(note, true);
     this.root.dataset.ready = "yes";
   }

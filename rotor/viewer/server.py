@@ -104,7 +104,7 @@ def page_bodies() -> dict[str, tuple[str, bytes]]:
     """Kind and content of the four files by their names; the page itself has none."""
     shell = page(
         '<link rel="stylesheet" href="page.css">',
-        '<script src="bokeh.js"></script>\n<script type="module" src="page.js"></script>',
+        '<script async src="bokeh.js"></script>\n<script type="module" src="page.js"></script>',
     )
     files = {
         "": ("text/html", shell),
