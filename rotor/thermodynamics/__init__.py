@@ -1,7 +1,7 @@
 """Thermodynamics of rotation: sums over levels, their classical limit, nuclear-spin species, and the ideal gas.
 
-A module for each: `level_sums`, `partition`, `classical_limit`, `classical_onset`, `species`, `vibration` and `functions`,
-which brings them together; `partition_table` gives Q(T) as records. They are loaded when a name is first used.
+Modules: `level_sums`, `partition`, `classical_limit`, `classical_onset`, `species`, `vibration`, and `functions`, which combines
+them; `partition_table` gives Q(T) as records. A module is loaded when one of its names is first used.
 """
 
 from importlib import import_module

@@ -1,10 +1,9 @@
 """Error budget of a partition function (`rotor.requests.budget`), relative to Q.
 
-Rounding: a level is off by at most `ROUNDING` of the largest energy E_max of its J, its Boltzmann factor by that over kT, and a sum of n
-terms by n units in the last place. Data: Q depends on the constants by ∂ln Q/∂c = -⟨∂E/∂c⟩/kT; scaled together they give -U/kT, of which
-each rotation of a rigid top has an equal share at high temperature, ∂ln Q/∂ln c = -(U/kT)/f for each of the f rotations that c belongs
-to. Model: a relative error of the constants is one of f/2 in Q, so that what shifts a line of J, 2B(J + 1), by δ shifts levels by
-δ J/2 and Q by that over kT.
+Rounding: the error of a level is at most `ROUNDING` times the largest energy E_max of its J; the relative error of its Boltzmann factor is
+that over kT, and of a sum of n terms n units in the last place. Data: ∂ln Q/∂c = -⟨∂E/∂c⟩/kT. Scaling all constants together gives -U/kT,
+shared equally by the f rotations of a rigid top at high temperature: ∂ln Q/∂ln c = -(U/kT)/f for each rotation that c belongs to.
+Model: an effect that shifts the line 2B(J + 1) by δ shifts the levels at J by δ J/2, and ln Q by that over kT.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ def q_budget(functions: ThermoFunctions, j: int, limits: Sequence[Limit], parame
     Parameters
     ----------
     functions : ThermoFunctions
-        With the bounds of their sums.
+        The functions, with error bounds of their sums.
     j : int
-        Populated at the highest temperature.
+        Typical J at the highest temperature.
     limits : sequence of Limit
-        What the Hamiltonian leaves out at that J.
+        Effects that the Hamiltonian neglects, with their sizes at that J.
     parameters : sequence of str
         Constants of the Hamiltonian.
 
@@ -66,7 +65,7 @@ def q_budget(functions: ThermoFunctions, j: int, limits: Sequence[Limit], parame
 
 
 def rounding_of_q(functions: ThermoFunctions) -> ErrorTerm:
-    """Bound of rounding, by the largest energy of the highest J in each sum."""
+    """Bound on the rounding error of Q, from the largest energy of the highest J in each sum."""
     largest = max(functions.top.rotational_constants_mhz, key=lambda c: c if math.isfinite(c) else 0.0)
     j = np.maximum(functions.jmax, 0).astype(np.float64)
     energy = largest * j * (j + 1) / (MHZ_PER_K * functions.temperature_k)
@@ -75,7 +74,7 @@ def rounding_of_q(functions: ThermoFunctions) -> ErrorTerm:
 
 
 def data_of_q(functions: ThermoFunctions, parameters: Sequence[str]) -> ErrorTerm:
-    """One standard deviation of ln Q by the uncertainty of A, B and C."""
+    """Standard deviation of ln Q from the uncertainties of A, B and C."""
     top = functions.top
     covariance = known_covariance(top, parameters)
     if covariance is None:
@@ -97,9 +96,9 @@ def _axes_of(top: Top) -> dict[str, int]:
 
 
 def model_of_q(functions: ThermoFunctions, j: int, limits: Sequence[Limit]) -> ErrorTerm:
-    """Relative size of what is left out: shifts of levels over kT; not estimated where vibration is left out.
+    """Relative size of neglected effects, level shifts over kT; not estimated if vibration is neglected.
 
-    Splittings by spins (`OF_SPINS`) count at the lowest temperature, other effects at the highest, where high J are populated.
+    Splittings by spins (`OF_SPINS`) matter most at the lowest temperature; other effects at the highest, with high J populated.
     """
     if functions.vibrations is None:
         return ErrorTerm(None, "vibration is left out", "vibrational states")

@@ -1,6 +1,6 @@
-"""A request for a classical gas of free molecules, and what answers it: the test of equipartition, correlation functions.
+"""Request and answer for a classical gas of free molecules: test of equipartition, correlation functions.
 
-Distortion, everything quantum, and what molecules do to each other are neglected.
+Distortion, quantum effects and forces between molecules are neglected.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ if TYPE_CHECKING:
 MOST_MOLECULES = 10_000_000
 MOST_TIMES = 100_000
 DEFAULT_TIMES = 101
-SETTLED = 12.0  # root mean square turns, in radians, after which the correlation functions are shown no further
+SETTLED = 12.0  # rms rotation angle in radians at which the table of the correlation functions ends
 TESTED_AT_PS = 10.0
 
 
 @dataclass(frozen=True)
 class GasRequest:
-    """A classical gas to draw and move; every field is checked when the request is made.
+    """A classical gas to sample and propagate; all fields are checked when the request is made.
 
-    molecules: how many are drawn. seed: of the random numbers. confidence: of the test of equipartition. times_ps: of the
-    correlation functions C1 and C2; None: none; see `settling_times_ps`.
+    molecules: sample size. seed: of the random numbers. confidence: of the test of equipartition. times_ps: times of the
+    correlation functions C1 and C2, see `settling_times_ps`; None: no correlation functions.
     """
 
     top: Top
@@ -80,13 +80,13 @@ class GasRequest:
 
     @property
     def tested_at_ps(self) -> float:
-        """The time at which equipartition is tested: the last one of the correlation functions, else 10 ps."""
+        """The time at which equipartition is tested: the last time of the correlation functions, or 10 ps without them."""
         return TESTED_AT_PS if self.times_ps is None else max(self.times_ps)
 
 
 @dataclass(frozen=True)
 class Probes:
-    """What C1 and C2 are of: a unit vector (3,) and a tensor (3, 3) in principal axes, and where they are from."""
+    """The probes of C1 and C2: a unit vector (3,) and a tensor (3, 3) in principal axes, with their sources."""
 
     vector: Floats
     vector_source: str
@@ -107,18 +107,18 @@ class GasAnswer(TextOf):
 
     @cached_property
     def probes(self) -> Probes:
-        """What the correlation functions are of."""
+        """The vector and tensor of the correlation functions."""
         return probes_of(self.request.top)
 
     @property
     def short_time(self) -> ShortTime:
-        """How the correlation functions begin, in closed form and the units of the motion."""
+        """The short-time behaviour of the correlation functions in closed form, in the units of the motion."""
         top, probes = self.request.top, self.probes
         return short_time(top.moments_u_angstrom2, self.request.kt, probes.vector, probes.tensor)
 
     @property
     def left_out(self) -> list[str]:
-        """What a classical gas of free rigid tops leaves out: quantum mechanics, distortion, and what the molecule shows signs of."""
+        """Effects neglected by a classical gas of free rigid tops: quantum mechanics, distortion, and others of this molecule."""
         top = self.request.top
         j, effects = populated_j(top, self.request.temperature_k), effects_of(top, hyperfine=False)
         above_k = classical_above_if_known(top, 0.01)
@@ -185,10 +185,10 @@ def answer_gas(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> GasAnswer:
-    """The gas of a request, moved and tested, and its correlation functions where times were asked for.
+    """Sample and propagate the gas of a request, test it, and compute its correlation functions if it has times.
 
-    executor: threads that the molecules of the correlation functions are spread over; the answer does not depend on it.
-    progress: called with how many of these molecules are done.
+    executor: threads for the correlation functions; the answer does not depend on it.
+    progress: called with the number of molecules done.
 
     >>> from rotor.tops.top import Top
     >>> answer = answer_gas(GasRequest(Top.from_constants("A=10 B=6 C=4 GHz"), molecules=1000))
@@ -205,7 +205,7 @@ def answer_gas(
 def _correlations(
     request: GasRequest, executor: ThreadPoolExecutor | None, progress: Callable[[int], object] | None
 ) -> Correlations | None:
-    """C1 and C2, times in ps, of molecules of their own (another stream of the same seed)."""
+    """C1 and C2, with times in ps, from a separate sample of molecules (another stream of the same seed)."""
     if request.times_ps is None:
         return None
     probes, times = probes_of(request.top), np.array(request.times_ps)
@@ -224,23 +224,23 @@ def _correlations(
 
 
 def probes_of(top: Top) -> Probes:
-    """The dipole and the polarizability of a top where they are known and turn with it, else its figure axis."""
+    """The dipole and the polarizability of a top if they are known and anisotropic; otherwise its figure axis."""
     axis = 2 if top.kind == "oblate" else 0
     vector, vector_source = np.eye(3)[axis], f"axis {'abc'[axis]}, as there is no dipole that is known"
     if top.dipole_abc_debye is not None and any(top.dipole_abc_debye):
         vector, vector_source = np.array(top.dipole_abc_debye), "the dipole"
         vector = vector / np.linalg.norm(vector)
     tensor, tensor_source = np.outer(vector, vector), f"the second Legendre polynomial of {vector_source.split(',')[0]}"
-    known = top.polarizability_abc_angstrom3
-    if known is not None:
-        alpha = np.array(known)
+    polarizability = top.polarizability_abc_angstrom3
+    if polarizability is not None:
+        alpha = np.array(polarizability)
         if np.linalg.norm(alpha - np.trace(alpha) / 3 * np.eye(3)) > 1e-6 * np.linalg.norm(alpha):
             tensor, tensor_source = alpha, "the anisotropic polarizability"
     return Probes(vector, vector_source, tensor, tensor_source)
 
 
 def settling_times_ps(top: Top, temperature_k: float) -> tuple[float, ...]:
-    """Times in ps over which the correlation functions of a free gas settle: 12 rad of root mean square turning."""
+    """Times in ps until the correlation functions of a free gas have settled: 12 rad of rms rotation."""
     probes = probes_of(top)
     start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, probes.vector, probes.tensor)
     last = SETTLED / math.sqrt(max(start.m2, start.n2 / 3)) * units.ASE_TIME_PS

@@ -1,33 +1,33 @@
-"""The classical limit of rotation with its first quantum corrections, and how large the next ones are.
+"""The classical limit of rotation with its first quantum corrections, and an estimate of the next ones.
 
-Classically, with ⟨g_I⟩ the spin weight averaged over many levels (G. Herzberg, Molecular Spectra and Molecular Structure
-II, eqs. V,18 and V,27; ⟨g_I⟩ is the number of nuclear-spin functions over the symmetry number),
+With ⟨g_I⟩ the spin weight averaged over many levels, which is the number of nuclear-spin functions over the symmetry number
+(G. Herzberg, Molecular Spectra and Molecular Structure II, eqs. V,18 and V,27),
 
     Q = ⟨g_I⟩ kT/hB  (linear),      Q = ⟨g_I⟩ √(π (kT/h)³ / ABC)  (all others),
 
-multiplied by 1 + a/T + b/T² + d T + e T² + ... The quantum corrections a and b are the first two terms of the expansion in ħ²: of
+multiplied by 1 + a/T + b/T² + d T + e T² + ... The quantum corrections a and b are the first two terms of the expansion in ħ². For
 a linear molecule (H. P. Mulholland, Proc. Camb. Phil. Soc. 24 (1928) 280)
 
     a = Θ/3,    b = Θ²/15;
 
-of any other (K. F. Stripp and J. G. Kirkwood, J. Chem. Phys. 19 (1951) 1131), with Θ = hA/k and so on and S the sum over
-the different terms that exchanging A, B, C makes,
+for other molecules (K. F. Stripp and J. G. Kirkwood, J. Chem. Phys. 19 (1951) 1131), with A, B, C in K and S the sum over
+the distinct terms under permutation of A, B, C,
 
     a = S[2A - AB/C]/12,    b = S[10A² + 12AB - 12A²B/C + 7A²B²/C²]/480,
 
 which for a spherical top are B/4 and (B/4)²/2. d T is the quartic centrifugal distortion to first order, -⟨H_d⟩/kT, with
 H_d a polynomial of classical angular momenta whose components have variances kT/2A, kT/2B, kT/2C (linear: 2D k/B² T).
 
-The logarithm is what is cut off: the corrected Q is the classical one times exp[a/T + (b - a²/2)/T² + d T + e T²], with
-e T² = -⟨H_6⟩/kT + [⟨H_4²⟩ - ⟨H_4⟩²]/2(kT)², sextic distortion to first order and quartic to second. To the order
-that is known that is the same, no spurious terms get into the heat capacity, and a spherical top's e^(B/4kT) is all of it.
+The series of the logarithm is truncated: the corrected Q is the classical Q times exp[a/T + (b - a²/2)/T² + d T + e T²], with
+e T² = -⟨H_6⟩/kT + [⟨H_4²⟩ - ⟨H_4⟩²]/2(kT)², sextic distortion to first order and quartic to second. To the known order this
+equals the series of Q, but the heat capacity has no spurious terms, and e^(B/4kT) of a spherical top is complete.
 
-What comes next, and how it is bounded here: (1) the terms in T⁻³, of the size of those before multiplied and of (Θ_b/T)³/100
-(a linear molecule has 0.0028), and of an asymmetric top, with s = A(B - C)²/BC, of [As(A + s)/40 + s³/400]/T³: of 60 tops with A/B
-up to 16 and B/C up to 8 the whole is 2.2 to 110 times what sums over the levels show, 2.8 times in the median
-(tests/thermodynamics/test_thermo_functions.py); (2) distortion in T³, f T³, the next cumulants of H_4, H_6 and H_8; (3) products of
-quantum and distortion terms, such as a d, which no power of T removes; (4) what spin weights that repeat after n levels leave of
-the sum over their classes, exp(-π² T/n²Θ) by Poisson's summation, Θ the largest.
+The error is estimated from the next terms. (1) Terms in T⁻³: products of the preceding terms, (Θ_b/T)³/100 (0.0028 for a linear
+molecule), and for an asymmetric top with s = A(B - C)²/BC, [As(A + s)/40 + s³/400]/T³. For 60 tops with A/B up to 16 and B/C up
+to 8 this estimate is 2.2 to 110 times (median 2.8) the error against sums over levels
+(tests/thermodynamics/test_thermo_functions.py). (2) Distortion in T³: f T³, the next cumulants of H_4, H_6 and H_8. (3) Products of
+quantum and distortion terms, such as a d, which do not vanish at any T. (4) Spin weights with a period of n levels: the oscillating
+remainder of the sum, exp(-π² T/n²Θ) by Poisson's summation, with the largest Θ.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
-from rotor.thermodynamics.species import of_species
+from rotor.thermodynamics.species import weights_in_species
 from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -52,16 +52,14 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-SERIES_LIMIT = 0.5  # of the quantum corrections and of dT, above which the corrected limit is not given
-_NODES = (
-    7  # of Gauss and Hermite, exact for polynomials of 13th order in a normal deviate; the cube of a quartic has 12
-)
+SERIES_LIMIT = 0.5  # largest size of the quantum corrections and of d T for which the corrected limit is given
+_NODES = 7  # Gauss-Hermite points; exact to degree 13 in a normal deviate, and the cube of a quartic has degree 12
 _PERIODS = {
     "none": 1,
     "J": 2,
     "KaKc": 2,
     "irrep": 5,
-}  # after how many levels spin weights repeat; of "K" its own modulus
+}  # period of the spin weights in levels; the rule "K" has its own modulus
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class ClassicalLimit:
 
     degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d, e, f: in K, K², 1/K, 1/K², 1/K³; see
     the module. theta_k: the largest finite and the middle rotational temperature. asymmetry_k: A(B - C)²/BC in K. period: of the spin
-    weights. states: of each state how much it counts beside the one of `mean_weight`, and its energy over k in K.
+    weights. states: for each state its weight relative to that of `mean_weight`, and its energy over k in K.
     """
 
     degrees: int
@@ -92,7 +90,7 @@ class ClassicalLimit:
         return np.asarray(self.mean_weight * self.scale * t ** (self.degrees / 2) * self.state_sums(t)[0])
 
     def state_sums(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """Σ w e⁻ˣ over the states with x = E/kT, and mean and variance of x, (n,) each; 1, 0, 0 of one state."""
+        """Σ w e⁻ˣ over the states with x = E/kT, and mean and variance of x, (n,) each; 1, 0, 0 for a single state."""
         share, energy = np.array(self.states).T
         x = energy / np.asarray(t)[..., None]
         terms = share * np.exp(-x)
@@ -101,7 +99,7 @@ class ClassicalLimit:
         return total, mean, (terms * x * x).sum(axis=-1) / total - mean**2
 
     def corrected(self, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Q, U/RT and C_v/R with the corrections, (n,) each; NaN where one of these is more than half of 1.
+        """Q, U/RT and C_v/R with the corrections, (n,) each; NaN if a correction exceeds 0.5.
 
         With c = b - a²/2: ln(Q/Q_cl) = a/T + c/T² + dT + eT², U/RT = n/2 - a/T - 2c/T² + dT + 2eT²,
         C_v/R = n/2 + 2c/T² + 2dT + 6eT².
@@ -119,7 +117,7 @@ class ClassicalLimit:
     def errors(self, temperatures_k: ArrayLike) -> Floats:
         """Estimated relative errors (3, n) of the corrected Q, U/RT and C_v/R: the next terms, see the module.
 
-        A term of ln Q in Tᵐ is one of U/RT times m, and of C_v/R times m(m + 1).
+        A term c Tᵐ of ln Q contributes m c Tᵐ to U/RT and m(m + 1) c Tᵐ to C_v/R.
 
         >>> from rotor.tops.top import Top
         >>> limit = classical_limit(Top.from_constants("B=1 GHz"))
@@ -130,8 +128,8 @@ class ClassicalLimit:
         first, second = np.abs(self.a / t), np.abs((self.b - self.a**2 / 2) / t**2)
         high, middle = self.theta_k
         asymmetry = self.asymmetry_k
-        of_asymmetry = high * asymmetry * (high + asymmetry) / 40 + asymmetry**3 / 400
-        cubic = first**3 + first * second + (middle**3 / 100 + of_asymmetry) / t**3
+        asymmetric_part = high * asymmetry * (high + asymmetry) / 40 + asymmetry**3 / 400
+        cubic = first**3 + first * second + (middle**3 / 100 + asymmetric_part) / t**3
         cubed, mixed = np.abs(self.f) * t**3, 4 * first * np.abs(self.d * t)
         exponent = math.pi**2 * t / (self.period**2 * max(high, 1e-300))
         repeats = 10 * np.sqrt(1 + t / max(high, 1e-300)) * np.exp(-np.minimum(exponent, 700.0))
@@ -146,7 +144,7 @@ class ClassicalLimit:
 
 
 def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLimit:
-    """The classical limit of a top: of all its levels, or of those that a species has, whose weights are given.
+    """The classical limit of a top for all its levels, or for the species with the given spin weights.
 
     >>> from rotor.tops.top import Top
     >>> limit = classical_limit(Top.from_constants("B=57635.968 MHz"))
@@ -172,7 +170,7 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
 
 
 def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights]:
-    """The spin weights of each state (its own, or those of the top) without the classes that the species lacks."""
+    """The spin weights of each state (its own, or those of the top), with 0 for classes outside the species."""
     whole = weights or top.spin_weights
     if top.states is None:
         return [whole]
@@ -182,13 +180,13 @@ def _weights_by_state(top: Top, weights: SpinWeights | None) -> list[SpinWeights
         if weights_of_state is None
         else weights_of_state
         if weights is None
-        else of_species(weights_of_state, weights)
+        else weights_in_species(weights_of_state, weights)
         for weights_of_state in stated
     ]
 
 
 def _shares(top: Top, by_state: list[SpinWeights], mean: float) -> tuple[tuple[float, float], ...]:
-    """How much each state counts beside one of this mean weight, by its own and its A, B, C, and its energy over k in K."""
+    """For each state, its classical Q relative to a state of weight `mean` with the top's A, B, C; and its energy over k in K."""
     if top.states is None:
         return ((1.0, 0.0),)
     names = ("B", "B") if top.kind == "linear" else ("A", "B", "C")
@@ -226,7 +224,7 @@ def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | 
 def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | Floats:
     """Q in the classical limit, with the mean spin weight; about 1 % low for water at 300 K, worse when colder.
 
-    A number for a number, an array of the same shape for an array.
+    A scalar temperature gives a scalar, an array an array of the same shape.
 
     >>> from rotor.tops.top import Top
     >>> round(classical_partition_function(Top.from_constants("B=57635.968 MHz"), 300.0), 2)
@@ -237,10 +235,10 @@ def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | 
 
 
 def _stripp_kirkwood(a: float, b: float, c: float) -> tuple[float, float]:
-    """Both quantum corrections, in K and K²: sums over the exchanges of the axes, terms that coincide counted once."""
+    """Both quantum corrections, in K and K²: sums over permutations of the axes, equal terms counted once."""
     first = second = 0.0
     for x, y, z in permutations((a, b, c)):
-        first += (2 * x - x * y / z) / 2  # each of three terms comes twice
+        first += (2 * x - x * y / z) / 2  # the six permutations give each of three terms twice
         second += 5 * x**2 + 6 * x * y - 12 * x**2 * y / z + 3.5 * (x * y / z) ** 2
     return first / 12, second / 480
 
@@ -250,12 +248,12 @@ def _distortion(top: Top) -> tuple[float, float, float]:
     operators = centrifugal_operators(top.constants)
     if not operators:
         return 0.0, 0.0, 0.0
-    first = operators  # of a spherical top the tensor of fourth rank is 0 on average
+    first = operators  # the fourth-rank tensor of a spherical top averages to 0
     if top.kind == "spherical":
         first, _ = scalar_and_tensor(operators)
     nodes, vectors = np.linalg.eigh(
         np.diag(np.sqrt(np.arange(1.0, _NODES)), -1)
-    )  # Gauss and Hermite, as Golub and Welsch
+    )  # Gauss-Hermite nodes by the method of Golub and Welsch
     weight = np.array([math.prod(p) for p in product((vectors[0] ** 2).tolist(), repeat=3)])
     points = np.array(list(product(nodes.tolist(), repeat=3))).T * np.sqrt(_variances(top))[:, None]
     energies = [_classical_energy(first, order, *points) for order in (2, 3, 4)]
@@ -269,7 +267,7 @@ def _distortion(top: Top) -> tuple[float, float, float]:
 
 
 def _classical_energy(operators: Operators, order: int, x: Floats, y: Floats, z: Floats) -> Floats:
-    """The terms of one order in J², (points,) in MHz."""
+    """The terms of this order in J², (points,) in MHz."""
     terms = [c * _classical_operator(powers, x, y, z) for powers, c in operators.items() if sum(powers) == order]
     return np.sum(terms, axis=0) if terms else np.zeros(len(x))
 
@@ -277,8 +275,8 @@ def _classical_energy(operators: Operators, order: int, x: Floats, y: Floats, z:
 def _variances(top: Top) -> tuple[float, float, float]:
     """1/2A, 1/2B, 1/2C of the axes x, y, z of the operators, in 1/MHz: variances of J/ħ per MHz of kT/h."""
     names = REPRESENTATIONS.get(AXIAL_REPRESENTATION.get(top.kind) or str(top.constants.representation), "bca")
-    of_axis = dict(zip("abc", top.rotational_constants_mhz, strict=True))
-    x, y, z = (0.5 / of_axis[axis] for axis in names)
+    constant_of_axis = dict(zip("abc", top.rotational_constants_mhz, strict=True))
+    x, y, z = (0.5 / constant_of_axis[axis] for axis in names)
     return x, y, z
 
 

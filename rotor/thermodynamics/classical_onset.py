@@ -17,12 +17,11 @@ if TYPE_CHECKING:
 
 
 def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
-    """The highest temperature at which C_v of the rigid quantum top differs from its classical value by `tolerance` of it.
+    """The highest temperature at which C_v of the rigid quantum top differs from n R/2 by a fraction `tolerance`.
 
-    Above it the classical n R/2 is good to that; distortion, which both could have, is left out of both. The spin weights
-    count, all species in equilibrium. Looked for at 40 temperatures a decade from 0.01 to 10 times the largest finite Θ,
-    higher where it differs there, and then between two of them to 1e-6. ValueError where no sum reaches so far. A linear
-    molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
+    Distortion is neglected in both; spin weights count, with all species in equilibrium. The search covers 40 temperatures per
+    decade from 0.01 to 10 times the largest finite Θ (higher if C_v still differs there) and is refined to 1e-6. For a linear
+    molecule C_v/R = 1 + (Θ/T)²/45 + ... differs by 1 % at 1.93 Θ. Raises ValueError if no sum over levels reaches that temperature.
 
     >>> from rotor.tops.top import Top
     >>> round(classical_above_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
@@ -39,7 +38,7 @@ def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
 
     grid = theta * np.logspace(-2, 1, 121)
     apart = beyond(grid)
-    while apart[-20:].any():  # half a decade without a difference is the end
+    while apart[-20:].any():  # stop after half a decade without a difference
         higher = grid[-1] * np.logspace(0.025, 0.5, 20)
         grid, apart = np.append(grid, higher), np.append(apart, beyond(higher))
     last = np.flatnonzero(apart)[-1]
@@ -50,7 +49,7 @@ def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
 
 
 def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
-    """The same; None where no sum over levels reaches so far."""
+    """`classical_above_k`, or None if no sum over levels reaches that temperature."""
     try:
         return classical_above_k(top, tolerance)
     except OutOfReachError:
@@ -58,7 +57,7 @@ def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
 
 
 def _rigid(top: Top) -> Top:
-    """This top without distortion."""
+    """The top without distortion."""
     from rotor.tops.top import Top, constants_of_moments
 
     constants = constants_of_moments(top.moments_u_angstrom2, top.kind)

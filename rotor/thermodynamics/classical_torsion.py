@@ -1,16 +1,16 @@
-"""A classical gas of molecules whose top turns against a potential: passages over the barrier, and equipartition where it holds.
+"""A classical gas of molecules with hindered internal rotation: barrier crossings and equipartition.
 
-Molecules are drawn from exp(-H/kT) and moved by `rotor.classical.internal_rotor`: whole rotation and torsion together. In equilibrium α' is
-Gaussian with the variance kT/I_red at every α, so that a molecule passes the maxima α* of V, in either direction, at the rate
+Molecules are drawn from exp(-H/kT) and propagated by `rotor.classical.internal_rotor`, with overall rotation and torsion coupled. In
+equilibrium α' is Gaussian with variance kT/I_red at any α, so that a molecule crosses the maxima α* of V, in either direction, at the rate
 
     k = √(2kT/π I_red) Σ_α* exp(-V(α*)/kT) / ∮ exp(-V/kT) dα,
 
-the flux of transition-state theory; here returns count as passages. ⟨p ∂H/∂p⟩ = kT and ⟨L·ω⟩ = 3kT hold at any barrier (equipartition of
-momenta); ⟨V⟩ is ½kT in a harmonic well alone, and otherwise the quadrature ∮ V exp(-V/kT) dα / ∮ exp(-V/kT) dα. Computed are tops whose
-turning leaves the moments as they are (threefold and more). Energies are in u Å²/ps², times in ps.
+the flux of transition-state theory; recrossings count as passages. ⟨p ∂H/∂p⟩ = kT and ⟨L·ω⟩ = 3kT hold for any barrier (equipartition
+of momenta); ⟨V⟩ is ½kT only in a harmonic well, and in general ∮ V exp(-V/kT) dα / ∮ exp(-V/kT) dα. Only tops whose rotation does not
+change the moments of inertia (threefold axis or higher) are computed. Energies are in u Å²/ps², times in ps.
 
 The step is symplectic and conserves an energy H' near H. With R the largest |H(t) - H(0)| of a molecule in kT, exp(-H/kT) and exp(-H'/kT)
-differ by factors within exp(±R), and so does each rate from that of H' at both ends: the step changes k by less than k (exp(2R) - 1).
+differ by a factor within exp(±R), in the numerator and in the denominator of k: the step changes k by less than k (exp(2R) - 1).
 Quantum mechanics changes it by κ = 1 + (ħω*/kT)²/24 + ..., ω*² = -V''(α*)/I_red (E. Wigner, 1932, as in the documentation of RMG-Py,
 rmgpy.kinetics.Wigner).
 """
@@ -38,13 +38,13 @@ ENERGY_PER_MHZ = units.PLANCK_J_S * 1e6 / (units.ATOMIC_MASS_KG * 1e4)  # u Å²
 ENERGY_PER_K = units.BOLTZMANN_J_PER_K / (units.ATOMIC_MASS_KG * 1e4)
 HBAR = ENERGY_PER_MHZ * 1e6 / (2 * math.pi)  # u Å²/ps
 ROWS = 50  # times of the table
-STEP = 0.15  # of the fastest angular frequency, radian
-SYMMETRIC = 0.02  # largest change of the kinetic energy with the angle, of the moment of the top: hydrogens off a threefold axis make 0.01
+STEP = 0.15  # phase of the fastest angular frequency per step, radian
+SYMMETRIC = 0.02  # largest change of the moments over the moment of the top; distorted methyl groups give 0.01
 ANGLES = 2 * np.pi * np.arange(4096) / 4096
 
 
 class Mean(NamedTuple):
-    """A mean over molecules and time, and its standard error from the means of the molecules."""
+    """A mean over molecules and time, and its standard error from the spread of the molecular means."""
 
     value: float
     error: float
@@ -52,10 +52,10 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClassicalTorsion(Table):
-    """The gas at times: energy and potential a molecule (cm⁻¹), and all passages a molecule so far.
+    """The gas at several times: energy and potential per molecule (cm⁻¹), and cumulative passages per molecule.
 
-    rate: passages a molecule and ps; its error is that of the mean over molecules, as one above the barrier passes it often. expected_rate:
-    of the equilibrium flux. equipartition: means in kT. momentum_error: largest change of L in space, in units of its root mean square.
+    rate: passages per molecule and ps; its error is from the spread over molecules, because the passages of one molecule are correlated.
+    expected_rate: equilibrium flux. equipartition: means in kT. momentum_error: largest change of L in space, relative to its rms.
     largest_energy_error_kt: largest change of the energy of a molecule. tunnelling: κ - 1.
     """
 
@@ -76,7 +76,7 @@ class ClassicalTorsion(Table):
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the rate of passages can be trusted."""
+        """Error budget of the rate of passages."""
         rate = self.expected_rate
         return ErrorBudget(
             "passages",
@@ -97,7 +97,7 @@ class ClassicalTorsion(Table):
 
     @property
     def energy_error(self) -> float:
-        """Largest change of the mean energy, of kT."""
+        """Largest change of the mean energy, relative to kT."""
         kt_cm = self.temperature_k * units.MHZ_PER_K / units.MHZ_PER_CM
         return float(np.abs(self.energy_cm - self.energy_cm[0]).max()) / kt_cm
 
@@ -114,7 +114,7 @@ class ClassicalTorsion(Table):
 
 
 def refuse_changing_moments(rotation: BondRotation) -> None:
-    """ValueError for a part whose turning changes the moments."""
+    """Raise ValueError for a turning group whose rotation changes the moments of inertia."""
     positions, kinetic = rotation.molecule.positions_angstrom, rotation.kinetic_matrix()
     turned = [rotation.kinetic_matrix(rotation.turned_positions(positions, angle)) for angle in (0.7, 1.9, 3.6)]
     change = max(float(np.abs(matrix - kinetic).max()) for matrix in turned) / float(kinetic[3, 3])
@@ -149,13 +149,13 @@ def passage_rate(body: TurningTop, kt: float) -> float:
 
 
 def _maxima(body: TurningTop) -> Floats:
-    """Angles of the maxima of V in a turn; to the grid, which changes V there by 1e-6 of itself."""
+    """Angles of the maxima of V in one turn, on a grid fine enough for a relative error of V of 1e-6."""
     values = body.potential(ANGLES)
     return ANGLES[(values > np.roll(values, 1)) & (values >= np.roll(values, -1))]
 
 
 def _tunnelling(body: TurningTop, kt: float) -> float:
-    """κ - 1 = (ħω*/kT)²/24, the mean over the maxima of V by their share of the flux."""
+    """κ - 1 = (ħω*/kT)²/24, averaged over the maxima of V, weighted by their share of the flux."""
     angles = _maxima(body)
     curvature = (body.torque(angles + 1e-4) - body.torque(angles - 1e-4)) / 2e-4  # -V'': to 1e-7 of itself
     return float(
@@ -177,7 +177,7 @@ def _wells_below(angle: Floats, maxima: Floats) -> Floats:
 
 
 def _step(body: TurningTop, kt: float) -> float:
-    """STEP over the fastest of the torsion in its well, the turning of the top and the rotation."""
+    """The time step: STEP over the fastest of torsion in its well, rotation of the top and overall rotation."""
     stiffest = float(np.abs(np.gradient(body.torque(ANGLES), ANGLES)).max())
     squares = (stiffest / body.reduced_moment, 4 * kt / body.reduced_moment, 4 * kt / float(body.rest_moments[0]))
     return STEP / math.sqrt(max(squares))
@@ -186,7 +186,7 @@ def _step(body: TurningTop, kt: float) -> float:
 def classical_torsion(
     body: TurningTop, temperature_k: float, duration_ps: float, molecules: int, seed: int
 ) -> ClassicalTorsion:
-    """Draw and move a gas.
+    """Sample a gas at a temperature and propagate it.
 
     Parameters
     ----------
@@ -194,9 +194,9 @@ def classical_torsion(
         u, Å, ps, as `turning_top` makes it.
     temperature_k, duration_ps : float
     molecules : int
-        How many are drawn.
+        Sample size.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Returns
     -------

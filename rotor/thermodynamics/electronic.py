@@ -2,9 +2,9 @@
 
     q = Σ g exp(-E/kT),     g = 2S + 1 for the spin, times 2 where Λ is not 0
 
-(G. Herzberg, Molecular Spectra and Molecular Structure I, chapter VIII,2). A molecule with an odd number of electrons has S of ½ at least.
-Where constants of the electron spin are in the Hamiltonian, Q of rotation counts its functions with their splittings, and nothing is
-added here. Every state has the same rotational levels.
+(G. Herzberg, Molecular Spectra and Molecular Structure I, chapter VIII,2). A molecule with an odd number of electrons has S of at least ½.
+If the Hamiltonian contains constants of the electron spin, the rotational Q already counts the spin functions with their splittings, and
+nothing is added here. All states are given the same rotational levels.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _STATE = re.compile(
 
 @dataclass(frozen=True)
 class ElectronicStates:
-    """Degeneracies of electronic states and their energies above the lowest, which is first and has 0 (cm⁻¹).
+    """Degeneracies of electronic states and their energies (cm⁻¹) above the lowest, which comes first with energy 0.
 
-    source: where they are from.
+    source: origin of the data.
     """
 
     degeneracies: tuple[int, ...] = (1,)
@@ -95,7 +95,7 @@ class ElectronicStates:
 
 
 def electronic_states_of(molecule: Molecule | None) -> ElectronicStates:
-    """The spin degeneracy of a molecule: its multiplicity where it is known, 2 for an odd number of electrons, else 1."""
+    """The spin degeneracy of a molecule: its multiplicity if known, otherwise 2 for an odd number of electrons and 1 for an even."""
     if molecule is None:
         return ElectronicStates()
     if molecule.multiplicity is not None:

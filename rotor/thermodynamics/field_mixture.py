@@ -1,8 +1,8 @@
 """Thermal mixtures of states in a static field: populations, mean orientation and alignment, mean dipole along the field.
 
-Two mixtures are meant: that of a gas in equilibrium in the field, and that of a beam that came out of equilibrium without field and
-went into it adiabatically, each state with the population of its free level. In equilibrium the mean dipole is kT ∂lnQ/∂E; far above
-the energies of the rotor it is the function of Langevin, coth x - 1/x of x = μE/kT.
+Two mixtures are available: a gas in equilibrium in the field, and a beam that was in equilibrium without field and entered the field
+adiabatically, so that each state has the population of its free level. In equilibrium the mean dipole is kT ∂lnQ/∂E; for kT far above
+the rotational energies it approaches μ times the Langevin function, coth x - 1/x with x = μE/kT.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ MOST_J = 60
 
 
 class Populations(NamedTuple):
-    """of_block: population of one state, for each block (fields, states). q: at each field, from the lowest free level (fields,)."""
+    """by_block: populations of single states, (fields, states) for each block. q: Q at each field (fields,), from the lowest free level."""
 
-    of_block: list[Floats]
+    by_block: list[Floats]
     q: Floats
 
 
@@ -48,7 +48,7 @@ def populations_in_field(
     populations: str,
     effects: Sequence[QuantumEffect] = (),
 ) -> Populations:
-    """Populations of the states of blocks that hold every M.
+    """Populations of the states of blocks that together contain all M.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ def populations_in_field(
     solved : sequence of BlockStates
         Energies (f, states) in MHz of each block at the same fields.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     populations : str
-        "adiabatic": each state has the population of the level it comes from; else equilibrium in the field.
+        "adiabatic": each state has the population of its free level; otherwise equilibrium in the field.
     effects : sequence of QuantumEffect, optional
         The Hamiltonian of a top with spins.
 
@@ -70,8 +70,8 @@ def populations_in_field(
 
     Notes
     -----
-    In equilibrium Q is that of the free top and what the states given differ by in the field. Neglected: those above
-    them are shifted by amounts whose sum over M is 0 to second order.
+    In equilibrium Q is that of the free top plus the change of the given states in the field. The shifts of higher states are
+    neglected; their sum over M is 0 to second order.
     """
     kt = temperature_k * MHZ_PER_K
     ground = lowest_level_k(top, [top.spin_weights])[0] * MHZ_PER_K
@@ -96,10 +96,10 @@ def populations_in_field(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldMixture(Table):
-    """Means of a thermal mixture against the field.
+    """Means of a thermal mixture as functions of the field.
 
     field_kv_per_cm: (n,). energy_mhz: above the lowest free level. mu_eff_debye: mean dipole along the field. cosines: by name (n,).
-    left_out: population above the states that were followed, which counts as isotropic. states: all states, copies apart.
+    left_out: population above the states in the map, taken as isotropic. states: number of states, degenerate copies included.
     """
 
     temperature_k: float
@@ -152,19 +152,19 @@ def field_mixture(
     top : Top
         With `dipole_abc_debye`.
     fields_kv_per_cm : (n,)
-        Each once, in rising order.
+        Fields, strictly increasing.
     temperature_k : float
-        Of the mixture.
+        Temperature of the mixture.
     populations : str
-        "equilibrium" in the field, or "adiabatic": of the free top, each state followed into the field.
+        "equilibrium" in the field, or "adiabatic": populations of the free top, carried into the field.
     left_out : float
-        Population of the free top that may lie above the J that are followed.
+        Population of the free top that may lie above the highest J of the map.
     intensity_w_per_cm2, direction : optional
         As in `stark_map`.
     tolerance_mhz : float
-        Of energies.
+        Tolerance of the energies.
     executor : Executor, optional
-        Blocks are spread over it.
+        Runs the blocks in parallel.
 
     Returns
     -------
@@ -173,11 +173,11 @@ def field_mixture(
     Raises
     ------
     ValueError
-        As `stark_map`; where states above J = 60 would have to be followed.
+        As `stark_map`; and if states above J = 60 would be needed.
 
     Notes
     -----
-    What is left out counts as isotropic, with the energy of the free top neglected.
+    The population above the map is taken as isotropic; its energy is neglected.
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
@@ -202,7 +202,7 @@ def field_mixture(
 
 
 def _followed_j(top: Top, temperature_k: float, left_out: float) -> tuple[int, float, float]:
-    """The J above which less than `left_out` of the population of the free top lies; Q; and the lowest energy in MHz."""
+    """The J that leaves less than `left_out` of the population of the free top above it; Q; the lowest energy in MHz."""
     from rotor.quantum.solve import solve_levels
 
     q = partition_function(top, temperature_k).q
@@ -219,8 +219,10 @@ def _followed_j(top: Top, temperature_k: float, left_out: float) -> tuple[int, f
     return int(enough[0]), float(q), float(ground)
 
 
-def _means(states: FieldMap, temperature_k: float, populations: str, known: tuple[int, float, float]) -> FieldMixture:
-    j, q_free, ground = known
+def _means(
+    states: FieldMap, temperature_k: float, populations: str, free_top: tuple[int, float, float]
+) -> FieldMixture:
+    j, q_free, ground = free_top
     kt, count = temperature_k * MHZ_PER_K, len(states.fields)
     shape = (-1, count)
     energy, copies = states.energy_mhz.reshape(shape), states.copies.reshape(shape)

@@ -1,19 +1,19 @@
 """Thermodynamic functions of a gas of tops: rotation by the quantum sum and classically, vibration, and the ideal gas.
 
-Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest existing
-level of the molecule, for all species, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
+Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies of all species count from the
+lowest existing level of the molecule, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
 
-Species that are frozen in a ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), whose last
-part is the entropy of mixing. `normal` is the ratio of high temperature, where species are as frequent as their spin
-functions: 3:1 of ortho and para hydrogen. `equilibrium` is the sum over all levels at every temperature.
+Species with a frozen ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), which contains the entropy of
+mixing. `normal` is the high-temperature ratio, given by the numbers of spin functions: 3:1 for ortho and para hydrogen.
+`equilibrium` is the sum over all levels at each temperature.
 
 The ideal gas has translation too (O. Sackur and H. Tetrode 1911-12; Mayer and Mayer, chapter 5),
 
     S_tr = R ln[(2πmkT/h²)^(3/2) kT/p] + 5R/2,    H - H(0) = U_rot + U_vib + 5RT/2,    C_p = C_rot + C_vib + 5R/2,
 
-and leaves R ln of the number of nuclear-spin functions out of S and of -(G - H(0))/T, as published tables do. Electronic states, the
-functions of the spin of a radical among them, count in the gas (`rotor.thermodynamics.electronic`). Neglected: that rotational
-constants differ between vibrational and electronic states, and forces between molecules.
+S and -(G - H(0))/T omit R ln of the number of nuclear-spin functions, as published tables do. Electronic states, including the spin
+functions of a radical, count in the ideal gas (`rotor.thermodynamics.electronic`). Neglected: differences of the rotational
+constants between vibrational and electronic states, and forces between molecules.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ GAS_CONSTANT = units.BOLTZMANN_J_PER_K * units.AVOGADRO_PER_MOL  # J/(mol K), ex
 
 @dataclass(frozen=True)
 class IdealGas:
-    """What translation and vibration make of the rotational functions, at one pressure.
+    """Functions of the ideal gas at one pressure: rotation with vibration, translation and electronic states.
 
-    cp_j_per_mol_k, entropy_j_per_mol_k, enthalpy_j_per_mol (H - H(0)), gibbs_j_per_mol_k (-(G - H(0))/T): (n,); nuclear
-    spin is left out of the last and of the entropy. electronic: the electronic states that count.
+    cp_j_per_mol_k, entropy_j_per_mol_k, enthalpy_j_per_mol (H - H(0)), gibbs_j_per_mol_k (-(G - H(0))/T): (n,); entropy and
+    gibbs omit nuclear spin. electronic: the electronic states that count.
     """
 
     pressure_bar: float
@@ -64,17 +64,15 @@ class IdealGas:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ThermoFunctions(Table):
-    """Thermodynamic functions of a top at n temperatures; every array is (n,).
+    """Thermodynamic functions of a top at n temperatures; all arrays are (n,).
 
-    species: what it is a gas of. fractions: how the species are mixed, empty unless frozen. symmetry_number, spin_factor: how
-    many rotations and how many nuclear-spin functions the classical q = spin_factor/symmetry_number · ... counts; the second
-    is of weights divided by their common divisor. q_rot, energy_j_per_mol, entropy_j_per_mol_k, cv_over_r: the quantum
-    sum. q_rot_classical, cv_over_r_classical: the classical limit. q_rot_corrected, cv_over_r_corrected: that with its
-    first quantum corrections and distortion, from the lowest level as q_rot, NaN where these are large.
-    jmax, relative_error: of the sums (-1 where the
-    classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
-    vibrational states are given. gas: with translation. hyperfine: how
-    spins were counted, by the keys of docs/verbs; None without spins.
+    species: the species of the gas. fractions: frozen ratio of the species; empty in equilibrium. symmetry_number, spin_factor: numbers
+    of rotations and of nuclear-spin functions in the classical q = spin_factor/symmetry_number · ...; a common divisor of the weights is
+    removed. q_rot, energy_j_per_mol, entropy_j_per_mol_k, cv_over_r: quantum sum. q_rot_classical, cv_over_r_classical: classical limit.
+    q_rot_corrected, cv_over_r_corrected: classical limit with quantum corrections and distortion, from the lowest level as q_rot; NaN if
+    the corrections are large. jmax: last J of the sums, -1 for the corrected classical limit. relative_error: the largest of Q, U and C_v.
+    vibrations, q_vib, cv_vib_over_r: None without vibrational states. gas: the ideal gas, None without pressure. hyperfine: treatment of
+    spins, by the keys of docs/verbs; None without spins.
     """
 
     top: Top
@@ -104,7 +102,7 @@ class ThermoFunctions(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the functions were made from: the top and its sources, species, vibration, pressure, errors of the sums."""
+        """Inputs of the functions: the top and its sources, species, vibration, pressure, and the errors of the sums."""
         return (
             self.top.provenance
             | {
@@ -125,7 +123,7 @@ class ThermoFunctions(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The functions by name, those of vibration and of the gas only where there are some."""
+        """The functions by name; those of vibration and of the ideal gas only if computed."""
         names = (
             "temperature_k", "q_rot", "q_rot_classical", "q_rot_corrected", "energy_j_per_mol", "entropy_j_per_mol_k",
             "cv_over_r", "cv_over_r_classical", "cv_over_r_corrected",
@@ -134,20 +132,20 @@ class ThermoFunctions(Table):
         if self.q_vib is not None and self.cv_vib_over_r is not None:
             out |= {"q_vib": self.q_vib, "cv_vib_over_r": self.cv_vib_over_r}
         if self.gas is not None:
-            of_gas = ("cp_j_per_mol_k", "entropy_j_per_mol_k", "enthalpy_j_per_mol", "gibbs_j_per_mol_k")
-            out |= {f"gas_{name}": getattr(self.gas, name) for name in of_gas}
+            names_of_gas = ("cp_j_per_mol_k", "entropy_j_per_mol_k", "enthalpy_j_per_mol", "gibbs_j_per_mol_k")
+            out |= {f"gas_{name}": getattr(self.gas, name) for name in names_of_gas}
         return out
 
 
 def species_names(top: Top) -> list[str]:
-    """What `thermodynamic_functions` takes as species of this top.
+    """The values of `species` that `thermodynamic_functions` accepts for this top.
 
     >>> from rotor.tops.top import Top
     >>> species_names(Top.from_constants("B=60 cm-1", spin_weights={"even": 1, "odd": 3}))
     ['equilibrium', 'normal', 'para', 'ortho']
     """
-    known = list(spin_species(top.spin_weights))
-    return ["equilibrium"] if known == ["all"] else ["equilibrium", "normal", *known]
+    names = list(spin_species(top.spin_weights))
+    return ["equilibrium"] if names == ["all"] else ["equilibrium", "normal", *names]
 
 
 def thermodynamic_functions(
@@ -171,13 +169,13 @@ def thermodynamic_functions(
     species : "equilibrium", "normal" (frozen in the ratio of high temperature), or one nuclear-spin species: "para",
         "ortho", or a class of the spin weights such as "E"; see `species_names`.
     vibrations : vibrational states; none: vibration is left out.
-    pressure_bar : of an ideal gas, whose functions are then given too; the top must have a mass.
-    electronic : electronic states of the ideal gas; by default the spin functions of the molecule (`electronic_states_of`), or none
-        where the effects have the spin of electrons, whose functions Q counts then.
-    relative_error : of Q, U and C_v, asked; larger, up to 10 %, where levels count that the distortion constants do not
-        serve: `ThermoFunctions.relative_error` says what was reached.
-    progress : called as `progress(j, last)` as a long sum goes on.
-    effects : what the Hamiltonian consists of; with spins Q counts their functions, see `rotor.thermodynamics.spin_sums`.
+    pressure_bar : pressure of an ideal gas, whose functions are then computed too; the top must have a mass.
+    electronic : electronic states of the ideal gas. Default: the spin functions of the molecule (`electronic_states_of`), or none if
+        the effects contain the electron spin, because Q then counts its functions.
+    relative_error : largest error of Q, U and C_v. It can be exceeded, up to 10 %, if levels beyond the range of the distortion
+        constants are populated; `ThermoFunctions.relative_error` is the error reached.
+    progress : called as `progress(j, last)` during a long sum.
+    effects : effects in the Hamiltonian; with spins Q counts their functions, see `rotor.thermodynamics.spin_sums`.
 
     Returns
     -------
@@ -186,13 +184,13 @@ def thermodynamic_functions(
     Raises
     ------
     ValueError
-        A temperature not above 0 K, a species that the molecule has not, no mass; distortion beyond its reach.
+        A temperature not above 0 K, a species that the molecule does not have, no mass, levels beyond the range of the distortion.
 
     Examples
     --------
     >>> from rotor.tops.top import Top
-    >>> found = thermodynamic_functions(Top.from_constants("B=10 cm-1"), [5.0, 300.0])
-    >>> [round(float(x), 4) for x in found.cv_over_r]  # 3x² e⁻ˣ/(1 + 3e⁻ˣ)², x = 2Θ/T; 1 + (Θ/T)²/45
+    >>> functions = thermodynamic_functions(Top.from_constants("B=10 cm-1"), [5.0, 300.0])
+    >>> [round(float(x), 4) for x in functions.cv_over_r]  # 3x² e⁻ˣ/(1 + 3e⁻ˣ)², x = 2Θ/T; 1 + (Θ/T)²/45
     [0.3088, 1.0001]
     """
     parts, fractions = _parts(top, species)
@@ -212,26 +210,26 @@ def thermodynamic_functions(
 
 def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, float]]:
     """The spin weights of each species in the gas, and the fractions in which they are frozen, if they are."""
-    known = spin_species(top.spin_weights)
+    weights_by_species = spin_species(top.spin_weights)
     if species == "equilibrium":
         return {species: top.spin_weights}, {}
-    if known.keys() == {"all"}:
+    if weights_by_species.keys() == {"all"}:
         raise ValueError(f"species {species!r}: all levels of {top.name or 'this top'} are of one nuclear-spin species")
     if species == "normal":
-        means = {name: weights.mean for name, weights in known.items()}
-        return known, {name: mean / sum(means.values()) for name, mean in means.items()}
-    if species not in known:
+        means = {name: weights.mean for name, weights in weights_by_species.items()}
+        return weights_by_species, {name: mean / sum(means.values()) for name, mean in means.items()}
+    if species not in weights_by_species:
         raise ValueError(f"species {species!r}: {top.name or 'this top'} has {', '.join(species_names(top))}")
-    return {species: known[species]}, {}
+    return {species: weights_by_species[species]}, {}
 
 
 def _tunnelling_components(top: Top) -> int:
-    """States that the spin weights of the geometry take together: they are what tunnelling between equivalent forms makes of one."""
+    """Number of tunnelling components (states split by tunnelling between equivalent forms) that share the spin weights of the geometry."""
     return len(top.states.weights) if top.states is not None and 0 in top.states.weights else 1
 
 
 def refuse_species_of_totals(top: Top, species: str, effects: Sequence[QuantumEffect]) -> None:
-    """ValueError for a single species, or a frozen mixture, of a top with nuclei that are coupled to a total spin."""
+    """Raise ValueError for a single species or a frozen mixture if nuclei are coupled to a total spin."""
     if species != "equilibrium" and any(spin.total for effect in effects for spin in effect.spins(top)):
         raise ValueError(
             f"species: {species!r}: with nuclei that are coupled to a total spin species are not separated; expected equilibrium"
@@ -243,7 +241,7 @@ def _has_electrons(top: Top, effects: Sequence[QuantumEffect]) -> bool:
 
 
 def refuse_electrons_twice(top: Top, effects: Sequence[QuantumEffect], electronic: ElectronicStates | None) -> None:
-    """ValueError for electronic states beside effects that have the spin of electrons, whose functions Q counts."""
+    """Raise ValueError for electronic states together with effects of the electron spin: Q would count its functions twice."""
     if electronic is not None and _has_electrons(top, effects):
         raise ValueError(
             "electronic: the constants of the electron spin make Q count its functions already; leave one of the two out"
@@ -286,7 +284,7 @@ def _rotation(
     sums: list[LevelSums],
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
 ) -> ThermoFunctions:
-    """The functions of rotation alone, with the functions of spins where the effects have some."""
+    """The functions of rotation, including spins if the effects contain them."""
     from rotor.thermodynamics.spin_factor import spin_functions
 
     ground_k, temperatures = lowest_level_k(top, [top.spin_weights], effects)[0], sums[0].temperatures_k
@@ -297,7 +295,7 @@ def _rotation(
     means = np.array([classical_limit(top, weights).mean_weight for weights in parts.values()])
     mean_weight = float(np.exp(shares @ np.log(means / shares)))
     limit = replace(limit, mean_weight=mean_weight * spin_functions(top, effects))
-    of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
+    nuclear_weight = mean_weight * spin_functions(top, effects, electrons=False)
     corrected_q, _, corrected_cv = limit.corrected(temperatures)
     above = np.where(np.isfinite(corrected_q), ground_k / temperatures, 0.0)
     symmetry_number = top.symmetry.symmetry_number if top.symmetry else implied_symmetry_number(top.spin_weights)
@@ -306,7 +304,7 @@ def _rotation(
         species=species,
         fractions=fractions,
         symmetry_number=symmetry_number,
-        spin_factor=of_nuclei * symmetry_number * _tunnelling_components(top),
+        spin_factor=nuclear_weight * symmetry_number * _tunnelling_components(top),
         temperature_k=temperatures,
         q_rot=np.exp(ln_q),
         q_rot_classical=limit.q(temperatures),
@@ -322,7 +320,7 @@ def _rotation(
 
 
 def _mixed(sums: Sequence[LevelSums], ground_k: float, shares: Floats) -> tuple[Floats, Floats, Floats]:
-    """ln q = Σ x ln(q/x), U/RT and C_v/R of species mixed in fixed shares, energies from a common zero in K."""
+    """ln q = Σ x ln(q/x), U/RT and C_v/R of species in a fixed ratio; energies (K) from a common zero."""
     ln_q, mean, cv = 0.0, 0.0, 0.0
     for total, share in zip(sums, shares.tolist(), strict=True):
         above = (total.ground_k - ground_k) / total.temperatures_k

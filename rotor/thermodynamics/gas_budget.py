@@ -1,8 +1,8 @@
-"""Error budget of a classical gas (`rotor.requests.budget`): of C1 and C2 where there are times, else of the temperature.
+"""Error budget of a classical gas (`rotor.requests.budget`): of C1 and C2 if the request has times, otherwise of the temperature.
 
-The kinetic energy of f N independent degrees of freedom has the relative variance 2/(f N), and the temperature that it shows with it. Free
-motion is exact at any time: an attitude is rounded as `rotor.classical.free.budget` states, with times converted from ps, and C1 and C2,
-of slope 1 and 3/2 at most in that angle, by no more than twice as much.
+The kinetic energy of f N independent degrees of freedom, and so the kinetic temperature, has a relative variance of 2/(f N). Free motion
+is exact at any time. The rounding error of an attitude is that of `rotor.classical.free.budget`; C1 and C2 have slopes of at most 1 and
+3/2 in that angle, so their error is at most twice as large.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rotor.classical.free.budget import attitude_rounding
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 EXACT_MOTION = ErrorTerm(0.0, "free motion in closed form")
-FASTEST = 6.0  # of the root mean square rate: 1 of 1e8 molecules turns faster about an axis
+FASTEST = 6.0  # times the rms rate: 1 of 1e8 molecules rotates faster about an axis
 LEFT_OUT = ErrorTerm(None, "a classical gas without collisions and vibrations", "the quantum calculation")
 
 

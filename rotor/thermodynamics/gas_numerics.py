@@ -1,4 +1,4 @@
-"""Accuracy and plan of a classical gas: how many molecules; their motion is exact.
+"""Accuracy and plan of a classical gas: the number of molecules. Their motion is exact.
 
 | accuracy of | molecules | error stated |
 |---|---|---|
@@ -8,8 +8,8 @@
 
 The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
 kurtosis κ = 12/f. For N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
-two-sided quantile of the confidence of the scene. What a gas of rigid classical molecules leaves out are parts of Q: a/T and d T of ln Q
-(`rotor.thermodynamics.classical_limit`).
+two-sided quantile of the confidence of the scene. The effects neglected by rigid classical molecules are stated as the terms a/T and d T
+of ln Q (`rotor.thermodynamics.classical_limit`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOLECULES = (100, 300, 1_000, 3_000, 10_000)
 SEEDS = 8  # gases whose errors are averaged
 MOST_IN_REFERENCE = 200_000
 SHORT_GAS = (500, 2000)  # of the calibration
-BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
+BYTES_A_MOLECULE = 136  # momentum, attitude, position, velocity and energies stored per molecule
 
 
 def quantile(confidence: float) -> float:
@@ -49,7 +49,7 @@ def quantile(confidence: float) -> float:
 
 
 def degrees_of(request: GasRequest) -> int:
-    """Degrees of freedom of one molecule whose energy is drawn; bare constants have no translation."""
+    """Degrees of freedom of one molecule; bare constants have no mass and hence no translation."""
     from rotor.statistics.degrees_of_freedom import count_degrees
 
     degrees = count_degrees([request.top.moments_u_angstrom2])
@@ -57,7 +57,7 @@ def degrees_of(request: GasRequest) -> int:
 
 
 def relative_spread(unit: str, degrees: int) -> float:
-    """Standard error times √N of the temperature ("K") or of the heat capacity ("%"), as a part of it.
+    """Relative standard error times √N of the temperature ("K") or of the heat capacity ("%").
 
     >>> relative_spread("K", 6), relative_spread("%", 6)
     (0.5773502691896257, 2.0)
@@ -66,7 +66,7 @@ def relative_spread(unit: str, degrees: int) -> float:
 
 
 def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
-    """The request with as many molecules as an accuracy in K of the temperature, % of the heat capacity, or of C1 and C2 needs."""
+    """The request with enough molecules for an accuracy of the temperature (K), of the heat capacity (%), or of C1 and C2."""
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
     refuse_set(request, "molecules")
@@ -81,7 +81,7 @@ def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
 
 
 def _spread(request: GasRequest, allowed: float, unit: str) -> float:
-    """Standard error times √N in the unit of the accuracy."""
+    """Standard error times √N, in the unit of the accuracy."""
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
         return scale * relative_spread(unit, degrees_of(request))
@@ -92,7 +92,9 @@ def _spread(request: GasRequest, allowed: float, unit: str) -> float:
     from rotor.thermodynamics.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
-    return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)  # the spread itself is known to some percent
+    return (
+        1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)
+    )  # margin: the spread itself has an error of a few percent
 
 
 def _largest_error(answer: GasAnswer) -> float:
@@ -103,7 +105,7 @@ def _largest_error(answer: GasAnswer) -> float:
 
 
 def error_of_gas(unit: str, answer: GasAnswer) -> float:
-    """Within what the result is, at the confidence asked for."""
+    """Half-width of the confidence interval of the result at the requested confidence."""
     request = answer.request
     z = quantile(request.confidence)
     if not unit:
@@ -113,7 +115,7 @@ def error_of_gas(unit: str, answer: GasAnswer) -> float:
 
 
 def sweeps_of_gas(request: Any) -> Sweeps:
-    """The number of molecules, whose error is statistical."""
+    """The sweep over the number of molecules, with its statistical error."""
     from rotor.thermodynamics.classical_gas import answer_gas
 
     def answers(varied: Any) -> list[Any]:
@@ -143,14 +145,14 @@ def _mean_square(errors: list[float]) -> float:
 
 
 def _temperature_error(answers: list[Any], _: Any) -> float:
-    """Root mean square error in K of the temperature that the kinetic energy of a gas has."""
+    """Rms error of the kinetic temperature in K."""
     return _mean_square(
         [_energies(answer).mean() / _degrees(answer) * 2 - answer.request.temperature_k for answer in answers]
     )
 
 
 def _heat_capacity_error(answers: list[Any], _: Any) -> float:
-    """Root mean square error in percent of C_v = var(E)/kT² of a molecule, f k/2 for f degrees of freedom."""
+    """Rms error in percent of C_v = var(E)/kT² per molecule; exact: f k/2 for f degrees of freedom."""
     return _mean_square(
         [
             100 * (_energies(answer).var() / (0.5 * _degrees(answer) * answer.request.temperature_k**2) - 1)
@@ -160,7 +162,7 @@ def _heat_capacity_error(answers: list[Any], _: Any) -> float:
 
 
 def _energies(answer: Any) -> Any:
-    """The kinetic energy over k of each molecule in K."""
+    """The kinetic energy of each molecule over k, in K."""
     from rotor import units
 
     return sum(answer.ensemble.kinetic.energies.values()) / units.EV_PER_K
@@ -176,7 +178,7 @@ def _curve_error(answer: Any, reference: Any) -> float:
 
 
 def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
-    """What a classical gas of rigid molecules leaves out, as parts of Q in percent, largest first."""
+    """Effects that a classical gas of rigid molecules neglects, in percent of Q, largest first."""
     from rotor.thermodynamics.classical_limit import classical_limit
 
     limit = classical_limit(top)

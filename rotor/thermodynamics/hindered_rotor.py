@@ -1,6 +1,6 @@
-"""Thermodynamic functions of the rotation about a bond: by the sum over its levels, and by the usual approximations.
+"""Thermodynamic functions of the rotation about a bond: from the sum over its levels, and from the usual approximations.
 
-Energies count from the foot of the potential, σ is the symmetry number of the rotation, x = V/kT, u = hν/kT of a well with energy V_i.
+Energies count from the minimum of the potential. σ is the symmetry number of the rotation, x = V/kT, u = hν/kT in a well of energy V_i.
 
 | method | Q |
 |---|---|
@@ -11,13 +11,13 @@ Energies count from the foot of the potential, σ is the symmetry number of the 
 | Pitzer-Gwinn | Q_classical · Q_harmonic/Q_classical harmonic, the latter with 1/u in place of the oscillator |
 | tanh | Q_harmonic · tanh(Q_classical free/Q_classical harmonic) |
 
-The classical Q is exact for a classical motion. The next one is that of K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, as
-the documentation of RMG-Py ("Torsional degrees of freedom") gives it: with the quantum correction of the harmonic wells. The last
-interpolates between the harmonic oscillator, where it is cold, and the free rotor, where it is hot. Unverified: the form is usually
+The classical Q is exact for classical motion. Pitzer-Gwinn (K. S. Pitzer and W. D. Gwinn, J. Chem. Phys. 10 (1942) 428, in the form of
+the documentation of RMG-Py, "Torsional degrees of freedom") multiplies it by the quantum correction of harmonic wells. The tanh form
+interpolates between the harmonic oscillator at low temperature and the free rotor at high temperature. Unverified: it is usually
 attributed to D. G. Truhlar, but no source was read; only its two limits are tested.
 
-From ln Q follow U/RT = d ln Q/d ln T, C_v/R = U/RT + d(U/RT)/d ln T and S/R = ln Q + U/RT. Spins of the nuclei are counted by σ alone:
-where kT is not above the splittings of the species, their weights would matter.
+From ln Q follow U/RT = d ln Q/d ln T, C_v/R = U/RT + d(U/RT)/d ln T and S/R = ln Q + U/RT. Nuclear spins enter through σ only; this is
+valid for kT above the splittings between the species.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from rotor.quantum.bond_torsion import BondTorsion, FourierSeries, no_terms
 from rotor.table import Table
 from rotor.thermodynamics.functions import GAS_CONSTANT
 
-HIGHEST_KT = 40.0  # levels up to so many kT: exp(-40) = 4e-18
+HIGHEST_KT = 40.0  # highest level in kT: exp(-40) = 4e-18
 METHODS = ("levels", "free rotor", "harmonic", "classical", "Pitzer-Gwinn", "tanh")
 
 
@@ -46,13 +46,13 @@ class LogPartition:
     cv: Floats
 
     def times(self, other: LogPartition, sign: float = 1.0) -> LogPartition:
-        """Sum of logarithms: of a product of partition functions, or with sign -1 of a ratio."""
+        """The product of two partition functions (sum of logarithms), or with sign -1 their ratio."""
         return LogPartition(self.ln_q + sign * other.ln_q, self.u + sign * other.u, self.cv + sign * other.cv)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HinderedRotorFunctions(Table):
-    """Functions by method and temperature; U counts from the foot of the potential, zero-point energy included."""
+    """Functions by method and temperature; U counts from the minimum of the potential and includes the zero-point energy."""
 
     method: NDArray[np.str_]
     temperature_k: Floats
@@ -74,7 +74,7 @@ class HinderedRotorFunctions(Table):
         }
 
     def of_method(self, name: str) -> HinderedRotorFunctions:
-        """The rows of one method."""
+        """The rows of a method."""
         rows = self.method == name
         return HinderedRotorFunctions(**{key: getattr(self, key)[rows] for key in self.__dataclass_fields__})
 
@@ -82,7 +82,7 @@ class HinderedRotorFunctions(Table):
 def hindered_rotor_functions(
     torsion: BondTorsion, temperatures_k: ArrayLike, symmetry_number: int
 ) -> HinderedRotorFunctions:
-    """Functions of one torsion by every method of METHODS.
+    """Functions of a torsion by all methods of METHODS.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def hindered_rotor_functions(
     Returns
     -------
     HinderedRotorFunctions
-        The methods one after the other, each at all temperatures; those with harmonic wells are missing where V has none.
+        Rows by method, each at all temperatures; without wells in V, the methods that need harmonic wells are missing.
 
     Raises
     ------
@@ -105,14 +105,14 @@ def hindered_rotor_functions(
 
     Notes
     -----
-    See the head of this module for the formulas, and for what is neglected.
+    Formulas and approximations are listed at the head of this module.
 
     Examples
     --------
     >>> from rotor.quantum.bond_torsion import FourierSeries, no_terms
     >>> methyl = BondTorsion(FourierSeries(160e3, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
-    >>> found = hindered_rotor_functions(methyl, [1000.0], 3)
-    >>> found.of_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
+    >>> functions = hindered_rotor_functions(methyl, [1000.0], 3)
+    >>> functions.of_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
     [0.5]
     """
     t = np.atleast_1d(np.asarray(temperatures_k, dtype=float))
@@ -148,7 +148,7 @@ def _table(t: Floats, parts: list[tuple[str, LogPartition]], symmetry_number: in
 
 
 def _weighted(ln_q: Floats, u: Floats, cv: Floats) -> LogPartition:
-    """A sum Q = Σ Q_i, of ln Q_i, U_i/RT and C_i/R (temperatures, parts)."""
+    """The sum Q = Σ Q_i from ln Q_i, U_i/RT and C_i/R (temperatures, parts)."""
     highest = ln_q.max(axis=1, keepdims=True)
     weights = np.exp(ln_q - highest)
     total = weights.sum(axis=1)
@@ -159,13 +159,13 @@ def _weighted(ln_q: Floats, u: Floats, cv: Floats) -> LogPartition:
 
 
 def _level_partition(energies: Floats, kt: Floats) -> LogPartition:
-    """Each level is a part with ln Q_i = -x and U_i/RT = x."""
+    """Q of the levels: each is a part with ln Q_i = -x and U_i/RT = x."""
     x = energies[None, :] / kt[:, None]
     return _weighted(-x, x, np.zeros_like(x))
 
 
 def _classical(torsion: BondTorsion, kt: Floats) -> LogPartition:
-    """Each angle is a part with √(πkT/F) exp(-x)/samples; the sum is the integral, to all orders of a periodic function."""
+    """Classical Q: each angle is a part with √(πkT/F) exp(-x)/samples; the sum converges exponentially for a periodic function."""
     _, f, v = torsion.sampled()
     x = v[None, :] / kt[:, None]
     ln_q = 0.5 * np.log(np.pi * kt[:, None] / f[None, :]) - x - np.log(len(f))
@@ -186,7 +186,7 @@ def _classical_harmonic(energies: Floats, quanta: Floats, kt: Floats) -> LogPart
 
 def _log_tanh(ratio: LogPartition) -> LogPartition:
     """ln tanh y and its derivatives: g = d ln y/d ln T, d ln tanh y/d ln T = g h, h = 2y/sinh 2y, dh/d ln T = g h (1 - 2y coth 2y)."""
-    double = 2 * np.exp(np.minimum(ratio.ln_q, 5.0))  # tanh of 148 is 1 to all digits, and so is what follows
+    double = 2 * np.exp(np.minimum(ratio.ln_q, 5.0))  # tanh is 1 to double precision here; the derivatives vanish too
     g, h = ratio.u, double / np.sinh(double)
     slope = (ratio.cv - ratio.u) * h + g * g * h * (1 - double / np.tanh(double))
     return LogPartition(np.log(np.tanh(double / 2)), g * h, g * h + slope)

@@ -1,4 +1,4 @@
-"""The request for the facts of a molecule as a top, and its answer: sizes of effects, Q(T), conformers."""
+"""Request and answer for the facts of a molecule as a top: sizes of effects, Q(T), conformers."""
 
 from __future__ import annotations
 
@@ -21,16 +21,26 @@ from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import top_facts
 from rotor.tops.top import Top
 
-TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
+TEMPERATURES_K = (
+    9.375,
+    18.75,
+    37.5,
+    75.0,
+    150.0,
+    225.0,
+    300.0,
+    500.0,
+    1000.0,
+)  # temperatures of the catalogues, and two more
 MOST_CONFORMERS, MOST_TEMPERATURES = 1000, 100_000
-ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
+ROOM_TEMPERATURE_K = 300.0  # effects are compared at the most populated J of this temperature
 
 
 @dataclass(frozen=True)
 class InfoRequest:
-    """What is computed of a top beside itself.
+    """Optional computations for a top.
 
-    top: the molecule. temperatures_k: of Q. conformers: how many geometries of a SMILES are tried; None: none. smiles: of them.
+    top: the molecule. temperatures_k: temperatures of Q. conformers: number of trial geometries of `smiles`; None: no search.
     """
 
     top: Top
@@ -54,13 +64,13 @@ class InfoRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartitionRows(Table):
-    """Q(T) by rows: temperature, the sum, its classical limit, the highest J of the sum, the error."""
+    """Rows of Q(T): temperature, sum, classical limit, highest J of the sum, error."""
 
     records: tuple[Mapping[str, Any], ...]
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """temperature_k, q, classical, jmax, relative_error; NaN and -1 where there is none."""
+        """temperature_k, q, classical, jmax, relative_error; NaN or -1 for a missing value."""
         names = ("temperature_k", "q", "classical", "relative_error")
         numbers = {name: np.array([record[name] for record in self.records], dtype=np.float64) for name in names}
         return {
@@ -71,7 +81,7 @@ class PartitionRows(Table):
 
 @dataclass(frozen=True, eq=False)
 class InfoAnswer:
-    """What a top is: records of Q(T) and of conformers, and sizes of effects."""
+    """Facts of a top: records of Q(T) and of conformers, and sizes of effects."""
 
     request: InfoRequest
     partition: tuple[Mapping[str, Any], ...]
@@ -85,7 +95,7 @@ class InfoAnswer:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far A, B and C can be trusted; Q has its error in its table."""
+        """Error budget of A, B and C; the error of Q is in its table."""
         return constants_budget([self.request.top])
 
     def facts(self) -> dict[str, Any]:
@@ -100,7 +110,7 @@ class InfoAnswer:
 
 
 def answer_info(request: InfoRequest, progress: Callable[..., Any] | None = None) -> InfoAnswer:
-    """Sizes of effects at the J most populated at 300 K, Q(T), and conformers where they are asked for."""
+    """Compute the sizes of effects at the most populated J at 300 K, Q(T), and optionally conformers."""
     top = request.top
     sizes = limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
     rows = partition_table(top, request.temperatures_k, progress, quick=request.temperatures_k == TEMPERATURES_K)
@@ -108,7 +118,7 @@ def answer_info(request: InfoRequest, progress: Callable[..., Any] | None = None
 
 
 def _conformers(request: InfoRequest) -> Sequence[dict[str, Any]]:
-    """Energy and constants of each different conformer, the lowest first."""
+    """Energy and constants of the distinct conformers, lowest first."""
     if request.conformers is None:
         return ()
     from rotor.molecules.readers.smiles import conformers

@@ -4,14 +4,13 @@ With x = E/kT, E from the lowest level that exists, and g = g_I (2J+1),
 
     Q = Σ g e⁻ˣ,      U/RT = Σ g x e⁻ˣ / Q,      C_v/R = Σ g x² e⁻ˣ / Q - (U/RT)²
 
-(J. E. Mayer and M. Goeppert Mayer, Statistical Mechanics, Wiley 1940, chapter 6). What is left out beyond the last J is
-estimated by a series that falls at least as fast as a geometric one: the same terms with every level weighing as much as
-the heaviest class of nuclear spin does, which are smooth in J whatever the spin weights leave out.
+(J. E. Mayer and M. Goeppert Mayer, Statistical Mechanics, Wiley 1940, chapter 6). The tail beyond the last J is bounded by a
+geometric series. Its terms use the largest spin weight for all levels, so that they are smooth in J even if some weights are 0.
 
-Levels that the distortion constants do not serve count with energies of simpler constants, see `trusted_levels`, and what
-the sum would gain if these were as low as they might be is added to the error.
+Levels beyond the range of the distortion constants enter with energies from simpler constants, see `trusted_levels`; the change of
+the sum if they had their lowest possible energies is added to the error.
 
-Where the classical limit with its corrections is as good as what was asked, and the sum would be long, no level is solved.
+If the sum would be long and the corrected classical limit reaches the requested error, no levels are solved.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.solve import solve_levels
 from rotor.thermodynamics.classical_limit import classical_limit
-from rotor.thermodynamics.species import of_species
+from rotor.thermodynamics.species import weights_in_species
 from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -40,37 +39,37 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-STRIDE = 8  # J are solved by so many at a time
-LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
-LOOSE = 1e-3  # a looser error makes sums shorter, which is no reason to sum what the limit gave for a tighter one
-MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
+STRIDE = 8  # number of J solved at a time
+LONG_SUM = 60  # J above which the corrected classical limit replaces the sum if its error is small enough
+LOOSE = 1e-3  # errors above this count as this, so that a looser request does not switch from the limit back to a sum
+MOST_J = {"asymmetric": 1000}  # longest sum; J 4000 for other kinds: both take some seconds
 MOST_J_DISTORTED = {
     "asymmetric": 800
-}  # with distortion, whose levels are all solved, and up to two simpler forms of them
-QUICK_PRODUCTS = 1e9  # n³ of diagonalizations, each some 5e-9 s
+}  # with distortion all levels are solved, and up to two simpler approximations of them
+QUICK_PRODUCTS = 1e9  # Σ n³ of the diagonalizations, about 5e-9 s each
 HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
 AT_WORST = 0.1  # estimated relative error above which a sum is refused
-HIGHEST_KT_OF_TORSION = 30.0  # the same with internal rotation: e⁻³⁰ of 10⁷ states is 1e-6 of one
-LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels that do not exist may lie below the lowest that does; e³⁰⁰ is enough
-ENDLESS = 1e150  # stands for a tail that is not known because the terms still grow
-NOT_SUMMED = -1  # stands for J max where the classical limit was taken
+HIGHEST_KT_OF_TORSION = 30.0  # the limit with internal rotation: e⁻³⁰ times 10⁷ states is 1e-6
+LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels of weight 0 may lie below the lowest existing one; the limits avoid overflow
+ENDLESS = 1e150  # marks an unknown tail: the terms still grow
+NOT_SUMMED = -1  # J max if the classical limit was used
 DIMENSIONS = {"A": 1, "E": 2, "F": 3, "G": 4, "H": 5}
 
 Progress = Callable[[int, int], object]
 
 
 class OutOfReachError(ValueError):
-    """The levels that count at a temperature lie beyond the reach of the constants or of a sum."""
+    """The levels populated at a temperature lie beyond the range of the constants or of a sum."""
 
 
 @dataclass(frozen=True)
 class LevelSums:
-    """What the levels of one set of spin weights sum to at n temperatures.
+    """Sums over the levels for one set of spin weights at n temperatures.
 
-    ground_k: energy of its lowest level over k, from the Hamiltonian's zero, in K. q: (n,), from that level. energy_over_rt,
-    cv_over_r: (n,), from that level. jmax: (n,), the last J that was added, -1 where the classical limit was taken.
-    error_q, error_energy, error_cv: (n,), estimated relative errors, of truncation and of levels that are not trusted.
+    ground_k: lowest level over k in K, from the zero of the Hamiltonian. q, energy_over_rt, cv_over_r: (n,), from that level.
+    jmax: (n,), the last J of the sum, -1 for the classical limit. error_q, error_energy, error_cv: (n,), estimated relative errors from
+    truncation and from levels that are not trusted.
     """
 
     temperatures_k: Floats
@@ -85,7 +84,7 @@ class LevelSums:
 
 
 def checked_temperatures(temperatures_k: ArrayLike) -> Floats:
-    """Temperatures as (n,); ValueError where one is not above 0 K."""
+    """Temperatures as an array (n,); ValueError if one is not above 0 K."""
     temperatures = np.atleast_1d(np.asarray(temperatures_k, dtype=np.float64)).ravel()
     for t in temperatures.tolist():
         if not (math.isfinite(t) and t > 0):
@@ -105,7 +104,7 @@ def level_sums(
     progress: Progress | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[LevelSums]:
-    """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
+    """Q, U/RT and C_v/R of a top for several sets of spin weights; the levels are solved once.
 
     Parameters
     ----------
@@ -114,24 +113,24 @@ def level_sums(
     temperatures_k : array_like
         (n,), above 0 K.
     relative_error : float
-        Asked of Q, and with `energies` of U and C_v too. The sum at each temperature goes on until its tail is below it;
-        where a sum would need more than J = 60 and the classical limit with corrections is as good, that is taken.
+        Largest error of Q, and with `energies` of U and C_v too. At each temperature the sum ends when its tail is smaller.
+        If it would extend beyond J = 60 and the corrected classical limit is as accurate, the limit is used.
     energies : bool
-        Whether U and C_v count for the error.
+        Whether the error limit applies to U and C_v too.
     at_worst : float
-        Estimated error up to which a sum is given at all.
+        Largest estimated error of a result.
     refuse : bool
-        False gives the sums with a larger error too, for a caller that looks at the errors; see `refusal`.
+        False: return sums with a larger error too, for a caller that checks the errors; see `refusal`.
     progress : callable, optional
-        Called as `progress(j, last)` whenever more levels are solved, with the J that the sum is expected to end at.
+        Called as `progress(j, last)` when more levels are solved; `last` is the expected last J.
     effects : sequence of QuantumEffect
-        What the Hamiltonian consists of. With others than the semi-rigid ones every level is solved and trusted.
+        Effects in the Hamiltonian. With effects beyond the semi-rigid ones all levels are solved and trusted.
 
     Returns
     -------
     list of LevelSums
-        One for each set of weights. Their errors say what was reached, which is less than what was asked where the
-        distortion constants do not serve the levels that count.
+        One for each set of weights. Their errors can exceed `relative_error` if levels beyond the range of the distortion
+        constants are populated.
 
     Raises
     ------
@@ -178,12 +177,12 @@ def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
 def lowest_level_k(
     top: Top, weights: Sequence[SpinWeights], effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> list[float]:
-    """E/k of the lowest level that exists by each set of spin weights, from the Hamiltonian's zero, in K."""
+    """E/k in K of the lowest existing level for each set of spin weights, from the zero of the Hamiltonian."""
     return [energy for energy, _ in _Ladder(top, tuple(weights), tuple(effects)).ground]
 
 
 def is_quick(top: Top, temperature_k: float, relative_error: float = 1e-6) -> bool:
-    """Whether the sum at a temperature takes some seconds at most: blocks of S states that mix, (2J + 1)/4 levels of each, are cubic work.
+    """Whether the sum at a temperature takes at most some seconds; blocks of S mixed states with (2J + 1)/4 levels each cost their cube.
 
     >>> from rotor.tops.top import Top
     >>> mixed = {"A": 9400.0, "B": 3100.0, "C": 2500.0, "E[1]": 6e4, "A[1]": 9480.0, "B[1]": 3090.0, "C[1]": 2497.0, "G_c[0,1]": 450.0}
@@ -193,17 +192,17 @@ def is_quick(top: Top, temperature_k: float, relative_error: float = 1e-6) -> bo
     if top.states is None or not top.states.couplings:
         return True
     last = float(_last_j(top, np.array([temperature_k]), relative_error)[0])
-    return (top.states.count * last) ** 3 * last / 8 <= QUICK_PRODUCTS  # of 4 blocks: the sum over J of 4 (S J/2)³
+    return (top.states.count * last) ** 3 * last / 8 <= QUICK_PRODUCTS  # 4 blocks per J: the sum over J of 4 (S J/2)³
 
 
 def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:
-    """The J that a sum will end at, about: where J² Θ of the smallest constant over T is ln(1/error) and some."""
+    """Estimate of the last J of a sum: J² Θ/T, with Θ of the smallest constant, slightly above ln(1/error)."""
     least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
     return np.sqrt((3.0 - math.log(min(relative_error, 0.1))) * temperatures / least_k)
 
 
 def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
-    """ValueError for the first temperature where the error is too large for the sum to mean anything."""
+    """Raise ValueError for the first temperature whose estimated error exceeds `at_worst`."""
     worst = np.max([sums.error_q, sums.error_energy, sums.error_cv][:kinds], axis=0)
     for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
         good = sums.temperatures_k[worst <= at_worst]
@@ -212,7 +211,7 @@ def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
 
 
 def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> str:
-    """Why a sum with this estimated relative error is not given, and what to do."""
+    """The message for a sum that is refused because of its estimated relative error."""
     how_much = f"{error:.1e} of it" if error < 1 else "all of it"
     return (
         f"Q({temperature_k:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum "
@@ -221,9 +220,9 @@ def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> s
 
 
 class Shell(NamedTuple):
-    """The levels of one J: energies (n,) in K, degeneracies (n,) without spin and (sets, n) with.
+    """The levels of one J: energies (n,) in K, degeneracies without spin (n,) and with spin (sets, n).
 
-    lower: energies (n,) in K that untrusted levels might have; None where all are trusted.
+    lower: lowest possible energies (n,) in K of untrusted levels; None if all are trusted.
     """
 
     kelvin: Floats
@@ -233,7 +232,7 @@ class Shell(NamedTuple):
 
 
 class _Ladder:
-    """Levels J by J, solved when first asked for."""
+    """Levels by J, solved on demand."""
 
     def __init__(
         self,
@@ -256,7 +255,7 @@ class _Ladder:
         self.ground = [self._lowest(s) for s in range(len(weights))]
 
     def reach(self, hottest_k: float) -> None:
-        """Levels that do not count at this temperature, and J that are not solved yet, are left out from here on."""
+        """Restrict J not yet solved to levels that are populated at this temperature."""
         if self._rigid or self.top.internal_rotation is not None:
             ground = max(energy for energy, _ in self.ground)
             highest = HIGHEST_KT if self._rigid else HIGHEST_KT_OF_TORSION
@@ -290,18 +289,20 @@ class _Ladder:
             self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
 
     def _weights(self, levels: Levels, species: SpinWeights) -> Ints:
-        """The weights of levels by one set; of several states by their own, where the set has the level's class at all."""
+        """The spin weights of levels by one set; further states have their own weights in the classes of the set."""
         if "v" not in levels.quanta or self.top.states is None:
             return weights_of_levels(levels, species)
         total = np.zeros(len(levels), dtype=np.int64)
         for v in range(self.top.states.count):
-            of_state = self.top.states.weights.get(v)
-            weights = weights_of_levels(levels, species if of_state is None else of_species(of_state, species))
+            weights_of_state = self.top.states.weights.get(v)
+            weights = weights_of_levels(
+                levels, species if weights_of_state is None else weights_in_species(weights_of_state, species)
+            )
             total = np.where(levels.quanta["v"] == v, weights, total)
         return total
 
     def _lowest(self, s: int) -> tuple[float, int]:
-        """Energy in K and J of the lowest level that exists, among those of the J solved by then."""
+        """Energy in K and J of the lowest existing level among the J solved so far."""
         while True:
             self._solve_more()
             lowest = [
@@ -322,7 +323,7 @@ def heaviest_component(weights: SpinWeights) -> float:
 
 
 def _expanded(ladder: _Ladder, s: int, temperatures: Floats) -> Floats:
-    """Rows Q, U/RT, C_v/R, J max and three errors (7, n) of the classical limit with its corrections, from the ground level."""
+    """Rows Q, U/RT, C_v/R, J max and three errors (7, n) from the corrected classical limit, from the ground level."""
     limit = classical_limit(ladder.top, ladder.weights[s])
     q, energy, cv = limit.corrected(temperatures)
     below = ladder.ground[s][0] / temperatures
@@ -331,9 +332,9 @@ def _expanded(ladder: _Ladder, s: int, temperatures: Floats) -> Floats:
 
 
 def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, float], kinds: int) -> Floats:
-    """The same rows of the sum; each temperature leaves the loop at the J where its tail is small enough.
+    """Rows Q, U/RT, C_v/R, J max and three errors (7, n) from the sum; a temperature is finished when its tail is small enough.
 
-    enough: the relative error asked for, and that of untrusted levels from which on there is no hope.
+    enough: the requested relative error, and the error of untrusted levels above which the sum is abandoned.
     """
     longest = ladder.longest
     ground, ground_j = ladder.ground[s]
@@ -350,7 +351,9 @@ def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, 
         tails[:, going], before[:, going] = _tail(smooth, before[:, going]), smooth
         if j < max(3, ground_j + 2):
             continue
-        if not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min():  # the series has turned over
+        if (
+            not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min()
+        ):  # the energies of the distortion series decrease with J
             tails[:, going] = ENDLESS
             break
         errors = relative_errors(moments[:, going], tails[:, going])[:kinds]
@@ -371,17 +374,17 @@ def _terms(x: Floats) -> Floats:
 
 
 def _tail(terms: Floats, before: Floats) -> Floats:
-    """What follows the last of terms that fall at least as fast as a geometric series, t r/(1 - r); endless while they grow."""
+    """Bound on the tail after the last term, t r/(1 - r), for terms that fall at least geometrically; `ENDLESS` while they grow."""
     falls = terms < before
     tail = terms * (terms / np.where(falls, before - terms, 1.0))
     return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
 
 
 def relative_errors(moments: Floats, tails: Floats) -> Floats:
-    """Relative errors (3, n) of Q, U and C_v, from moments of x and what may be missing of them, (3, n).
+    """Relative errors (3, n) of Q, U and C_v from moments of x and bounds on their tails, (3, n) each.
 
-    To first order in the tails t: δ⟨x⟩ ≤ (t₁ + ⟨x⟩ t₀)/Q and δC ≤ (t₂ + 2⟨x⟩ t₁ + |2⟨x⟩² - ⟨x²⟩| t₀)/Q. Nothing left out of
-    nothing is no error.
+    To first order in the tails t: δ⟨x⟩ ≤ (t₁ + ⟨x⟩ t₀)/Q and δC ≤ (t₂ + 2⟨x⟩ t₁ + |2⟨x⟩² - ⟨x²⟩| t₀)/Q. A zero value with a zero
+    tail has no error.
     """
     q = moments[0]
     mean, square = moments[1] / q, moments[2] / q

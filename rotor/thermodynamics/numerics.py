@@ -13,7 +13,7 @@ from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_of_whole, timed
 
 
 def plan_of_thermo(request: Any) -> Plan:
-    """The plan of thermodynamic functions: levels and seconds are those of the highest temperature."""
+    """The plan of thermodynamic functions; levels and seconds refer to the highest temperature."""
     from rotor.thermodynamics.request import answer_thermo
 
     hottest = max(request.temperatures_k)
@@ -40,7 +40,7 @@ def plan_of_torsion(request: Any) -> Plan:
     from rotor.thermodynamics.torsion_request import answer_torsion
 
     def describe(answer: Any) -> dict[str, Any]:
-        """Basis and potential are those of the answer."""
+        """Describe the basis and potential of the answer."""
         scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
         return {
             "effects": (f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
@@ -58,7 +58,7 @@ def _sweeps_of_thermo(request: Any) -> Sweeps:
 
 
 def _sweeps_of_torsion(request: Any) -> Sweeps:
-    """Without a scan nothing is left to choose, since the basis follows from the energies."""
+    """The sweep over scan points; without a scan nothing can be chosen, since the basis follows from the energies."""
     from rotor.thermodynamics.torsion_request import is_scan
 
     why = "basis: its size follows from the highest energy; the error is stated with each run"

@@ -1,4 +1,4 @@
-"""The rotational partition function Q(T) at one temperature or many, with how it was found and how well."""
+"""The rotational partition function Q(T) at one or many temperatures, with its method and estimated error."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PartitionFunction:
-    """Q at one temperature: the value, the J it was summed to, its estimated relative error, how it was found.
+    """Q at one temperature: value, last J of the sum, estimated relative error, method in words.
 
-    jmax: None where no sum was made.
+    jmax: None without a sum.
     """
 
     temperature_k: float
@@ -38,10 +38,9 @@ class PartitionFunction:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartitionFunctions(Table):
-    """Q at n temperatures, every array (n,); `[i]` and a loop give each as a `PartitionFunction`.
+    """Q at n temperatures; all arrays are (n,); indexing and iteration give each as a `PartitionFunction`.
 
-    jmax: the J that Q was summed to, -1 where the classical limit with corrections was taken. relative_error: estimated.
-    source: in words.
+    jmax: last J of the sum, -1 for the corrected classical limit. relative_error: estimated. source: method in words.
     """
 
     temperature_k: Floats
@@ -65,7 +64,7 @@ class PartitionFunctions(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """How each sum came, in words, and how many there are."""
+        """The method of each Q in words, and their number."""
         return {"source": list(self.source), "rows": len(self)}
 
     @property
@@ -96,10 +95,10 @@ def partition_function(
     relative_error: float = 1e-6,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | PartitionFunctions:
-    """Q(T) of a top: one for a number, a table of arrays for a list or an array of temperatures.
+    """Q(T) of a top: a single value for a number, a table for a list or array of temperatures.
 
-    Summed over levels until the tail is below `relative_error` of it, or, where the sum would be long and that is as
-    good, the classical limit with its corrections; see `rotor.thermodynamics.level_sums`.
+    Q is summed over levels until the relative tail is below `relative_error`. If the sum would be long and the corrected
+    classical limit is as accurate, that is used; see `rotor.thermodynamics.level_sums`.
 
     Parameters
     ----------
@@ -108,15 +107,15 @@ def partition_function(
     temperature_k : float or (n,) array
         One temperature or many.
     relative_error : float, optional
-        Asked of Q.
+        Largest relative error of Q.
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        Effects in the Hamiltonian.
 
     Returns
     -------
     PartitionFunction or PartitionFunctions
-        Q with J max, error and source. The error is larger than what was asked where levels count that the distortion
-        constants do not serve.
+        Q with J max, error and source. The error can exceed `relative_error` if levels beyond the range of the distortion
+        constants are populated.
 
     Raises
     ------
@@ -152,13 +151,13 @@ def partition_functions(
     temperatures_k : (n,) array
         Above 0 K.
     relative_error : float, optional
-        Asked of Q.
+        Largest relative error of Q.
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        Effects in the Hamiltonian.
     refuse : bool, optional
-        False gives sums with an error above 10 % too, for a caller that looks at the errors.
+        False: return sums with an error above 10 % too, for a caller that checks the errors.
     progress : callable, optional
-        Called as `progress(j, last)` whenever more levels are solved; see `level_sums`.
+        Called as `progress(j, last)` when more levels are solved; see `level_sums`.
 
     Returns
     -------
@@ -176,7 +175,7 @@ def partition_functions(
     settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
     if factor == 1:
         sums = level_sums(top, weights, temperatures, relative_error, effects=spinless, **settings)[0]
-    else:  # from the lowest level that spins split, as energies of levels count
+    else:  # energies count from the lowest split level
         from rotor.thermodynamics.spin_sums import spin_sums
 
         sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]
@@ -184,7 +183,7 @@ def partition_functions(
 
 
 def _sources(sums: LevelSums, relative_error: float) -> tuple[str, ...]:
-    """How each Q was found, and its error: the one asked for, or the larger one that was reached."""
+    """The method of each Q in words, and its error: the requested limit, or a larger error that was reached."""
     rows = zip(sums.jmax.tolist(), sums.error_q.tolist(), strict=True)
     return tuple(
         f"{_means(j)}, relative error {f'below {relative_error:g}' if error <= relative_error else f'about {error:.0e}'}"

@@ -1,4 +1,4 @@
-"""Q(T) of a top beside its classical limit, as plain records."""
+"""Q(T) of a top with its classical limit, as plain records."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ def partition_facts(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     limit: ClassicalLimit | None = None,
 ) -> dict[str, Any]:
-    """Q at one temperature beside its classical limit, by the keys of docs/verbs; both count the spins of the effects.
+    """Q at one temperature with its classical limit, by the keys of docs/verbs; both count the spins of the effects.
 
-    No classical limit beside internal rotation: that of the rigid top has no torsional states. limit: of the top, where it is known.
+    With internal rotation there is no classical limit, because that of the rigid top lacks torsional states. limit: that of the top,
+    if already computed.
     """
     classical = None
     if top.internal_rotation is None:
@@ -44,9 +45,9 @@ def partition_facts(
 def partition_table(
     top: Top, temperatures_k: Sequence[float], progress: Progress | None = None, quick: bool = False
 ) -> list[dict[str, Any]]:
-    """Q summed and classical at each temperature; where there is no sum, `q` is None and `source` says why.
+    """Q summed and classical at each temperature; without a sum `q` is None and `source` says why.
 
-    quick: sums over levels of states that mix are left out where they take longer than some seconds.
+    quick: skip sums over levels of mixed states that take longer than some seconds.
 
     >>> from rotor.tops.top import Top
     >>> [round(row["q"], 2) for row in partition_table(Top.from_constants("B=57635.968 MHz"), [10.0, 300.0])]
@@ -61,12 +62,12 @@ def partition_table(
         functions = partition_functions(top, temperatures_k, refuse=False, progress=progress)
         limit = classical_limit(top)
         return [_unless_refused(partition_facts(top, function, limit=limit)) for function in functions]
-    except ValueError:  # levels of one of them cannot be solved: each for itself
+    except ValueError:  # the levels of one temperature cannot be solved: try each temperature separately
         return [_row_alone(top, temperature) for temperature in temperatures_k]
 
 
 def _unless_refused(facts: dict[str, Any]) -> dict[str, Any]:
-    """The facts of one temperature, without a sum whose error is too large for it to mean anything."""
+    """The facts of one temperature; a sum with too large an error is removed."""
     if facts["relative_error"] <= AT_WORST:
         return facts
     return _without_sum(facts, refusal(facts["temperature_k"], facts["relative_error"]))
@@ -76,13 +77,16 @@ def _row_alone(top: Top, temperature_k: float) -> dict[str, Any]:
     try:
         return partition_facts(top, partition_function(top, temperature_k))
     except ValueError as error:
-        known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
-        return _without_sum(known, str(error))
+        classical_facts = {
+            "temperature_k": temperature_k,
+            "classical": classical_partition_function(top, temperature_k),
+        }
+        return _without_sum(classical_facts, str(error))
 
 
 def _long_row(top: Top, temperature_k: float) -> dict[str, Any]:
-    known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
-    return _without_sum(known, "a long sum over levels of states that mix; --temperature asks for it")
+    classical_facts = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
+    return _without_sum(classical_facts, "a long sum over levels of states that mix; --temperature asks for it")
 
 
 def _without_sum(facts: dict[str, Any], reason: str) -> dict[str, Any]:

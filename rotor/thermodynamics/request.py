@@ -1,4 +1,4 @@
-"""A request for thermodynamic functions of rotation, and what answers it."""
+"""Request and answer for thermodynamic functions of rotation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TEMPERATURES_K = (
     5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0, 298.15, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1000.0,
 )  # fmt: skip
 MOST_TEMPERATURES = 100_000
-CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
+CLASSICAL_TOLERANCE = 0.01  # relative difference of the quantum heat capacity that marks the classical limit
 
 
 def _electronic(states: ElectronicStates | str) -> ElectronicStates:
@@ -48,7 +48,7 @@ def _electronic(states: ElectronicStates | str) -> ElectronicStates:
 
 
 def _relative(name: str) -> Callable[[Any, Any], float]:
-    """The largest relative error in percent of a column, relative to its largest value where it passes through 0."""
+    """The largest relative error of a column in percent; relative to its largest value if the column passes through 0."""
 
     def error(answer: Any, reference: Any) -> float:
         import numpy as np
@@ -68,12 +68,12 @@ LEFT_OUT = Knob(
 
 @dataclass(frozen=True)
 class ThermoRequest:
-    """Thermodynamic functions to compute; every field is checked when the request is made.
+    """Thermodynamic functions to compute; all fields are checked when the request is made.
 
-    temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None leaves
-    vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass. electronic:
-    degeneracies of electronic states of the ideal gas; None: those of the molecule. relative_error: of Q, U and C_v. effects: what
-    the Hamiltonian consists of, spins among it where Q is to count them.
+    temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None: no vibration.
+    pressure_bar: pressure of the ideal gas, whose functions are then computed too; the top must have a mass. electronic: degeneracies
+    of electronic states of the ideal gas; None: those of the molecule. relative_error: largest error of Q, U and C_v. effects: effects
+    in the Hamiltonian, with spins if Q is to count them.
     """
 
     top: Top
@@ -111,10 +111,10 @@ class ThermoRequest:
         for temperature in self.temperatures_k:
             require_positive("temperatures_k", temperature, "K")
         check_fields(self)
-        known = species_names(self.top)
-        if self.species not in known:
-            only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
-            raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
+        names = species_names(self.top)
+        if self.species not in names:
+            only = "; its levels are all of one nuclear-spin species" if len(names) == 1 else ""
+            raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(names)}{only}")
         refuse_species_of_totals(self.top, self.species, self.effects)
         if self.electronic is not None and self.pressure_bar is None:
             raise ValueError("electronic: counts in the ideal gas; give --gas, or its pressure")
@@ -126,7 +126,7 @@ class ThermoRequest:
 
 @dataclass(frozen=True, repr=False)
 class ThermoAnswer(TextOf):
-    """The functions that a request asked for, and what follows from the top."""
+    """The functions of a request, with notes and errors."""
 
     shown = "functions"
 
@@ -135,18 +135,18 @@ class ThermoAnswer(TextOf):
 
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
-        """What the Hamiltonian consists of, further states of the top among it."""
+        """The effects in the Hamiltonian, including further states of the top."""
         effects = self.request.effects
         return effects_of(self.request.top, hyperfine=False) if effects == SEMI_RIGID else effects
 
     @cached_property
     def classical_above_k(self) -> float | None:
-        """The temperature above which the heat capacity is classical within 1 %; None where no sum over levels reaches so far."""
+        """The temperature above which the heat capacity is classical within 1 %; None if no sum over levels reaches it."""
         return classical_above_if_known(self.request.top, CLASSICAL_TOLERANCE)
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far Q can be trusted."""
+        """Error budget of Q."""
         from rotor.thermodynamics.budgets import q_budget
 
         top, effects = self.functions.top, self.effects
@@ -156,7 +156,7 @@ class ThermoAnswer(TextOf):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Functions of the electrons that the degeneracy of a linear radical's spin leaves out."""
+        """A note on electronic functions of a linear radical that its spin degeneracy does not count."""
         gas, top = self.functions.gas, self.functions.top
         doublet = gas is not None and self.request.electronic is None and gas.electronic.degeneracies == (2,)
         if not doublet or top.kind != "linear":
@@ -194,7 +194,7 @@ class ThermoAnswer(TextOf):
 
 
 def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> ThermoAnswer:
-    """The functions of a request; ValueError where a sum over levels gives no answer. progress: see `level_sums`.
+    """Compute the functions of a request; ValueError if a sum over levels is refused. progress: see `level_sums`.
 
     >>> from rotor.tops.top import Top
     >>> answer = answer_thermo(ThermoRequest(Top.from_constants("B=10 cm-1"), (300.0,)))

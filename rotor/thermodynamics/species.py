@@ -1,8 +1,8 @@
-"""Nuclear-spin species: levels of one species turn into those of another so slowly that each is a gas of its own.
+"""Nuclear-spin species: conversion between them is so slow that each behaves as a separate gas.
 
-The species are the classes of the spin weights that radiation and collisions do not mix: even and odd J of H2, the two
-sums of Ka and Kc of H2O, K a multiple of 3 or not of NH3, the irreps A, E and F of CH4. Where there are two, the one that
-weighs more is called ortho (G. Herzberg, Molecular Spectra and Molecular Structure I, section III,2f).
+The species are the classes of spin weights that radiation and collisions do not mix: even and odd J (H2), even and odd Ka + Kc
+(H2O), K a multiple of 3 or not (NH3), the irreps A, E and F (CH4). If there are two, the species of larger weight is called ortho
+(G. Herzberg, Molecular Spectra and Molecular Structure I, section III,2f).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ _PAIRS = ((("ee", "oo"), ("eo", "oe")), (("ee", "eo"), ("oe", "oo")), (("ee", "o
 
 
 def spin_species(weights: SpinWeights) -> dict[str, SpinWeights]:
-    """The weights of each nuclear-spin species by its name, all other classes weighing 0; the weights add up to those given.
+    """The spin weights of each nuclear-spin species by name, 0 for all other classes.
 
-    Two species are para and ortho, more have the names of their classes. One entry, "all", where all levels are of one
-    species. Weights are not divided again by a common divisor.
+    Two species are named para and ortho; more have the names of their classes. If all levels belong to one species, the only
+    entry is "all". Common divisors are not removed, so the weights of the species add up to the input.
 
     >>> {name: one.values for name, one in spin_species(SpinWeights.from_mapping({"even": 1, "odd": 3})).items()}
     {'para': (1, 0), 'ortho': (0, 3)}
@@ -36,7 +36,7 @@ def spin_species(weights: SpinWeights) -> dict[str, SpinWeights]:
 
 
 def _groups(weights: SpinWeights) -> list[tuple[str, ...]]:
-    """Classes that one species holds: K and n - K, the two parities that differ under a half turn, else each by itself."""
+    """Classes grouped by species: K with n - K, parities that a half turn does not separate; otherwise one class each."""
     if weights.rule == "K":
         return _by_k(weights)
     if weights.rule == "KaKc":
@@ -62,11 +62,11 @@ def _only(weights: SpinWeights, names: tuple[str, ...]) -> SpinWeights:
     return replace(weights, values=tuple(remaining))
 
 
-def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
-    """The weights of a state, 0 for classes that the species of the molecule lacks.
+def weights_in_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
+    """The spin weights of a state, with 0 for classes outside the species.
 
     >>> state = SpinWeights.from_mapping({"0even": 0, "0odd": 4, "1": 1, "2": 1})
-    >>> of_species(state, SpinWeights("K", ("0", "1", "2"), (0, 1, 1))).values
+    >>> weights_in_species(state, SpinWeights("K", ("0", "1", "2"), (0, 1, 1))).values
     (0, 0, 1, 1)
     """
     if species.rule == "none":
@@ -83,7 +83,7 @@ def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
 
 
 def implied_symmetry_number(weights: SpinWeights) -> int:
-    """How many rotations of a molecule the rule and the classes of its spin weights tell of; 1 where there is no rule.
+    """The symmetry number that the rule and classes of the spin weights imply; 1 without a rule.
 
     >>> implied_symmetry_number(SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}))
     12

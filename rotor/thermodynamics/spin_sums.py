@@ -1,10 +1,10 @@
-"""Sums over levels that spins split: level by level where the splittings matter, as a product where they do not.
+"""Sums over levels with spin splittings: over split levels if the splittings matter, otherwise as a product.
 
-    Q = Σ_rot e^(-E/kT) Σ_F (2F+1) e^(-δ_F/kT),      Σ_F (2F+1) δ_F = 0 of a traceless coupling,
+    Q = Σ_rot e^(-E/kT) Σ_F (2F+1) e^(-δ_F/kT),      Σ_F (2F+1) δ_F = 0 for a traceless coupling.
 
-so that with x = δ/kT of the largest splitting Q is Π(2I+1) Q_rot to x²/2 of itself, and U/RT and C_v/R are those of the rotation to x²:
-C_v has the x² of a Schottky anomaly. Where that is more than was asked, the split levels are summed themselves. Energies count from the
-lowest split level at every temperature. With an unpaired electron the split levels are always summed (`spin_factor`).
+With x = δ/kT of the largest splitting, Q is Π(2I+1) Q_rot within a relative error x²/2, and U/RT and C_v/R are those of the rotation
+within x² (for C_v, a Schottky anomaly). If this exceeds the requested error, the split levels are summed. Energies always count from the
+lowest split level. With an unpaired electron the split levels are always summed (`spin_factor`).
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _NONE_OF_J_0 = {
     "nuclear quadrupole",
     "spin-rotation",
     "hyperfine method",
-}  # effects that shift J = 0 in second order alone
+}  # effects that shift J = 0 in second order only
 
 
 @dataclass(frozen=True)
 class SpinSums:
-    """Sums of each set of spin weights, and how they were made.
+    """Sums for each set of spin weights.
 
-    splitting_mhz: the largest size of the couplings. split: (n,) temperatures at which split levels were summed.
+    splitting_mhz: the largest size of the couplings. split: (n,), whether split levels were summed at a temperature.
     """
 
     sums: list[LevelSums]
@@ -60,7 +60,7 @@ def spin_sums(
     energies: bool = True,
     refuse: bool = True,
 ) -> SpinSums:
-    """Q, U/RT and C_v/R of levels with spins for each of several sets of spin weights.
+    """Q, U/RT and C_v/R of levels with spins, for several sets of spin weights.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def spin_sums(
     temperatures_k : (n,) array
         Above 0 K.
     relative_error : float
-        Asked of Q, U and C_v.
+        Largest error of Q, U and C_v.
     effects : sequence of QuantumEffect
-        What the Hamiltonian consists of, spins among it.
+        Effects in the Hamiltonian, including spins.
     progress : callable, optional
     energies : bool
     refuse : bool
@@ -84,7 +84,7 @@ def spin_sums(
     Raises
     ------
     ValueError
-        As `level_sums` does.
+        As in `level_sums`.
     """
     spinless, functions = without_spins(top, effects)
     size = splitting_mhz(top, effects, float(temperatures_k.max()))
@@ -122,10 +122,10 @@ def _lowest_split_k(
     size_mhz: float,
     share: float,
 ) -> list[float]:
-    """E/k of the lowest split level by each set of weights.
+    """E/k of the lowest split level for each set of weights.
 
-    That of J = 0 and 1 where no rigid level of J = 2 is within twice the size of the couplings of the ground level; of J = 0 alone
-    where it exists and none of J = 1 is. J = 0 has a shift of second order in χ and C alone, V²/ΔE; below `share` of kT it is left out.
+    J = 0 and 1 suffice if no rigid level of J = 2 is within twice the size of the couplings of the ground level; J = 0 suffices if it
+    exists and no J = 1 is that close. Couplings χ and C shift J = 0 only in second order, V²/ΔE; a shift below `share` of kT is ignored.
     """
     ground_mhz, least = max(sums.ground_k for sums in rotation) * units.MHZ_PER_K, min(top.rotational_constants_mhz)
     reach = ground_mhz + 2 * size_mhz
@@ -142,22 +142,22 @@ def _lowest_split_k(
 
 
 def splitting_mhz(top: Top, effects: Sequence[QuantumEffect], temperature_k: float) -> float:
-    """The sizes of all couplings of spins, added, at the J that is the most populated one."""
+    """The sum of the sizes of all spin couplings at the most populated J."""
     j = max(populated_j(top, temperature_k), 1)
     return sum(effect.size_mhz(top, j) for effect in effects if effect.spins(top))
 
 
 def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_mhz: float) -> LevelSums:
-    """The sums without spins times their functions, from the lowest split level, with what the splittings may change.
+    """The sums without spins times the number of spin functions, from the lowest split level, with error bounds for the splittings.
 
     Parameters
     ----------
     rotation : LevelSums
-        Without spins.
+        Sums without spins.
     functions : int
-        Π(2I+1).
+        Number of spin functions, Π(2I+1).
     ground_k : float
-        The lowest split level over k.
+        Lowest split level over k, K.
     size_mhz : float
         The largest splitting.
 
@@ -167,7 +167,7 @@ def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_m
     """
     above, x2 = (rotation.ground_k - ground_k) / rotation.temperatures_k, _squared(size_mhz, rotation.temperatures_k)
     energy = rotation.energy_over_rt + above
-    with np.errstate(divide="ignore", over="ignore"):  # where the rotation is frozen, all of C_v is that of the spins
+    with np.errstate(divide="ignore", over="ignore"):  # if the rotation is frozen, C_v is due to the spins alone
         return replace(
             rotation,
             ground_k=ground_k,
@@ -184,7 +184,7 @@ def _squared(size_mhz: float, temperatures_k: Floats) -> Floats:
 
 
 def _over(x2: Floats, value: Floats) -> Floats:
-    """What splittings may change, over a function; nothing where there are none."""
+    """Relative change by the splittings; 0 without splittings."""
     return np.asarray(np.divide(x2, value, out=np.zeros_like(x2), where=x2 > 0))
 
 
@@ -194,7 +194,7 @@ def _worst(sums: LevelSums, energies: bool) -> Floats:
 
 
 def _placed(whole: LevelSums, where: NDArray[np.bool_], parts: LevelSums) -> LevelSums:
-    """The sums with others at some of the temperatures."""
+    """The sums with those at selected temperatures replaced."""
     columns = {}
     for name in ("q", "energy_over_rt", "cv_over_r", "jmax", "error_q", "error_energy", "error_cv"):
         columns[name] = getattr(whole, name).copy()

@@ -1,4 +1,4 @@
-"""The free rotation of a molecule as it is at a temperature: from a top to a `TumbleRequest` in ps, ħ and cm⁻¹."""
+"""Free rotation of a molecule at a temperature: from a top to a `TumbleRequest` in ps, ħ and cm⁻¹."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ MOLECULAR = Units(
 
 @dataclass(frozen=True)
 class MolecularTumble(TumbleRequest):
-    """The free rotation of a molecule. top: whose moments these are. temperature_k: of the thermal mean of |L|, where it is that."""
+    """The free rotation of a molecule. top: source of the moments. temperature_k: that of |L|, if |L| is a thermal mean."""
 
     top: Top | None = None
     temperature_k: float | None = None
 
     def about(self) -> dict[str, Any]:
-        """Everything about the top, by the keys of docs/verbs."""
+        """Facts about the top, by the keys of docs/verbs."""
         assert self.top is not None
         return {**top_facts(self.top), "temperature_k": self.temperature_k}
 
@@ -50,11 +50,11 @@ def thermal_tumble(
     top : Top
         Its moments of inertia are those of the constants.
     temperature_k : float
-        |L| is its thermal mean ⟨|L|⟩, half a degree off the intermediate axis.
+        Temperature of the thermal mean ⟨|L|⟩, which is taken half a degree off the intermediate axis.
     angular_momentum_hbar : (3,), optional
         Angular momentum along a, b, c in ħ, instead of the thermal mean.
     times_ps : (n,), optional
-        Times of the table in ps; two periods of the motion if left out.
+        Times of the table in ps. Default: two periods of the motion.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def thermal_tumble(
 
 
 def _thermal(moments: Three, temperature_k: float) -> tuple[Three, str]:
-    """The thermal mean of |L| in ħ, half a degree off the intermediate axis, and the sentence that says so."""
+    """The vector of the thermal mean |L| in ħ, half a degree off the intermediate axis, and a sentence that describes it."""
     require_positive("temperature_k", temperature_k, "K")
     size = float(mean_thermal_momentum(moments, units.EV_PER_K * temperature_k)) * MOLECULAR.momentum_factor
     x, y, z = off_intermediate_axis(np.array(moments), size, math.radians(TILT_DEGREES)).tolist()

@@ -1,4 +1,4 @@
-"""A request for the rotation about a bond, and what answers it: potential, reduced moment, levels, splittings, thermodynamics."""
+"""Request and answer for the rotation about a bond: potential, reduced moment, levels, splittings, thermodynamics."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
 TABLE = "table"
-SAME_WELLS = 0.05  # largest difference of the probabilities in wells of two components of one tunnelling doublet
-SHARED = 0.75  # of one well: a state with more there is no tunnelling component
+SAME_WELLS = 0.05  # largest difference between the well probabilities of the two components of a tunnelling doublet
+SHARED = 0.75  # largest probability in one well for a component of a tunnelling doublet
 _TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
 Progress = Callable[[int, int], object]
 
@@ -55,12 +55,12 @@ ANGLES = Knob(
 
 @dataclass(frozen=True)
 class TorsionRequest:
-    """The rotation about one bond of a molecule; every field is checked when the request is made.
+    """The rotation about a bond of a molecule; all fields are checked when the request is made.
 
-    top: with a geometry. bond: atoms i-j as counted from 1; those behind j turn. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
-    of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: of a scan, in a whole turn. vmax: highest
-    torsional level. temperatures_k: of the thermodynamic functions. classical_k: temperature of a classical gas, of `molecules`
-    followed for `duration_ps`; None: none is made.
+    top: with a geometry. bond: atoms i-j, counted from 1; those behind j turn. potential: "V3=400 V6=-10 cm-1", "table", "mmff", the name
+    of an ASE calculator, or (in Python) a TorsionalPotential in MHz or a calculator. points: angles of a scan per turn. vmax: highest
+    torsional level. temperatures_k: of the thermodynamic functions. classical_k: temperature of a classical gas of `molecules`,
+    propagated for `duration_ps`; None: no gas.
     """
 
     top: Top
@@ -113,7 +113,7 @@ class TorsionRequest:
 
     @property
     def rotation(self) -> BondRotation:
-        """The rotation about the bond; ValueError for a bond about which nothing turns."""
+        """The rotation about the bond; ValueError for a bond without internal rotation."""
         assert self.top.molecule is not None
         try:
             return bond_rotation(self.top.molecule, self.bond)
@@ -123,10 +123,10 @@ class TorsionRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TorsionLevels(Table):
-    """Torsional levels. v: number within the species. species: σ of m = s k + σ. energy_cm: above the foot of the potential.
+    """Torsional levels. v: number within the species. species: σ of m = s k + σ. energy_cm: above the minimum of the potential.
 
-    splitting_mhz: energy less that of σ = 0 with the same v; without symmetry, less that of the other component of a tunnelling doublet
-    (nan: the level has no partner).
+    splitting_mhz: energy relative to σ = 0 with the same v; without symmetry, relative to the other component of the tunnelling doublet
+    (nan without a partner).
     """
 
     v: Ints
@@ -164,12 +164,12 @@ class TorsionAnswer(TextOf):
 
     @cached_property
     def symmetry_number(self) -> int:
-        """σ of the rotation, different isotopes counted apart."""
+        """The symmetry number of the rotation; isotopes are distinguished."""
         return self.rotation.symmetry_number()
 
     @cached_property
     def levels(self) -> TorsionLevels:
-        """Levels up to v = vmax of each species; without symmetry vmax + 1 for each well."""
+        """Levels up to v = vmax of each species; without symmetry, vmax + 1 levels per well."""
         if self.torsion.fold == 1:
             return self._levels_without_symmetry()
         count, fold = self.request.vmax + 1, self.torsion.fold
@@ -202,7 +202,7 @@ class TorsionAnswer(TextOf):
         )
 
     def functions_of_levels(self, angles: Floats) -> Floats:
-        """Real wave functions (angles, levels) in the order of `levels`; of a pair ±σ the one that is even in its phase."""
+        """Real wave functions (angles, levels) in the order of `levels`; for a pair ±σ the combination of even phase."""
         by_species = []
         for species in range(self.torsion.fold // 2 + 1):
             rows = np.flatnonzero(self.levels.species == species)
@@ -216,7 +216,7 @@ class TorsionAnswer(TextOf):
 
     @cached_property
     def classical(self) -> ClassicalTorsion | None:
-        """The classical gas; None without its temperature."""
+        """The classical gas; None if the request has no temperature for it."""
         if self.request.classical_k is None:
             return None
         from rotor.thermodynamics.classical_torsion import classical_torsion, turning_top
@@ -231,7 +231,7 @@ class TorsionAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the energies of the levels can be trusted."""
+        """Error budget of the level energies."""
         count, fold = self.request.vmax + 1, self.torsion.fold
         smaller = [self.torsion.states(species, max(3 * self.waves // 4, fold))[0][:count] for species in range(fold)]
         larger = [self.torsion.states(species, self.waves)[0][:count] for species in range(fold)]
@@ -258,7 +258,7 @@ class TorsionAnswer(TextOf):
         )
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its tables, by the keys of docs/verbs."""
+        """Facts of the answer except its tables, by the keys of docs/verbs."""
         torsion, potential = self.torsion, self.torsion.potential
         moments = units.ROTATIONAL_MHZ_U_ANGSTROM2 / torsion.sampled()[1]
         wells, levels = torsion.wells(), self.levels
@@ -289,7 +289,7 @@ class TorsionAnswer(TextOf):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user must know of the scan."""
+        """Warnings about the scan."""
         if self.scan is None or abs(self.scan.closure_cm) < max(
             1.0, 0.01 * self.torsion.barrier_mhz / units.MHZ_PER_CM
         ):
@@ -301,7 +301,7 @@ class TorsionAnswer(TextOf):
 
 
 def answer_torsion(request: TorsionRequest, progress: Progress | None = None) -> TorsionAnswer:
-    """The torsion of a request. progress: called with points of the scan that are done, and all.
+    """Compute the torsion of a request. progress: called with the numbers of scan points done and in total.
 
     >>> from rotor.molecules.readers.read import read_molecule
     >>> from rotor.tops.top import Top
@@ -310,7 +310,7 @@ def answer_torsion(request: TorsionRequest, progress: Progress | None = None) ->
     (3, 1013.0)
     """
     rotation = request.rotation
-    potential, kinetic, source, scan, misfit = _made(request, rotation, progress)
+    potential, kinetic, source, scan, misfit = _potential_and_kinetic(request, rotation, progress)
     fold = int(np.gcd.reduce([rotation.symmetry_number(), *(int(n) for n in (*potential.n, *kinetic.n))]))
     torsion = BondTorsion(kinetic, potential, fold)
     wells = max(1, len(torsion.wells()))
@@ -319,16 +319,16 @@ def answer_torsion(request: TorsionRequest, progress: Progress | None = None) ->
 
 
 def is_scan(potential: Any) -> bool:
-    """Whether a potential is made by a scan, by MMFF94 or a calculator, instead of terms."""
+    """Whether a potential comes from a scan (MMFF94 or a calculator) instead of Fourier terms."""
     if isinstance(potential, str):
         return "=" not in potential and potential != TABLE
     return not isinstance(potential, TorsionalPotential)
 
 
-def _made(
+def _potential_and_kinetic(
     request: TorsionRequest, rotation: BondRotation, progress: Progress | None
 ) -> tuple[FourierSeries, FourierSeries, str, BondScan | None, float]:
-    """V and F in MHz, where V is from, the scan and the misfit (cm⁻¹) of its series."""
+    """V and F in MHz, the source of V, the scan, and the misfit (cm⁻¹) of its Fourier series."""
     stated = request.potential
     if not is_scan(stated):
         terms, source = _named_terms(stated, rotation)
@@ -345,7 +345,9 @@ def _made(
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
     symmetry = rotation.symmetry_number()
-    if symmetry != period:  # isotopes: the masses repeat less often than the potential, and are scanned rigidly
+    if (
+        symmetry != period
+    ):  # isotopes: the masses have a longer period than the potential, so F comes from the rigidly turned geometry
         return potential, _rigid_kinetic(rotation, request.points), scan.source, scan, float(misfit)
     kinetic = FourierSeries.fitted(
         scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
@@ -354,21 +356,21 @@ def _made(
 
 
 def _harmonics(angles: Floats, period: int) -> int:
-    """Terms of a series through angles of one period: a third of the points, and no more than the widest gap resolves."""
+    """Number of Fourier terms for angles in a period: a third of the points, limited by the widest gap."""
     rising = np.sort(angles)
     gaps = np.diff(rising, append=rising[0] + 2 * math.pi / period)
     return max(1, min(len(angles) // 3, int(math.pi / (period * float(gaps.max())))))
 
 
 def _named_terms(potential: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
-    """The terms that are given, or those of the table, and where they are from."""
+    """The given Fourier terms, or those of the table, and their source."""
     if potential == TABLE:
         return table_barrier(rotation)
     return (given_terms(potential, rotation) if isinstance(potential, str) else potential), "given"
 
 
 def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
-    """F(α) of the geometry with its top turned rigidly."""
+    """F(α) of the geometry with a rigidly turned top."""
     period = rotation.symmetry_number()
     count = max(6, math.ceil(points / period))
     angles = 2 * math.pi / period * np.arange(count) / count
@@ -381,7 +383,7 @@ def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
 
 
 def _series(terms: TorsionalPotential) -> FourierSeries:
-    """Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα as a mean, cosines and sines."""
+    """Convert Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα to a mean, cosines and sines."""
     n = np.array(sorted({*terms.cosines, *terms.sines}), dtype=np.int64)
     cosines = np.array([-0.5 * terms.cosines.get(int(i), 0.0) for i in n])
     sines = np.array([0.5 * terms.sines.get(int(i), 0.0) for i in n])
@@ -389,9 +391,9 @@ def _series(terms: TorsionalPotential) -> FourierSeries:
 
 
 def given_terms(text: str, rotation: BondRotation) -> TorsionalPotential:
-    """The potential that "V3=400 V6=-10 cm-1" means: ½ V_n (1 - cos nα), ½ W_n sin nα; cm⁻¹ without a unit.
+    """Parse a potential such as "V3=400 V6=-10 cm-1": ½ V_n (1 - cos nα), ½ W_n sin nα; cm⁻¹ by default.
 
-    Raises ValueError for another text, a term twice, and a term that the symmetry of the group excludes.
+    Raises ValueError for other texts, repeated terms, and terms that the symmetry of the group excludes.
     """
     matches = list(_TERM.finditer(text))
     rest = _TERM.sub("", text).replace(",", " ").strip()
@@ -413,7 +415,7 @@ def given_terms(text: str, rotation: BondRotation) -> TorsionalPotential:
 
 
 def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
-    """V3 of a similar molecule, and which; ValueError where the bond bears no methyl group or the table has no such one."""
+    """V3 of a similar molecule and its name; ValueError if the bond has no methyl group or the table no similar molecule."""
     from rotor.quantum.estimates.methyl_groups import barrier_beside
 
     molecule = rotation.molecule
@@ -431,7 +433,7 @@ def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
 
 
 def _shares(torsion: BondTorsion, vectors: NDArray[np.complex128], m: Ints) -> Floats:
-    """Probability (levels, wells) between neighbouring maxima of V."""
+    """Probabilities (levels, wells) between neighbouring maxima of V."""
     angles = torsion.sampled()[0]
     density = np.abs(np.exp(1j * np.outer(angles, m)) @ vectors) ** 2 / len(angles)
     place = np.searchsorted(torsion.potential.extrema(-1.0), angles)
@@ -440,7 +442,7 @@ def _shares(torsion: BondTorsion, vectors: NDArray[np.complex128], m: Ints) -> F
 
 
 def _real(waves: NDArray[np.complex128]) -> Floats:
-    """Real functions (angles, levels) of norm 1: the phase is taken at the largest value; √2 Re of a running wave."""
+    """Real functions (angles, levels) of norm 1: real at the largest value; √2 Re for a running wave."""
     size = np.abs(waves)
     peak = np.argmax(size > (1 - 1e-6) * size.max(axis=0), axis=0)  # the first of equal maxima
     phase = waves[peak, np.arange(waves.shape[1])]

@@ -1,10 +1,10 @@
-"""Which levels of an effective Hamiltonian are energies of a molecule, and what replaces the others in a sum.
+"""Trusted levels of an effective Hamiltonian, and replacements for the others in sums.
 
-Distortion constants serve up to some J and K; beyond, their polynomial bends down and makes levels that no molecule has. A level is not
-trusted if its energy is less than 0.6 or more than 2 times the rigid one. If a level of a J is too low, its label has passed to others,
-and no level of that J is trusted. These levels are replaced by those of the same top with quartic distortion alone, and where they fail by
-the same rule, rigid ones with quartic distortion to first order; how far distortion might bring them down further is taken as its quartic
-part once more. Rigid levels are solved only where their estimate, A Ka² + C Kc² + B (J(J+1) - Ka² - Kc²), is missed.
+Distortion constants are valid up to some J and K; beyond, their polynomial turns over and gives levels that no molecule has. A level is
+not trusted if its energy is less than 0.6 or more than 2 times the rigid energy. If a level is too low, labels within its J are wrong,
+and no level of that J is trusted. Untrusted levels are replaced by those with quartic distortion only; if these fail by the same rule, by
+rigid levels with quartic distortion to first order. The lowest possible energy is lower by the quartic part once more. Rigid levels
+are solved only if the estimate A Ka² + C Kc² + B (J(J+1) - Ka² - Kc²) does not suffice.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from rotor.tops.operators import REPRESENTATIONS
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-TRUSTED = (0.6, 2.0)  # energy over the rigid estimate, outside which a level is not trusted
+TRUSTED = (0.6, 2.0)  # range of energy over rigid energy for a trusted level
 GROUND_J = 10  # the lowest level of all states has at most this J
-LOWEST = 0.4  # of the rigid estimate: distortion lowers no level further
+LOWEST = 0.4  # of the rigid energy: lower bound of a distorted level
 
 
 def rigid_energies_mhz(top: Top, levels: Levels) -> Floats:
-    """A Ka² + B (J(J+1) - Ka² - Kc²) + C Kc² of every level in MHz; exact for a symmetric top without distortion.
+    """A Ka² + B (J(J+1) - Ka² - Kc²) + C Kc² of all levels in MHz; exact for a symmetric top without distortion.
 
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=9 B=3 MHz")
@@ -43,7 +43,7 @@ def rigid_energies_mhz(top: Top, levels: Levels) -> Floats:
     """
     a, b, c = top.rotational_constants_mhz
     along_a, along_c = _squared_labels(top, levels)
-    finite = a if np.isfinite(a) else 0.0  # of a linear top, which has no K
+    finite = a if np.isfinite(a) else 0.0  # a linear top has no K
     return np.asarray(b * _j_squared(levels) + (finite - b) * along_a + (c - b) * along_c)
 
 
@@ -52,7 +52,7 @@ def _j_squared(levels: Levels) -> Floats:
 
 
 def _squared_labels(top: Top, levels: Levels) -> tuple[Floats, Floats]:
-    """Ka² and Kc² of every level, (n,) each; 0 for a number that the kind of top lacks."""
+    """Ka² and Kc² of all levels, (n,) each; 0 for a quantum number that the kind of top lacks."""
     quanta, none = levels.quanta, np.zeros(len(levels))
     if "kc" in quanta:
         return quanta["ka"] ** 2.0, quanta["kc"] ** 2.0
@@ -63,7 +63,7 @@ def _squared_labels(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 
 def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
-    """Energies (n,) with those that are not trusted replaced, and the lowest that these might be, (n,), both in MHz."""
+    """Energies (n,) with untrusted ones replaced, and lower bounds (n,) of these; MHz."""
     energy, rigid = levels.energy_mhz, rigid_energies_mhz(top, levels)
     if not centrifugal_operators(top.constants) or not _untrusted(levels, energy, rigid).any():
         return energy, energy
@@ -77,10 +77,10 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 
 def are_trusted(top: Top, levels: Levels, ground_mhz: float | None = None) -> NDArray[np.bool_]:
-    """Which levels (n,) are energies of a molecule; all of a rigid top.
+    """Which levels (n,) are trusted; all levels of a rigid top.
 
-    Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them; of one
-    with further states those of a J without a level below the ground, `ground_mhz` where the levels have no low J themselves.
+    With a level table, trusted levels are those in the table. With spins, those whose rotational level is trusted without spins. With
+    further states, those of J without a level below the ground level (`ground_mhz` if the levels do not include low J).
     """
     if "irrep" in levels.quanta or "species" in levels.quanta or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
@@ -97,7 +97,7 @@ def are_trusted(top: Top, levels: Levels, ground_mhz: float | None = None) -> ND
 
 
 def _above_the_ground(levels: Levels, ground_mhz: float | None) -> NDArray[np.bool_]:
-    """Levels of every J but those that have one below all of low J, or below the ground given for levels without low J."""
+    """Which levels belong to a J without a level below the ground, which is the lowest level of low J or `ground_mhz`."""
     low = levels.rotational <= GROUND_J
     ground = levels.energy_mhz[low].min() if low.any() else ground_mhz
     if ground is None:
@@ -107,7 +107,7 @@ def _above_the_ground(levels: Levels, ground_mhz: float | None) -> NDArray[np.bo
 
 
 def _trusted_by_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
-    """Which levels with spins (n,) belong to a trusted rotational level; solved without spins only where energies look wrong."""
+    """Which levels with spins (n,) belong to a trusted rotational level; solved without spins only if energies look wrong."""
     energy = np.where(
         levels.rotational > 0, levels.energy_mhz, 0.0
     )  # N = 0 has no distortion; spins may move it up or down
@@ -120,9 +120,9 @@ def _trusted_by_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
 
 
 def in_level_table(top: Top, levels: Levels) -> NDArray[np.bool_] | None:
-    """Which levels (n,) have the energy of the top's table; None where there is no table, or other effects than its own.
+    """Which levels (n,) have energies from the top's level table; None without a table, or with effects beyond it.
 
-    A molecule has a table because its distortion series does not converge: its other levels are not to be trusted.
+    A molecule has a table because its distortion series does not converge, so its other levels are not trusted.
     """
     if top.level_table is None or tuple(levels.effects) != SEMI_RIGID:
         return None
@@ -135,7 +135,7 @@ def _untrusted(levels: Levels, energy: Floats, rigid: Floats) -> NDArray[np.bool
 
 
 def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Floats]:
-    """Energies (n,) in MHz of the rigid top and of the one with quartic distortion, in the order of the levels."""
+    """Energies (n,) in MHz of the rigid top and with quartic distortion, in the order of the levels."""
     if top.kind != "asymmetric":
         return rigid, rigid + _first_order_quartic_mhz(top, levels)[0]
     plain, quartic = (_energies_like(top.with_constants(_truncated(top, order)), levels) for order in (1, 2))
@@ -143,7 +143,7 @@ def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Float
 
 
 def _truncated(top: Top, order: int) -> Constants:
-    """The constants of terms up to J^2·order."""
+    """The constants of terms up to J^(2·order)."""
     constants = top.constants
     operators = operators_by_name(constants)
     values: dict[str, Any] = {k: v for k, v in constants.values.items() if all(sum(p) <= order for p in operators[k])}
@@ -159,7 +159,7 @@ def _energies_like(top: Top, levels: Levels) -> Floats:
 
 
 def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
-    """The diagonal quartic terms (n,) in MHz with K² of the label for Jz², and the sum of the sizes of all of them."""
+    """The diagonal quartic terms (n,) in MHz with K² of the label for Jz², and the sum of their absolute values."""
     squared = _j_squared(levels)
     k2 = _k_squared(top, levels, squared)
     operators = centrifugal_operators(top.constants)
@@ -168,7 +168,7 @@ def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
     value, size = np.zeros(len(k2)), np.zeros(len(k2))
     for (p, q, n), c in operators.items():
         if p + q + n == 2:
-            term = c * squared ** (p + n) * k2**q  # an element of J₊² is J(J+1) at most
+            term = c * squared ** (p + n) * k2**q  # elements of J₊² are at most J(J+1)
             value += np.zeros(len(k2)) if n else term
             size += np.abs(term)
     return value, size

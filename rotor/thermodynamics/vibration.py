@@ -1,7 +1,7 @@
-"""Vibrational states of a gas: their part of the partition function, of the energy and of the heat capacity.
+"""Vibrational states of a gas: contributions to partition function, energy and heat capacity.
 
-Either states that are listed one by one, or fundamentals of harmonic oscillators, all overtones among them. Every state
-is given the same rotational levels. Energies count from the ground state of vibration.
+The states are either listed, or fundamentals of harmonic oscillators with all overtones. All states are given the same rotational
+levels. Energies count from the vibrational ground state.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 
-LEAST_CM = 1e-3  # of an energy: below it nothing vibrates, and kT over it would not be a number
+LEAST_CM = 1e-3  # lowest vibrational energy; avoids overflow of kT/E
 
 
 @dataclass(frozen=True)
 class VibrationalStates:
-    """Vibrational states behind a partition function, by their energies above the ground state.
+    """Vibrational states of a partition function, by their energies above the ground state.
 
-    energies_cm: in cm⁻¹, each 0.001 or more. degeneracies: of each, 1 unless given. harmonic: the energies are fundamentals, and
-    all their overtones and combinations are added as those of harmonic oscillators; else they are states, each listed.
+    energies_cm: in cm⁻¹, each at least 0.001. degeneracies: default 1. harmonic: the energies are fundamentals, and all overtones and
+    combinations are added as those of harmonic oscillators; otherwise the energies are a list of states.
 
-    Neglected either way: that each state has rotational constants of its own, some per cent of the factor less 1.
+    The dependence of the rotational constants on the state is neglected, an error of some per cent of (factor - 1).
     """
 
     energies_cm: tuple[float, ...]
@@ -50,7 +50,7 @@ class VibrationalStates:
 
     @classmethod
     def parse(cls, text: str, harmonic: bool = False) -> VibrationalStates:
-        """From a comma list such as "667.4x2, 1388, 2349 cm-1", with x and the degeneracy after an energy; cm⁻¹ by default.
+        """Parse a comma list such as "667.4x2, 1388, 2349 cm-1", with x and the degeneracy after an energy; cm⁻¹ by default.
 
         >>> VibrationalStates.parse("667.4x2,1388,2349 cm-1").degeneracies
         (2, 1, 1)
@@ -67,7 +67,7 @@ class VibrationalStates:
 
     @property
     def text(self) -> str:
-        """The energies as they are given, and what they are."""
+        """The energies as given, described as fundamentals or states."""
         energies = (
             f"{e:g}" + (f"x{g}" if g > 1 else "") for e, g in zip(self.energies_cm, self.degeneracies, strict=True)
         )
@@ -80,7 +80,7 @@ class VibrationalStates:
     def factor(self, temperature_k: ArrayLike) -> float | Floats: ...
 
     def factor(self, temperature_k: ArrayLike) -> float | Floats:
-        """The factor of Q at one temperature or an array of them; see `vibrational_partition_function`."""
+        """The vibrational factor of Q at one temperature or an array; see `vibrational_partition_function`."""
         return vibrational_partition_function(
             self.energies_cm, self.degeneracies, temperature_k, harmonic=self.harmonic
         )
@@ -106,16 +106,16 @@ def vibrational_partition_function(
 def vibrational_partition_function(
     energies_cm: ArrayLike, degeneracies: ArrayLike, temperature_k: ArrayLike, *, harmonic: bool = False
 ) -> float | Floats:
-    """Q of vibration, the ground state counted as 1: Σ g exp(-E/kT) over the states listed, or of harmonic oscillators.
+    """Vibrational Q relative to the ground state: Σ g exp(-E/kT) over the listed states, or that of harmonic oscillators.
 
-    With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, all overtones among it.
+    With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, which includes all overtones.
 
     Parameters
     ----------
     energies_cm : (n,) array
         Energies above the ground state in cm⁻¹.
     degeneracies : (n,) array of int
-        Of each state or fundamental.
+        Degeneracy of each state or fundamental.
     temperature_k : float or (...) array
         Above 0 K.
     harmonic : bool, optional
@@ -134,7 +134,7 @@ def vibrational_partition_function(
     Notes
     -----
     G. Herzberg, Molecular Spectra and Molecular Structure II, eqs. V,20 and V,21. Neglected in the harmonic form:
-    anharmonicity and what splits overtones.
+    anharmonicity, including the splitting of overtones.
 
     Examples
     --------
@@ -159,8 +159,8 @@ def vibrational_functions(states: VibrationalStates, temperatures_k: ArrayLike) 
     ln Q = -ln(1 - e⁻ˣ), U/RT = x/(eˣ - 1), C_v/R = x² eˣ/(eˣ - 1)² (A. Einstein, Ann. Phys. 327 (1907) 180, eq. 8). Where
     eˣ would overflow they are 0.
 
-    >>> one = VibrationalStates((100.0,), harmonic=True)
-    >>> [round(float(v[0]), 4) for v in vibrational_functions(one, [1000.0])]  # C_v/R near 1 - x²/12
+    >>> mode = VibrationalStates((100.0,), harmonic=True)
+    >>> [round(float(v[0]), 4) for v in vibrational_functions(mode, [1000.0])]  # C_v/R near 1 - x²/12
     [2.0099, 0.9298, 0.9983]
     """
     t = np.asarray(temperatures_k, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Vibrational states that a partition function counts, as verbs ask for them: fundamentals or a list of states."""
+"""Input of vibrational states for verbs: fundamentals or a list of states."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SCENE_TYPE = str | list[list[float]]
 
 
 def _reader(harmonic: bool) -> Custom:
-    """Of energies in cm⁻¹ with degeneracies, as a text or as pairs."""
+    """A reader for energies in cm⁻¹ with degeneracies, as text or as pairs."""
 
     def read(value: Any) -> VibrationalStates:
         if isinstance(value, VibrationalStates):
@@ -32,7 +32,7 @@ def _reader(harmonic: bool) -> Custom:
 
 @dataclass(frozen=True)
 class VibrationInput:
-    """Vibrational states that the partition function counts; one of the two."""
+    """Vibrational states in the partition function; exactly one of the two fields."""
 
     fundamentals: VibrationalStates | None = declared(
         None, _reader(True), 'Fundamentals (cm⁻¹) whose harmonic factor multiplies Q: "667.4x2,1388,2349"', "vibration.fundamentals",

@@ -247,7 +247,7 @@ MUTATIONS = (
     ),
     Mutation(
         20, "rotor/thermodynamics/classical_limit.py",
-        "(middle**3 / 100 + of_asymmetry)", "(middle**3 / 100)",
+        "(middle**3 / 100 + asymmetric_part)", "(middle**3 / 100)",
         "tests/thermodynamics/test_thermo_functions.py::test_the_next_quantum_correction_is_bounded",
     ),
     Mutation(

@@ -288,7 +288,7 @@ def _lines_of(
     levels = up.block.levels
     free = levels.energy_mhz[up.rows[first]] - levels.energy_mhz[low.rows[second]]
     sign = np.where(turned, -1.0, 1.0)
-    difference = populations.of_block[pair.low][:, second] - populations.of_block[pair.up][:, first]
+    difference = populations.by_block[pair.low][:, second] - populations.by_block[pair.up][:, first]
     intensity = INTENSITY_NM2_MHZ * frequency * strength[:, first, second] * difference
     return _Part(
         sign * frequency,
