@@ -26,11 +26,10 @@ from rotor.quantum.internal_rotation.nuclei import BY_ANGLE, Nuclei
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
-from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
+from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, species_of_tops
 
 MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt
 TORSIONAL = ("F", "rho", "V3", "V6")
-SPECIES = {1: ("A", "E"), 2: ("AA", "AE", "EA", "EE", "EE*")}  # by the number of tops
 
 
 @dataclass(frozen=True)
@@ -166,7 +165,7 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j" if nuclei is None else "n", "vt", "ka", "kc")])
     sums = _doubled_sums(columns, nuclei, constants.halves)
-    numbers = {SPECIES_NUMBERS[name]: name for name in SPECIES[internal.tops]}
+    numbers = {SPECIES_NUMBERS[name]: name for name in species_of_tops(internal.tops)}
     meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
     rules = [
         (f"species: {meaning}", np.isin(columns["species"], list(numbers))),

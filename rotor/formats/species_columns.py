@@ -47,6 +47,6 @@ def species_number(path: object, line: int, name: str, text: str) -> int:
     if text not in numbers:
         raise ValueError(
             f"{path}, line {line} of the table: {name} reads {text!r}; expected A or E (A1, A2, E1, E2; sigma 0, 1, -1), "
-            "of two tops AA, AE, EA, EE or EE*"
+            "of two tops AA, AE, EA, EE or EE*, of three AAA, AAE ... EE*E*"
         )
     return numbers[text]

@@ -1,11 +1,11 @@
-"""Input (.xi) and output (.xo) of XIAM: constants in principal axes, with one or two tops.
+"""Input (.xi) and output (.xo) of XIAM: constants in principal axes, with one to three tops.
 
 XIAM has z, x, y = a, b, c and gigahertz (H. Hartwig and H. Dreizler, Z. Naturforsch. 51a (1996) 923; its manual xiam-v25.txt, Version 2.5):
 
     BJ = ½(B + C),    BK = A - ½(B + C),    B- = ½(B - C),    V1n = V3,    V2n = V6,
 
 F0, delta and epsil (radians) of a top; mu_x, mu_y, mu_z in debye. Watson's reduction is A where `reduc` is 0 and S where it is 1. A
-constant with an index in brackets belongs to one set of constants B; the first is read, and those of one top of two end in _1 and _2.
+constant with an index in brackets belongs to one set of constants B; the first is read, and those of several tops end in _1, _2, _3.
 Lines that begin with a backslash print what XIAM derives; of these delta is read, F, rho and beta follow here anew.
 
 Quadrupole coupling in the manual's elements, with one factor e1,
@@ -96,7 +96,7 @@ def _content(text: str) -> tuple[dict[str, int], dict[str, float]]:
         match = _CONSTANT.match(line)
         if match is None or match["set"] not in (None, "1"):
             continue
-        plain = re.sub(r"_[12]$", "", match["name"])
+        plain = re.sub(r"_[123]$", "", match["name"])
         if plain in known or plain.startswith(("Dpi2", "Dc3", "F12", "Vss", "Vcc", "mk")):
             values.setdefault(match["name"], float(match["value"].upper().replace("D", "E")))
     return settings, values
@@ -110,11 +110,11 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
     if reduction is None:
         raise ValueError(f"reduc {settings['reduc']}: read are Watson's A (0) and S (1)")
     tops = settings.get("ntop", 1)
-    if tops not in (1, 2) or settings.get("nfold", 3) != 3:
-        raise ValueError(f"{tops} tops of fold {settings.get('nfold', 3)}: read are one or two threefold tops")
+    if tops not in (1, 2, 3) or settings.get("nfold", 3) != 3:
+        raise ValueError(f"{tops} tops of fold {settings.get('nfold', 3)}: read are one to three threefold tops")
     strange = [
         key for key, value in values.items()
-        if value and re.sub(r"_[12]$", "", key) not in (*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE)
+        if value and re.sub(r"_[123]$", "", key) not in (*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE)
     ]  # fmt: skip
     if strange:
         squares = "; XIAM multiplies Dpi2 by ⟨p - ρ·P⟩², which no term here does" if "Dpi2" in "".join(strange) else ""
@@ -130,7 +130,7 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
     }
     constants = Constants(**numbers, reduction=reduction, representation="Ir")
     internal = InternalRotationConstants(
-        _one_top(values) if tops == 1 else _two_tops(values), "PAM", vt_max=0, source="file of XIAM"
+        _one_top(values) if tops == 1 else _several_tops(values, tops), "PAM", vt_max=0, source="file of XIAM"
     )
     dipole = tuple(values.get(key, 0.0) for key in DIPOLE)
     top = Top.from_constants(
@@ -166,8 +166,12 @@ def _one_top(values: dict[str, float]) -> dict[str, float]:
     return constants | {"delta": float(np.cos(turn)) * constants["delta"]}
 
 
-def _two_tops(values: dict[str, float]) -> dict[str, float]:
-    return {f"{name}_{top}": value for top in (1, 2) for name, value in _constants_of_top(values, f"_{top}").items()}
+def _several_tops(values: dict[str, float], tops: int) -> dict[str, float]:
+    return {
+        f"{name}_{top}": value
+        for top in range(1, tops + 1)
+        for name, value in _constants_of_top(values, f"_{top}").items()
+    }
 
 
 def _constants_of_top(values: dict[str, float], suffix: str) -> dict[str, float]:

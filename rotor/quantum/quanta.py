@@ -3,7 +3,7 @@
 | name | what it is |
 |---|---|
 | `v` | number of the vibrational or tunnelling state |
-| `species` | of the permutations of a turning group: A, E; of two AA, AE, EA, EE, EE* for (σ1, σ2) = 00, 01, 10, 11, 1-1 |
+| `species` | of the permutations of a turning group: A, E; of two AA, AE, EA, EE, EE* for (σ1, σ2) = 00, 01, 10, 11, 1-1; AAA ... |
 | `vt` | number of the torsional state of a species |
 | `n` | rotational angular momentum where spins are coupled to it (`j` where there are none) |
 | `j` | total angular momentum without nuclear spins; the rotational one where there is no spin |
@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.tops.internal_rotation import species_of_tops
 
 FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
 
@@ -69,14 +70,8 @@ _HEADINGS = {
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
 
 SPECIES_NUMBERS = {
-    "A": 0,
-    "E": 1,
-    "AA": 10,
-    "AE": 11,
-    "EA": 12,
-    "EE": 13,
-    "EE*": 14,
-}  # how labels of whole numbers have species
+    name: first + i for tops, first in ((1, 0), (2, 10), (3, 100)) for i, name in enumerate(species_of_tops(tops))
+}  # how labels of whole numbers have species: A, E are 0, 1; AA, AE, EA, EE, EE* are 10 to 14; AAA ... are 100 to 113
 
 Quanta = Mapping[str, NDArray[Any]]
 

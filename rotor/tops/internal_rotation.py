@@ -6,8 +6,9 @@ In the rho-axis frame (RAM) z is along ρ and the rotational constants of the to
 
 A beside F (p - ρPa)². In the principal-axis frame (PAM, as XIAM has it) the rotational constants and distortion are those of the principal
 axes, F0 = ħ²/2I_α of the top alone, and delta is the angle of its axis from a, in the plane ab. The names of further terms are in
-`rotor.quantum.internal_rotation.terms`. Two tops are given in the PAM, with the number of the top behind each name: F0_1, delta_1,
-epsilon_1 (about a, from b), V3_1, V6_1, F0_2 ..., and V12, V12s for what couples them. Constants without a stated frame are refused.
+`rotor.quantum.internal_rotation.terms`. Two or three tops are given in the PAM, with the number of the top behind each name: F0_1, delta_1,
+epsilon_1 (about a, from b), V3_1, V6_1, F0_2 ..., and V12, V12s (V13 ...) for what couples them.
+Constants without a stated frame are refused.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from types import MappingProxyType
 from typing import Any
 
@@ -31,16 +33,39 @@ SPELLED = re.compile(
 )
 FRAMES = ("RAM", "PAM")
 NEEDED = {"RAM": ("F", "rho", "V3"), "PAM": ("F0", "delta", "V3")}
-NUMBERED = tuple(f"{name}_{top}" for top in (1, 2) for name in ("F0", "delta", "epsilon", "V3", "V6"))  # of two tops
-BETWEEN_TOPS = ("V12", "V12s")
-NEEDED_OF_TWO = tuple(name for name in NUMBERED if not name.startswith(("epsilon", "V6")))
+MOST_TOPS = 3
+COUNTED = {2: "two", 3: "three"}
+NUMBERED = {
+    f"{name}_{top}": top for top in range(1, MOST_TOPS + 1) for name in ("F0", "delta", "epsilon", "V3", "V6")
+}  # constants of several tops, and the number of the top
+PAIRS = {"V12": 2, "V12s": 2, "V13": 3, "V13s": 3, "V23": 3, "V23s": 3}  # and of two of them, with the higher number
 BARE = (
     "rho",
     "delta",
     *(name for name in NUMBERED if name.startswith(("delta", "epsilon"))),
 )  # without a unit, radians
-DEFAULT_FUNCTIONS = {1: 9, 2: 25}  # n_v by the number of tops: 1 Hz for v_t = 0 at J = 25 of one, MHz at J = 20 of two
-MOST_FUNCTIONS = {1: 20, 2: 81}
+DEFAULT_FUNCTIONS = {
+    1: 9,
+    2: 25,
+    3: 60,
+}  # n_v by the number of tops; v_t = 0: 1 Hz of one top at J = 25, a tenth of a MHz to 1 MHz of several
+MOST_FUNCTIONS = {1: 20, 2: 81, 3: 100}
+
+
+def species_of_tops(count: int) -> dict[str, tuple[int, ...]]:
+    """σ of each top by the name of the species; each stands for the opposite σ too, so that the first that is not 0 is 1.
+
+    >>> species_of_tops(2)
+    {'AA': (0, 0), 'AE': (0, 1), 'EA': (1, 0), 'EE': (1, 1), 'EE*': (1, -1)}
+    >>> len(species_of_tops(3)), species_of_tops(3)["EE*A"]
+    (14, (1, -1, 0))
+    """
+    letters = {0: "A", 1: "E", -1: "E*"}
+    return {
+        "".join(letters[s] for s in sigma): sigma
+        for sigma in product(letters, repeat=count)
+        if next(filter(None, sigma), 1) > 0
+    }
 
 
 def is_torsional(name: str) -> bool:
@@ -49,7 +74,7 @@ def is_torsional(name: str) -> bool:
     >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
     [True, True, False, False]
     """
-    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED, *NUMBERED, *BETWEEN_TOPS):
+    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED, *NUMBERED, *PAIRS):
         return True
     match = SPELLED.fullmatch(name)
     return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
@@ -57,11 +82,11 @@ def is_torsional(name: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class InternalRotationConstants:
-    """Constants of one threefold top, or of two: MHz by name, rho without a unit.
+    """Constants of one threefold top, or of two or three: MHz by name, rho without a unit.
 
     values: F, rho, V3 and further terms, apart from the rotational constants and distortion, which are the top's. frame: "RAM" or "PAM".
     vt_max: the highest torsional state of the levels. functions: n_v, the torsional functions retained for each K; 0 stands for 9, and for
-    25 products of two tops. spin_states: 2I + 1 of
+    25 products of two tops, 60 of three. spin_states: 2I + 1 of
     each nucleus that turns, 2 of hydrogen. names: "K", of a top that turns nearly freely E levels by the signed K that they mostly are;
     "energy", Ka and Kc counted by energy inside each v_t, as westerfit and BELGI (A levels) do, which is another order for such a top.
     exchanged: of two equivalent tops 2I + 1 of the nuclei of each further pair that goes over into itself when they are exchanged, (2,) of
@@ -91,7 +116,7 @@ class InternalRotationConstants:
         self._check_names()
         numbers = {n: float(value) if n in BARE else parse_quantity(value, "MHz") for n, value in self.values.items()}
         for name in numbers:
-            if name in ("F", "F0", "F0_1", "F0_2") and not numbers[name] > 0:
+            if (name == "F" or name.startswith("F0")) and not numbers[name] > 0:
                 raise ValueError(f"{name} = {numbers[name]:g} MHz: expected a number above 0")
         if not self.functions:
             object.__setattr__(self, "functions", DEFAULT_FUNCTIONS[self.tops])
@@ -103,7 +128,7 @@ class InternalRotationConstants:
             )
         if self.names not in ("K", "energy"):
             raise ValueError(f"names {self.names!r} of levels of internal rotation: expected K or energy")
-        if self.exchanged and (self.tops == 1 or min(self.exchanged) < 1):
+        if self.exchanged and (self.tops != 2 or min(self.exchanged) < 1):
             raise ValueError(
                 f"exchanged = {list(self.exchanged)}: expected 2I + 1 of each pair of nuclei that the exchange of two tops exchanges too"
             )
@@ -113,8 +138,8 @@ class InternalRotationConstants:
     def _check_names(self) -> None:
         """ValueError for names that are none, that another frame has, and that are missing."""
         for name in self.values:
-            if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[3-9]", name):
-                raise ValueError(f"{name}: computed are molecules with one or two tops; leave the others locked")
+            if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[4-9]", name):
+                raise ValueError(f"{name}: computed are molecules with up to three tops; leave the others locked")
             if not is_torsional(name):
                 known = ("F", "rho", *BARRIERS, *NAMED)
                 raise ValueError(
@@ -124,13 +149,12 @@ class InternalRotationConstants:
         needed: tuple[str, ...] = NEEDED[self.frame]
         others: tuple[str, ...] = NEEDED["PAM" if self.frame == "RAM" else "RAM"]
         place = f"in the frame {self.frame}"
-        if self.tops == 2:
-            needed, place = NEEDED_OF_TWO, "of two tops"
-            others = tuple(name for name in self.values if name not in (*NUMBERED, *BETWEEN_TOPS))
+        if self.tops > 1:
+            needed = tuple(f"{name}_{top}" for top in range(1, self.tops + 1) for name in ("F0", "delta", "V3"))
+            place = f"of {COUNTED[self.tops]} tops"
+            others = tuple(name for name in self.values if name not in (*NUMBERED, *PAIRS))
             if self.frame != "PAM":
-                raise ValueError(
-                    f"internal rotation of two tops in the frame {self.frame}: expected PAM (principal axes)"
-                )
+                raise ValueError(f"internal rotation {place} in the frame {self.frame}: expected PAM (principal axes)")
         if missing := [name for name in needed if name not in self.values]:
             raise ValueError(f"internal rotation: {', '.join(missing)} missing; expected {', '.join(needed)} {place}")
         if strange := [name for name in others if name in self.values and name not in needed]:
@@ -139,7 +163,7 @@ class InternalRotationConstants:
     @property
     def tops(self) -> int:
         """How many tops turn."""
-        return 2 if any(name in (*NUMBERED, *BETWEEN_TOPS) for name in self.values) else 1
+        return max((NUMBERED | PAIRS).get(name, 1) for name in (*self.values, ""))
 
     def __reduce__(self) -> tuple[Any, ...]:
         others = (

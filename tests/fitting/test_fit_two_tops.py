@@ -1,4 +1,4 @@
-"""Fits of two internal rotors: derivatives, and constants found again from lines of all species."""
+"""Fits of two internal rotors: derivatives, also of three, and constants found again from lines of all species."""
 
 import numpy as np
 import pytest
@@ -43,11 +43,14 @@ def lines_of(top, jmax, error_mhz=0.005, noise=None):
     return assignments(NAMES, upper, lower, frequency, error_mhz, blend=np.arange(len(seen)))
 
 
-@pytest.mark.parametrize("epsilon", [None, 0.3])
-def test_derivatives_by_constants_of_two_tops_are_those_of_finite_differences(epsilon):
-    values = DIFFERENT if epsilon is None else DIFFERENT | {"epsilon_2": epsilon}
+THIRD = {"F0_3": 159e3, "delta_3": 1.45, "V3_3": 200.0 * CM, "V23": 3 * CM}
+
+
+@pytest.mark.parametrize("further", [{}, {"epsilon_2": 0.3}, THIRD], ids=["plane", "no plane", "three tops"])
+def test_derivatives_by_constants_of_several_tops_are_those_of_finite_differences(further):
+    values = DIFFERENT | further
     constants = TopConstants(two_tops(values | {"V12s": -2 * CM}))
-    labels = levels_in(lines_of(two_tops(values), 2))[0]
+    labels = levels_in(lines_of(two_tops(values), 1 if "F0_3" in values else 2))[0]
     model = model_of(constants, labels)
     point = np.array(list(constants.values.values()))
     slopes = model.levels(point)[1]

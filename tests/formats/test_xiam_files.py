@@ -62,10 +62,12 @@ def test_an_axis_on_the_other_side_of_a_has_a_delta_below_zero(mtbe):
     assert rotor.read(mtbe).internal_rotation.values["delta"] == pytest.approx(-0.460684017)
 
 
-def test_two_tops(tmp_path):
-    path = tmp_path / "two.xi"
+@pytest.mark.parametrize("ntop", [2, 3])
+def test_several_tops(tmp_path, ntop):
+    path = tmp_path / "several.xi"
     tops = " F0_1 158.\n delta_1 0.5\n V1n_1 9000.\n F0_2 160.\n delta_2 2.4\n epsil_2 0.1\n V1n_2 7000.\n"
-    path.write_text("two\n\nntop 2\n BJ 2.7\n BK 1.6\n B- 0.4\n" + tops)
+    third = " F0_3 159.\n delta_3 1.4\n V1n_3 8000.\n"
+    path.write_text(f"several\n\nntop {ntop}\n BJ 2.7\n BK 1.6\n B- 0.4\n" + tops + third * (ntop - 2))
     values = rotor.read(path).internal_rotation.values
     assert values == {
         "F0_1": 158e3,
@@ -75,7 +77,7 @@ def test_two_tops(tmp_path):
         "delta_2": 2.4,
         "epsilon_2": 0.1,
         "V3_2": 7e6,
-    }
+    } | ({"F0_3": 159e3, "delta_3": 1.4, "V3_3": 8e6} if ntop == 3 else {})
 
 
 @pytest.mark.parametrize(
@@ -84,7 +86,7 @@ def test_two_tops(tmp_path):
         (" BK(1) ", " XX(1) ", "BK missing"),
         (" F0 ", " XX ", "F0 missing"),
         ("reduc 1", "reduc 2", "reduc 2"),
-        ("ntop 1", "ntop 3", "3 tops"),
+        ("ntop 1", "ntop 4", "4 tops"),
         ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the plane"),
         ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J.*which no term here does"),
         ("\\F(1) ", " chi_z 1E-3\n\\F(1) ", "chi_aa beside spin 0: expected spin 2"),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
 ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
-MOST_J_COMPARED = {1: 30, 2: 8}  # J up to which the truncation of the torsion is compared, by the number of tops
+MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # J up to which the truncation of the torsion is compared, by the number of tops
 
 
 def of_top(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:

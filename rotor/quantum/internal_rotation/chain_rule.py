@@ -1,6 +1,6 @@
 """Derivatives of levels by constants of principal axes, which enter the Hamiltonian also through F, ρ and angles.
 
-F, ρ and the angle of ρ of one top, and F_ij and ρ_i of two, follow from A, B, C, F0, delta and epsilon, so that
+F, ρ and the angle of ρ of one top, and F_ij and ρ_i of several, follow from A, B, C, F0, delta and epsilon, so that
 
     dE/dc = ∂E/∂c + Σ_q ∂E/∂q ∂q/∂c,        q = F, ρ, angle;    F1, F2, F12, ρ_1a, ρ_1b ....
 
@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
-from rotor.quantum.internal_rotation.two_tops import TwoTops, torsional_kinetics
+from rotor.quantum.internal_rotation.several_tops import SeveralTops, torsional_kinetics
 
 ANGLE = "angle"  # name of the angle of ρ from the axis a
 RELATIVE_STEP, ANGLE_STEP = 1e-5, 1e-5  # steps (angles in radians) at which central differences are exact to 1e-10
@@ -43,19 +44,22 @@ class ChainRule:
 NO_CHAIN = ChainRule((), (), np.zeros((0, 0)))
 
 
-def chain_rule(model: RamModel | TwoTops, values: Mapping[str, float]) -> ChainRule:
+def chain_rule(model: RamModel | SeveralTops, values: Mapping[str, float]) -> ChainRule:
     """Dependence of F, ρ and angles on constants of principal axes; empty for constants of the rho-axis frame."""
-    if isinstance(model, TwoTops):
+    if isinstance(model, SeveralTops):
         angles = [name for name in values if name.startswith(("F0_", "delta_", "epsilon_"))]
-        return _rule(kinetics_of_two_tops, values, ["F1", "F2", "F12", *model.slopes_by_rho((0, 0))], [*"ABC", *angles])
+        kinetic = [*kinetics_of_tops(values)]
+        along = model.slopes_by_rho((0,) * len(model.tops))
+        quantities = [name for name in kinetic if name in along or not name.startswith("rho")]
+        return _rule(kinetics_of_tops, values, quantities, [*"ABC", *angles])
     if "F0" not in values:
         return NO_CHAIN
     return _rule(kinetics_of_one_top, values, ["F", "rho", ANGLE], [*"ABC", "F0", "delta"])
 
 
-def further_operators(model: RamModel | TwoTops, species: str, chain: ChainRule) -> dict[str, list[Product]]:
+def further_operators(model: RamModel | SeveralTops, species: str, chain: ChainRule) -> dict[str, list[Product]]:
     """∂H/∂q of the quantities that are not coefficients of the Hamiltonian."""
-    if isinstance(model, TwoTops):
+    if isinstance(model, SeveralTops):
         return model.slopes_by_rho(model.species[species])
     return {ANGLE: model.slope_by_angle(model.species[species])} if ANGLE in chain.quantities else {}
 
@@ -66,11 +70,12 @@ def kinetics_of_one_top(values: Mapping[str, float]) -> dict[str, float]:
     return {"F": model.values["F"], "rho": model.values["rho"], ANGLE: model.angle}
 
 
-def kinetics_of_two_tops(values: Mapping[str, float]) -> dict[str, float]:
-    """F_ij and the components of ρ_i of two tops."""
+def kinetics_of_tops(values: Mapping[str, float]) -> dict[str, float]:
+    """F_i, F_ij and the components of ρ_i of several tops."""
     f, rho = torsional_kinetics(values, values)
-    along = {f"rho_{i + 1}{letter}": float(rho[i, g]) for i in (0, 1) for g, letter in enumerate("abc")}
-    return {"F1": float(f[0, 0]), "F2": float(f[1, 1]), "F12": float(f[0, 1])} | along
+    named = {f"F{i + 1}": float(f[i, i]) for i in range(len(f))}
+    named |= {f"F{i + 1}{j + 1}": float(f[i, j]) for i, j in combinations(range(len(f)), 2)}
+    return named | {f"rho_{i + 1}{letter}": float(rho[i, g]) for i in range(len(f)) for g, letter in enumerate("abc")}
 
 
 def _rule(

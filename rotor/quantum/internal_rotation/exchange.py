@@ -136,7 +136,7 @@ class SpinCounts:
     states: int = 2
     pairs: tuple[int, ...] = ()
 
-    def functions_of_species(self, sigma: tuple[int, int], x: Ints) -> Ints:
+    def functions_of_species(self, sigma: tuple[int, ...], x: Ints) -> Ints:
         """Spin functions (levels,) of levels with a sign x under the exchange, summed over their components.
 
         >>> counts = SpinCounts(2)

@@ -16,18 +16,18 @@ from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
+from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
-from rotor.quantum.internal_rotation.two_tops import SPECIES, TwoTops, two_tops
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
-from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.tops.internal_rotation import InternalRotationConstants, species_of_tops
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-TurningTops = RamModel | TwoTops
+TurningTops = RamModel | SeveralTops
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
@@ -253,7 +253,7 @@ def turning_tops(top: Top, constants: InternalRotationConstants) -> TurningTops:
     model = turning_model(top.constants.values, constants.values, constants)
     dipole = zip("abc", top.dipole_abc_debye or (), strict=False)
     if (
-        isinstance(model, TwoTops)
+        isinstance(model, SeveralTops)
         and model.axis
         and (beside := [name for name, mu in dipole if mu and name != model.axis])
     ):
@@ -268,8 +268,8 @@ def turning_model(
     rotation: Mapping[str, float], values: Mapping[str, float], constants: InternalRotationConstants
 ) -> TurningTops:
     """Model of constants of the rotation and of the internal rotors, in the frame that `constants` states."""
-    if constants.tops == 2:
-        return two_tops(rotation, values)
+    if constants.tops > 1:
+        return several_tops(rotation, values)
     return (
         RamModel({**rotation, **values})
         if constants.frame == "RAM"
@@ -281,7 +281,7 @@ def species_blocks(
     model: TurningTops, name: str, jmin: int, jmax: int, count: int, needed: Ints | None = None
 ) -> SpeciesBlocks:
     """Blocks of a species, for J from jmin to jmax or for those in `needed`."""
-    if isinstance(model, TwoTops):
+    if isinstance(model, SeveralTops):
         return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
     return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
 
@@ -299,7 +299,7 @@ class Degeneracies:
     @classmethod
     def of(cls, model: TurningTops, constants: InternalRotationConstants) -> Degeneracies:
         """Degeneracies of a model."""
-        equivalent = isinstance(model, TwoTops) and bool(model.axis)
+        equivalent = isinstance(model, SeveralTops) and bool(model.axis)
         if constants.exchanged and not equivalent:
             raise ValueError(
                 "internal rotation: exchanged nuclei are stated, and no twofold axis a, b or c exchanges the tops: expected equal F0, V3, "
@@ -308,28 +308,27 @@ class Degeneracies:
         return cls(constants, equivalent)
 
     def components(self, species: str) -> int:
-        """States that coincide: (σ1, σ2) and (-σ1, -σ2), except for A and AA; for equivalent tops also AE and EA."""
+        """States that coincide: σ and -σ, except for A, AA and AAA; for equivalent tops also AE and EA."""
         return 1 if set(species) == {"A"} else 4 if self.equivalent and species == "AE" else 2
 
     def weights(self, species: str, functions: TorsionRotation, rows: Ints) -> Ints:
         """Spin weights (levels,), summed over components, of the levels at `rows` of the functions.
 
-        Weights of inequivalent tops are products; EE and EE* share the four components, so each has half of the product.
+        Weights of inequivalent tops are products; each of the species has two components, σ and -σ, but for that of σ = 0.
         """
+        names = species_of_tops(self.constants.tops)
         if self.equivalent:
             counts = SpinCounts(self.constants.spin_states, self.constants.exchanged)
             signs = np.array([1, -1])
             divisor = np.gcd.reduce(
-                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in SPECIES.values()])
+                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in species_of_tops(2).values()])
             )
             x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
-            return np.asarray(counts.functions_of_species(SPECIES[species], x[rows]) // divisor)
+            return np.asarray(counts.functions_of_species(names[species], x[rows]) // divisor)
         a, e = self.constants.weights
-        weights = (
-            {"A": a, "E": e}
-            if self.constants.tops == 1
-            else {"AA": a * a, "AE": a * e, "EA": e * a, "EE": e * e // 2, "EE*": e * e // 2}
-        )
+        weights = {
+            name: (1 + any(sigma)) * math.prod(e // 2 if s else a for s in sigma) for name, sigma in names.items()
+        }
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
@@ -354,7 +353,7 @@ def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: 
 def species_splitting(top: Top, constants: InternalRotationConstants, j: int) -> float:
     """The largest |E_s(K) - E_A(K) - E_s(0) + E_A(0)| over |K| ≤ J and species s of the torsional ground state, MHz."""
     model = turning_tops(top, constants)
-    if isinstance(model, TwoTops):
+    if isinstance(model, SeveralTops):
         ground = [model.ground_energies(species, j) for species in model.species.values()]
     else:
         ground = [model.ground_energies(sigma, j) for sigma in model.species.values()]

@@ -7,30 +7,30 @@ from typing import Any
 import numpy as np
 
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.two_tops import EACH, TwoTops
+from rotor.quantum.internal_rotation.several_tops import EACH, SeveralTops
 
 STEP = 4  # functions added for the comparison
 MARGIN = 1.5  # factor on the change from n_v to n_v + 4 functions: the error falls at least fivefold in four functions
 ROUNDING = 64 * float(np.finfo(float).eps)  # round-off relative to the largest energy in a block
 
 
-def truncation_mhz(model: RamModel | TwoTops, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
+def truncation_mhz(model: RamModel | SeveralTops, jmax: int, vt_max: int, count: int, waves: int = 10) -> float:
     """Bound (MHz) of the truncation error of levels with v_t ≤ vt_max at J = jmax, where it is largest.
 
-    Energies are upper bounds and fall with n_v. The bound is 1.5 times their change from n_v to n_v + 4 functions (2 n_v products for two
-    tops), plus round-off.
+    Energies are upper bounds and fall with n_v. The bound is 1.5 times their change from n_v to n_v + 4 functions (2 n_v products for
+    several tops), plus round-off.
 
     >>> model = RamModel({"A": 9e3, "B": 4e3, "C": 3e3, "Dab": 0.0, "F": 2e5, "rho": 0.1, "V3": 1e7})
     >>> truncation_mhz(model, 3, 0, 9) < 1e-5
     True
     """
     largest, scale = 0.0, 0.0
-    has_two_tops = isinstance(model, TwoTops)
-    enlarged = min(2 * count, EACH**2) if has_two_tops else min(count + STEP, 2 * waves + 1)
+    products = EACH ** len(model.tops) if isinstance(model, SeveralTops) else 0
+    enlarged = min(2 * count, products) if products else min(count + STEP, 2 * waves + 1)
     for species in model.species.values():
         energies = []
         for functions in (count, enlarged):
-            solve: Any = model.blocks  # takes σ, or (σ1, σ2)
+            solve: Any = model.blocks  # takes σ, or σ of each top
             blocks = solve(species, jmax, jmin=jmax, count=functions, waves=waves)
             levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])

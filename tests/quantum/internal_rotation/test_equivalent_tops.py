@@ -12,7 +12,7 @@ from rotor import units
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import write_molecule_file
 from rotor.quantum.internal_rotation.exchange import SpinCounts
-from rotor.quantum.internal_rotation.two_tops import two_tops
+from rotor.quantum.internal_rotation.several_tops import several_tops
 
 CM = units.MHZ_PER_CM
 ABC = {"A": 9800.0, "B": 4300.0, "C": 3200.0, "DeltaK": 0.01}
@@ -111,7 +111,7 @@ def test_weights_sum_to_all_spin_functions(n):
 @pytest.mark.parametrize("case", ANGLES)
 @pytest.mark.parametrize("species", [(0, 0), (1, 1)])
 def test_functions_with_a_sign_give_the_levels_of_plain_ones(case, species):
-    model = two_tops(ABC, constants_of(case))
+    model = several_tops(ABC, constants_of(case))
     assert model.axis == case[0]
     blocks = model.blocks(species, 3, count=9)
     plain = replace(model, axis="").blocks(species, 3, count=len(blocks.functions.torsion.retained))
@@ -128,7 +128,7 @@ def test_functions_with_a_sign_give_the_levels_of_plain_ones(case, species):
 @pytest.mark.parametrize("case", ANGLES)
 def test_the_sign_of_a_ground_state_is_that_of_a_rigid_top(case):
     """C2 about the axis changes J(Ka, Kc) by (-1)^Ka, (-1)^(Ka + Kc), (-1)^Kc of a, b, c."""
-    model = two_tops(ABC, constants_of(case))
+    model = several_tops(ABC, constants_of(case))
     for species in ((0, 0), (1, 1)):
         levels = model.blocks(species, 4, count=9).solve_once(model.coefficients, 0)
         quanta = levels.quanta
@@ -140,7 +140,7 @@ def test_the_sign_of_a_ground_state_is_that_of_a_rigid_top(case):
 
 @pytest.mark.parametrize("change", [{"V3_2": 151 * CM}, {"F0_2": 158.1e3}, {"delta_2": pi - 0.561}])
 def test_tops_that_differ_are_not_equivalent(change):
-    assert two_tops(ABC, constants_of(**change)).axis == ""
+    assert several_tops(ABC, constants_of(**change)).axis == ""
 
 
 FILE = """
@@ -190,7 +190,7 @@ def test_weights_of_levels_of_equivalent_tops(tmp_path):
 def test_strengths_are_those_of_inequivalent_tops_together(tmp_path, monkeypatch):
     top = read(tmp_path)
     lines = rotor.api.line_list(top, jmax=2, q=1.0, min_lgint=None)
-    from rotor.quantum.internal_rotation import two_tops as module
+    from rotor.quantum.internal_rotation import several_tops as module
 
     monkeypatch.setattr(module, "_exchanging", lambda first, second: "")
     apart = rotor.api.line_list(top, jmax=2, q=1.0, min_lgint=None)
