@@ -191,8 +191,6 @@ def _run(arguments: list[str]) -> int:
     if words[:1] and words[0] in ONE_THREAD:
         jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
         process.one_thread_of_blas(int(jmax[1]) if jmax else None)
-    if verbs == ["run"]:
-        process.start_workers_ahead(arguments)
     command = typer.main.get_command(_application(verbs, listed=not is_verb))
     # undecodable bytes of file names are read as UTF-8, or shown as �
     provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")

@@ -532,10 +532,9 @@ def loaded(_):
     return [name in sys.modules for name in ("rotor.verbs.levels", "rdkit.Chem", "rotor.verbs.tumble")]
 
 if __name__ == "__main__":
-    from rotor.cli.shared import process
-    process.begin()
-    process.start_workers_ahead(["run", "s.toml", "--workers", "2"])
-    heavy = "numpy" in sys.modules
+    from rotor.__main__ import start_workers_ahead
+    start_workers_ahead(["run", "s.toml", "--workers", "2"])
+    heavy = bool({"numpy", "typer"} & set(sys.modules))
     from rotor.scenes.worker_processes import worker_processes
     with worker_processes(2) as pool:
         print(heavy, pool.submit(loaded, 0).result())
@@ -552,16 +551,16 @@ def test_the_server_of_workers_starts_before_anything_is_loaded(folder):
 
 
 def test_arguments_that_are_wrong_start_no_workers(monkeypatch):
-    from rotor.cli.shared import process
+    from rotor.__main__ import start_workers_ahead
     from rotor.scenes import worker_processes as processes
 
     texts = []
-    monkeypatch.setattr(process, "_OWN", True)
     monkeypatch.setattr(processes, "start_ahead", texts.append)
-    for words in ("run s.toml", "run s.toml --workers 1", "run s.toml --workers x", "run s.toml --workers 01"):
-        process.start_workers_ahead(words.split())
+    for words in ("run s.toml", "run s.toml --workers 1", "run s.toml --workers x", "run s.toml --workers 01",
+                  "plan s.toml --workers 2"):  # fmt: skip
+        start_workers_ahead(words.split())
     assert texts == []
-    process.start_workers_ahead(["run", "no such file", "--workers=2"])
+    start_workers_ahead(["run", "no such file", "--workers=2"])
     assert texts == [""]
 
 

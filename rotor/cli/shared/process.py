@@ -5,12 +5,9 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-import re
 import sys
 import threading
-from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import NoReturn
 
 _OWN = False  # set by the console script
@@ -78,18 +75,3 @@ def one_thread_of_blas(jmax: int | None = None) -> None:
     """
     if _OWN and "numpy" not in sys.modules and (jmax is None or jmax <= _ONE_THREAD_TO):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-def start_workers_ahead(arguments: Sequence[str]) -> None:
-    """Of a scene that is run by several processes: what they import is loaded while this process reads the scene.
-
-    Arguments that are wrong start nothing; what is wrong is said where they are read.
-    """
-    several = re.search(r"--workers[= ]0*([2-9]|[1-9]\d+)(?!\S)", " ".join(arguments))
-    if not (_OWN and several):
-        return
-    from rotor.scenes.worker_processes import start_ahead
-
-    files = (Path(word) for word in arguments[1:])
-    with suppress(OSError, ValueError):
-        start_ahead(next((path.read_text(encoding="utf-8") for path in files if path.is_file()), ""))
