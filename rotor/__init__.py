@@ -7,8 +7,8 @@
     spectrum.write("water.cat")
     spectrum.plot()
 
-Every verb of the command line is a function whose keyword arguments are numbers in the unit of the argument, or texts with a unit.
-The building blocks behind them are in `rotor.api`. Names are loaded when they are first used, so that `import rotor` does no work.
+Each verb of the command line is a function; its keyword arguments are numbers in the unit of the argument, or texts with a unit.
+The building blocks behind the verbs are in `rotor.api`. Names are loaded on first use, so that `import rotor` does no work.
 """
 
 from importlib import import_module
@@ -56,7 +56,7 @@ VERBS = (
     "assign",
     "structure",
     "torsion",
-)  # each a function of that name
+)  # each is a function of this name
 
 _MODULES = {
     "ErrorBudget": "rotor.requests.budget",
@@ -101,7 +101,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _moved(name: str) -> Any:
-    """A name that has left for `rotor.api`, with a warning; AttributeError for others."""
+    """A name that moved to `rotor.api`, with a deprecation warning; AttributeError for unknown names."""
     from rotor import api
 
     if name not in api.MOVED:

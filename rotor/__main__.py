@@ -31,5 +31,5 @@ def main() -> None:
     command()
 
 
-if __name__ == "__main__":  # not where something only imports every module of the package
+if __name__ == "__main__":  # not when a tool imports all modules of the package
     main()

@@ -3,7 +3,7 @@
     from rotor.api import line_list
     lines = line_list("water", temperature_k=300, jmax=20)
 
-Functions of a top take whatever `rotor.read` takes instead. Names are loaded when they are first used.
+Functions of a top also accept anything that `rotor.read` accepts. Names are loaded on first use.
 """
 
 import ast
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import did_you_mean
 
-if TYPE_CHECKING:  # the declaration of what stands here: `modules` reads these lines
+if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this module
     from rotor import units as units
     from rotor.alignment.acting import revival_period_ps as revival_period_ps
     from rotor.alignment.align import AlignmentTrace as AlignmentTrace
@@ -239,9 +239,9 @@ MOVED = frozenset(
         "answer_tumble", "answer_zeeman", "effects_of", "free_motion", "line_list", "partition_function", "raman_lines", "refine",
         "solve_levels", "stark_map", "stream_lines", "thermal_tumble", "thermodynamic_functions", "zeeman_map",
     }
-)  # fmt: skip  # names that stood in `rotor` itself
+)  # fmt: skip  # names that moved here from `rotor`
 
-OF_TOPS = frozenset(
+TOP_FUNCTIONS = frozenset(
     {
         "align", "effects_of", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
         "thermal_tumble", "thermodynamic_functions", "zeeman_map",
@@ -251,9 +251,11 @@ OF_TOPS = frozenset(
 
 @cache
 def modules() -> dict[str, str]:
-    """The module of every name, from the imports at the head of this file."""
-    head = next(one for one in ast.parse(Path(__file__).read_text(encoding="utf-8")).body if isinstance(one, ast.If))
-    return {name.name: str(one.module) for one in head.body if isinstance(one, ast.ImportFrom) for name in one.names}
+    """The module of each name, from the imports at the head of this file."""
+    body = ast.parse(Path(__file__).read_text(encoding="utf-8")).body
+    head = next(statement for statement in body if isinstance(statement, ast.If))
+    imports = (statement for statement in head.body if isinstance(statement, ast.ImportFrom))
+    return {name.name: str(statement.module) for statement in imports for name in statement.names}
 
 
 def __dir__() -> list[str]:
@@ -268,13 +270,13 @@ def __getattr__(name: str) -> Any:
     if name not in modules():
         raise AttributeError(f"module 'rotor.api' has no attribute {name!r}{did_you_mean(name, modules())}")
     where = import_module(modules()[name])
-    found = getattr(where, name) if hasattr(where, name) else import_module(f"{where.__name__}.{name}")
-    return _taking_words(found) if name in OF_TOPS else found
+    value = getattr(where, name) if hasattr(where, name) else import_module(f"{where.__name__}.{name}")
+    return _reading_tops(value) if name in TOP_FUNCTIONS else value
 
 
 @cache
-def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function of a top, given a top or whatever `read` makes one of."""
+def _reading_tops(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of a top, extended to accept anything from which `read` makes a top."""
 
     @wraps(function)
     def call(top: Any, *args: Any, **options: Any) -> Any:
@@ -282,21 +284,21 @@ def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
         from rotor.tops.top import Top
 
         _refuse_arguments(function, (top, *args), options)
-        found = top if isinstance(top, Top) else read(top)
-        if not isinstance(found, Top):
-            raise ValueError(f"{top}: holds a {type(found).__name__}, not a molecule or constants")
-        return function(found, *args, **options)
+        value = top if isinstance(top, Top) else read(top)
+        if not isinstance(value, Top):
+            raise ValueError(f"{top}: holds a {type(value).__name__}, not a molecule or constants")
+        return function(value, *args, **options)
 
     return call
 
 
 def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
-    """TypeError, with the names that would do, for arguments that the function does not take."""
-    taken = signature(function)
+    """Raise TypeError, with the valid names, for arguments that the function does not take."""
+    accepted = signature(function)
     try:
-        taken.bind(*args, **options)
+        accepted.bind(*args, **options)
     except TypeError as error:
-        unknown = next((name for name in options if name not in taken.parameters), None)
-        names = [name for name in taken.parameters if name not in ("top", *options)]
+        unknown = next((name for name in options if name not in accepted.parameters), None)
+        names = [name for name in accepted.parameters if name not in ("top", *options)]
         which = did_you_mean(unknown, names) if unknown else ""
         raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None

@@ -1,6 +1,6 @@
 """Verbs as functions: `rotor.spectrum("water", temperature_k=100)`. Keyword arguments are the fields of the verb's declaration.
 
-A value is a number in the unit of the field or a text with a unit ("100 K"). What comes back is a `Result`.
+A value is a number in the unit of the field, or a text with a unit ("100 K"). A call returns a `Result`.
 """
 
 from __future__ import annotations
@@ -62,22 +62,21 @@ EXAMPLES = {
         "[0.0, 0.002, 0.004]",
     ),
     "gas": ('rotor.gas("CO", molecules=100, seed=1).request.molecules', "100"),
-}  # fmt: skip  # of each function: an expression and its value, which a test evaluates
+}  # fmt: skip  # an example of each function and its value; a test evaluates them
 
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """What a verb found out: tables, errors, pictures and files.
+    """Result of a verb: tables, errors, pictures and files.
 
-    answer: everything that the library computed; its attributes are attributes of the result too. verb, request, subject, given: how it
-    was asked for.
+    answer: all computed data; its attributes are also attributes of the result. verb, request, subject, entries: the call that produced it.
     """
 
     verb: Verb
     request: Any
     answer: Any
     subject: Subject
-    given: Entries
+    entries: Entries
 
     @property
     def table(self) -> Table:
@@ -86,7 +85,7 @@ class Result:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the result can be trusted.
+        """Error budget of the main observable.
 
         Raises AttributeError for verbs from outside the package that state none.
         """
@@ -96,9 +95,9 @@ class Result:
         return budget
 
     def facts(self) -> Mapping[str, Any]:
-        """Everything but the table, by the keys of the JSON."""
-        found: Mapping[str, Any] = self.answer.facts()
-        return found
+        """All content except the table, by the keys of the JSON."""
+        facts: Mapping[str, Any] = self.answer.facts()
+        return facts
 
     def to_pandas(self) -> Any:
         """The table as a pandas DataFrame."""
@@ -109,35 +108,35 @@ class Result:
         return self.table.to_polars()
 
     def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
-        """A matplotlib figure; with a path the picture is written too."""
+        """Draw a matplotlib figure; with a path, the picture is also written."""
         from rotor.plots.show import plot
 
         return plot(self.answer, path, **options)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the table or picture that the suffix names.
+        """Write the table or picture in the format of the suffix.
 
-        Raises ValueError for a suffix that the verb does not write.
+        Raises ValueError for a suffix that the verb cannot write.
         """
         from rotor.formats.atomic_write import write_together
 
         target = Path(path)
         outputs = [output for output in self.verb.outputs if target.name.endswith(output.suffixes) and not output.grows]
         if not outputs:
-            known = ", ".join(dict.fromkeys(suffix for output in self.verb.outputs for suffix in output.suffixes))
-            raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {known}")
+            suffixes = ", ".join(dict.fromkeys(suffix for output in self.verb.outputs for suffix in output.suffixes))
+            raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {suffixes}")
         head = {"command": f"rotor.{self.verb.name}", "input": self.subject.text}
-        report = report_of(self.verb, self.answer, head, self.given)
+        report = report_of(self.verb, self.answer, head, self.entries)
         write_together({target: files_of(self.verb, self.answer, report)[outputs[0].name]})
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
-        """The scene that computes the same again; `rotor.write_scene` writes it. folder: from which its files are counted."""
+        """The scene that repeats the calculation; `rotor.write_scene` writes it. folder: of the scene, for names of files."""
         from rotor.scenes.structures import saved_scene
 
-        return saved_scene(self.verb, self.request, self.subject, Path(folder), {}, self.given)
+        return saved_scene(self.verb, self.request, self.subject, Path(folder), {}, self.entries)
 
     def plan(self) -> Any:
-        """Method, cost and what is left out, as `rotor plan` of its scene states them."""
+        """Method, cost and neglected effects, as `rotor plan` of the scene."""
         from rotor.scenes.plan import plan_of
 
         return plan_of(self.scene())
@@ -151,28 +150,28 @@ class Result:
         return f"{self.verb.name} of {self.subject.text or 'no molecule'}: {self.table!r}"
 
     def _repr_html_(self) -> str:
-        """The table for notebooks, and how far it can be trusted."""
+        """The table and the error budget, for notebooks."""
         return self.table._repr_html_() + html_of_errors(self.answer)
 
 
 def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Result:
-    """Carry out a verb with Python values by the names of its fields.
+    """Carry out a verb with values by the names of its fields.
 
-    Raises TypeError for a name that the verb does not have, and ValueError for a value that cannot be.
+    Raises TypeError for an unknown name, and ValueError for an invalid value.
     """
     fields = {field.name: field for field in verb.fields.values()}
     unknown = [name for name in values if name not in fields]
     if unknown:
         others = f"; it takes {', '.join(fields)}"
         raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
-    given = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
-    request, subject = verb.read(given, Place())
-    return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(given))), subject, given)
+    entries = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
+    request, subject = verb.read(entries, Place())
+    return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(entries))), subject, entries)
 
 
 @cache
 def function_of(name: str) -> Callable[..., Result]:
-    """The function of a verb, with a documentation made from its declaration."""
+    """The function of a verb; signature and docstring are made from the declaration."""
     verb = verb_of(name)
     names = {field.name for field in verb.fields.values()}
     first = next((name for name in ("source", "names") if name in names), "")
@@ -192,7 +191,7 @@ def function_of(name: str) -> Callable[..., Result]:
 
 
 def _signature(verb: Verb, first: str) -> Signature:
-    """The arguments by name, so that editors complete them and `help` shows them."""
+    """The signature of the function, for completion in editors and for `help`."""
     fields = [field for field in _arguments(verb) if field.name != first]
     source = [Parameter(first, Parameter.POSITIONAL_OR_KEYWORD, default=None)] if first else []
     named = [Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default) for field in fields]
@@ -203,12 +202,14 @@ def _arguments(verb: Verb) -> list[Field]:
     """The fields that are arguments in Python, each name once."""
     fields = {field.name: field for field in reversed(verb.fields.values()) if field.name}
     return [
-        field for field in verb.fields.values() if fields.get(field.name) is field and not _is_printing(verb, field)
+        field
+        for field in verb.fields.values()
+        if fields.get(field.name) is field and not _is_display_option(verb, field)
     ]
 
 
 def documentation(verb: Verb) -> str:
-    """The docstring of the function of a verb: its arguments with units, from the declaration."""
+    """The docstring of a verb's function, with its arguments and their units."""
     rows = "\n".join(_argument(field) for field in _arguments(verb))
     expression, value = EXAMPLES.get(verb.name, ("", ""))
     example = f"\n\nExamples\n--------\n>>> import rotor\n>>> {expression}\n{value}" if value else ""
@@ -219,8 +220,8 @@ def documentation(verb: Verb) -> str:
     )
 
 
-def _is_printing(verb: Verb, field: Field) -> bool:
-    """Whether a field says how the command line prints, not what is computed."""
+def _is_display_option(verb: Verb, field: Field) -> bool:
+    """Whether a field only affects what the command line prints."""
     from rotor.requests.field import all_fields
 
     return field.identity in all_fields(verb.shown) and not field.key

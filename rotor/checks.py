@@ -1,4 +1,4 @@
-"""Checks of arguments, each with one wording: name, value found, rule."""
+"""Checks of arguments with uniform messages: name, value, rule."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from collections.abc import Collection, Iterable
 
 
 def require_positive(name: str, value: float, unit: str = "") -> float:
-    """The value, refused with a ValueError unless it is finite and above zero.
+    """The value; ValueError unless it is finite and above zero.
 
     >>> require_positive("temperature_k", 300.0)
     300.0
     """
-    of = f"{' ' if unit else ''}{unit}"
+    in_unit = f" {unit}" if unit else ""
     if isinstance(value, str):
-        raise ValueError(f"{name}: {value!r}: expected a number above 0{of}, not a text")
+        raise ValueError(f"{name}: {value!r}: expected a number above 0{in_unit}, not a text")
     if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name}: {value:g}: expected a finite number above 0{of}")
+        raise ValueError(f"{name}: {value:g}: expected a finite number above 0{in_unit}")
     return value
 
 
 def require_whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
-    """Refuse a whole number out of bounds; None passes.
+    """Raise ValueError for a whole number out of bounds; None passes.
 
     Parameters
     ----------
     name : str
-        What the number is called in the error.
+        Name of the number in the error.
     value : int or None
         The number.
     least : int
-        The smallest that is allowed.
+        Smallest allowed value.
     most : int, optional
-        The largest that is allowed.
+        Largest allowed value.
 
     Raises
     ------
@@ -47,16 +47,16 @@ def require_whole(name: str, value: int | None, least: int, most: int | None = N
 
 
 def require_between(name: str, value: float, low: float, high: float) -> float:
-    """The value, refused unless it lies between two bounds, neither of them included.
+    """The value; ValueError unless it lies strictly between two bounds.
 
     Parameters
     ----------
     name : str
-        What the number is called in the error.
+        Name of the number in the error.
     value : float
         The number.
     low, high : float
-        Bounds.
+        Bounds, excluded.
 
     Returns
     -------
@@ -73,36 +73,36 @@ def require_between(name: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def require_one_of(name: str, value: str, known: Collection[str]) -> str:
-    """The value, refused with a ValueError unless it is one of those known."""
-    if value not in known:
-        raise ValueError(f"{name}: {value!r}: expected one of {', '.join(known)}")
+def require_one_of(name: str, value: str, allowed: Collection[str]) -> str:
+    """The value; ValueError unless it is one of the allowed words."""
+    if value not in allowed:
+        raise ValueError(f"{name}: {value!r}: expected one of {', '.join(allowed)}")
     return value
 
 
 def require_top(value: object) -> None:
-    """Refuse what is no top, such as its name; a top is known by its constants, since nothing is imported here."""
+    """Raise ValueError for an object that is not a Top; this module imports nothing and knows a top by its constants."""
     if not hasattr(value, "constants"):
         raise ValueError(f"top: {value!r:.60}: expected a Top; rotor.read makes one of a name, a file or a molecule")
 
 
 class NoAnswerError(RuntimeError):
-    """The input is sound, but no answer was reached: exit code 1; nothing is written."""
+    """The input is valid, but no answer was reached: exit code 1, and no file is written."""
 
 
 class RunStopped(ValueError):
-    """A run that began could not continue; what was written before stays."""
+    """A run stopped after it began; files written so far remain."""
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The names that are like an unknown one, as the end of a message; empty where there is none.
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """End of a message with the names similar to an unknown one; empty if there are none.
 
     >>> did_you_mean("jmex", ["jmax", "range"])
     '; did you mean jmax?'
     """
     from difflib import get_close_matches
 
-    matches = get_close_matches(name, list(known), n=3)
+    matches = get_close_matches(name, list(names), n=3)
     return f"; did you mean {', '.join(matches)}?" if matches else ""
 
 

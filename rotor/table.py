@@ -1,4 +1,4 @@
-"""Tables of equal columns: what lines, levels, spectra and motions have in common."""
+"""Tables of equally long columns: the base of lines, levels, spectra and motions."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 EXTRA = 'python -m pip install "molrotor[tables]"'
-_SHOWN = 6  # rows of a table that its text shows: the first and the last half of them
+_SHOWN = 6  # rows in the text of a table: half from the start, half from the end
 
 
-def counted(count: int, one: str, several: str = "") -> str:
-    """A number with what it counts, in the singular or the plural; several: the plural where it is not one with an s.
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """A number with its noun. plural: of the noun if it is not the singular with an s.
 
     >>> counted(1, "line"), counted(0, "line"), counted(2, "frequency", "frequencies"), counted(1, "line is", "lines are")
     ('1 line', '0 lines', '2 frequencies', '1 line is')
     """
-    return f"{count} {one if count == 1 else several or one + 's'}"
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
 class Table(ABC):
-    """A thing with columns of equal length, by their names with unit.
+    """An object with columns of equal length, by their names with unit.
 
     >>> class Squares(Table):
     ...     columns = {"n": [1, 2, 3], "square": [1, 4, 9]}
@@ -38,47 +38,47 @@ class Table(ABC):
     @property
     @abstractmethod
     def columns(self) -> Mapping[str, NDArray[Any]]:
-        """Every column by its name with unit."""
+        """The columns by their names with unit."""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the table was made from, as numbers, texts, lists and dictionaries of them."""
+        """Origin of the table, as numbers, texts, and lists and dictionaries of them."""
         return {"rows": len(self)}
 
     def to_pandas(self) -> Any:
         """All columns as a pandas DataFrame.
 
-        Raises ImportError, with the command that installs it, without pandas.
+        Raises ImportError, with the command that installs pandas, if it is missing.
         """
         return _frame("pandas", self.columns)
 
     def to_polars(self) -> Any:
         """All columns as a polars DataFrame.
 
-        Raises ImportError, with the command that installs it, without polars.
+        Raises ImportError, with the command that installs polars, if it is missing.
         """
         return _frame("polars", self.columns)
 
     def _title(self) -> str:
-        """One line that says what the table is."""
+        """One line that describes the table."""
         return f"{type(self).__name__}, {counted(len(self), 'row')}"
 
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
-        """Some rows as text, by the headings of the columns that are worth showing."""
+        """The given rows as text, by the headings of the columns to show."""
         return {name: [_text(column[row]) for row in rows.tolist()] for name, column in self.columns.items()}
 
     def __repr__(self) -> str:
-        """The title, and the first and last rows below it."""
+        """The title, and the first and last rows."""
         heads, lines = self._shown()
         widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
         rows = ["  ".join(t.rjust(w) for t, w in zip(line, widths, strict=True)) for line in (heads, *lines)]
         return "\n".join([self._title(), *(rows if lines else [])])
 
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The title and the rows as HTML, for notebooks."""
         import html
 
         heads, lines = self._shown()
@@ -88,7 +88,7 @@ class Table(ABC):
         return f"<p>{html.escape(self._title())}</p><table><tr>{head}</tr>{body}</table>"
 
     def _shown(self) -> tuple[list[str], list[list[str]]]:
-        """Headings, and some rows of text; three dots stand for the rows between."""
+        """Headings and rows of text; dots stand for omitted rows."""
         count = len(self)
         short = count <= _SHOWN
         rows = np.arange(count) if short else np.r_[0 : _SHOWN // 2, count - _SHOWN // 2 : count]
@@ -100,7 +100,7 @@ class Table(ABC):
 
 
 class TextOf:
-    """The text of an answer: its class, and what its attribute `shown` has, which for a table is some rows.
+    """Text of an answer: its class, and the text of the attribute that `shown` names.
 
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True, repr=False)
@@ -117,16 +117,16 @@ class TextOf:
         return f"{type(self).__name__}: {getattr(self, self.shown)!r}"
 
     def _repr_html_(self) -> str:
-        """The same for notebooks, with the line of the error budget where there is one."""
+        """The text as HTML with the line of the error budget, for notebooks."""
         import html
 
-        thing = getattr(self, self.shown)
-        inner = thing._repr_html_() if hasattr(thing, "_repr_html_") else f"<pre>{html.escape(repr(thing))}</pre>"
+        value = getattr(self, self.shown)
+        inner = value._repr_html_() if hasattr(value, "_repr_html_") else f"<pre>{html.escape(repr(value))}</pre>"
         return f"<p>{html.escape(type(self).__name__)}</p>{inner}{html_of_errors(self)}"
 
 
 def html_of_errors(answer: Any) -> str:
-    """The line of the error budget of an answer as a paragraph; empty without one."""
+    """The line of an answer's error budget as a paragraph; empty without a budget."""
     import html
 
     errors = getattr(answer, "errors", None)
@@ -134,7 +134,7 @@ def html_of_errors(answer: Any) -> str:
 
 
 def _text(value: Any) -> str:
-    """A number with six digits, more where it is large.
+    """A number with six digits, or with four decimals if it is large.
 
     >>> _text(115271.936), _text(1.23456789e-7), _text(12)
     ('115271.9360', '1.23457e-07', '12')

@@ -1,7 +1,7 @@
-"""Folders of unfinished work, and files being written, locked as long as their process lives.
+"""Locked folders for unfinished work, and locked files: a lock lasts as long as its process.
 
-A process that is killed leaves its folder behind; the next one that makes one of the same kind in the same place finds it unlocked
-and removes it.
+A killed process leaves its folder behind. The next process that makes a folder of the same kind in the same place finds it unlocked and
+removes it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 @contextmanager
 def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
-    """A new folder in `parent` whose name begins with `prefix`, locked and at the end removed; abandoned ones are removed first.
+    """A new locked folder in `parent` whose name begins with `prefix`; removed at the end. Abandoned folders are removed first.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as place, locked_folder(Path(place), "work-") as folder:
@@ -34,7 +34,7 @@ def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
-    """The folder and its lock; made again where another process took it for abandoned before it was locked."""
+    """The folder and its lock; repeated if another process removed the folder, as abandoned, before it was locked."""
     import tempfile
 
     while True:
@@ -47,10 +47,10 @@ def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """An open descriptor that holds the lock of a folder; None where it is locked, gone, or the system has no such locks."""
+    """An open descriptor that holds the lock of a folder; None if it is locked or gone, or without file locks."""
     try:
         import fcntl
-    except ImportError:  # not on Windows
+    except ImportError:  # Windows
         return None
     handle = None
     try:
@@ -64,8 +64,8 @@ def _lock(folder: Path) -> int | None:
 
 
 def _remove_abandoned(parent: Path, prefix: str) -> None:
-    """Remove the folders and the locks of killed processes; one that is in use is locked."""
-    with suppress(OSError):  # a folder that cannot be listed has nothing that can be removed
+    """Remove folders and lock files of killed processes; those in use are locked."""
+    with suppress(OSError):  # the folder cannot be listed
         for folder in parent.glob(f"{prefix}*"):
             lock = _lock(folder) if _is_ours(folder) else None
             if lock is not None:
@@ -77,18 +77,18 @@ def _remove_abandoned(parent: Path, prefix: str) -> None:
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether this is a folder, or the lock of a file, and no link to something else."""
+    """Whether this is a folder or a lock file, not a link."""
     return not path.is_symlink() and (path.is_dir() or path.name.startswith(_LOCK))
 
 
 @contextmanager
 def locked_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold the right to write a file, until the end of the context.
+    """Hold the right to write a file until the end of the context.
 
-    The lock is a small file beside it, `.rotor-lock-NAME`, which ends with its process. What is no regular file (a pipe, a device)
-    needs none, and where the file system has no locks there is none.
+    The lock is a small file beside it, `.rotor-lock-NAME`, which disappears with its process. A pipe or device needs none; file systems
+    without locks have none.
 
-    Raises ValueError where another run holds it, with the number of its process.
+    Raises ValueError, with the number of its process, if another run holds the lock.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, locked_file(Path(folder) / "a.csv"):
@@ -119,15 +119,15 @@ _LONGEST_NAME = 255  # bytes, on the usual file systems
 
 
 def _locked_handle(lock: Path, path: str | os.PathLike[str]) -> int | None:
-    """An open descriptor with the lock of a file; None where the folder or the system has no locks."""
+    """An open descriptor with the lock of a file; None without file locks, or if the folder is not writable."""
     try:
         import fcntl
-    except ImportError:  # not on Windows
+    except ImportError:  # Windows
         return None
     while True:
         try:
             handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
-        except OSError:  # a folder in which nothing can be written: the writer of the file says so
+        except OSError:  # the folder is not writable: writing the file will fail with the reason
             return None
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -144,7 +144,7 @@ def _locked_handle(lock: Path, path: str | os.PathLike[str]) -> int | None:
             os.ftruncate(handle, 0)
             os.write(handle, str(os.getpid()).encode("ascii"))
             return handle
-        os.close(handle)  # the run before has just ended and removed it
+        os.close(handle)  # the previous run just ended and removed its lock
 
 
 def _is_file_of(handle: int, path: Path) -> bool:

@@ -1,7 +1,7 @@
-"""Physical constants and conversions, each with its source, and the one grammar for numbers with units.
+"""Physical constants and conversions, each with its source, and the parser of numbers with units.
 
-Constants are CODATA 2022 (exact ones are SI 2019 definitions); a test holds them against `scipy.constants`,
-which is not imported here because it would double the time that `import rotor` takes.
+Constants are CODATA 2022 (exact ones by definition of the SI of 2019). A test compares them with `scipy.constants`,
+which is not imported here because it would double the time of `import rotor`.
 """
 
 import math
@@ -33,7 +33,7 @@ DEBYE_C_M = 1e-21 / SPEED_OF_LIGHT_M_PER_S  # 1 D = 1e-18 esu cm, exact by defin
 MHZ_PER_DEBYE_KV_PER_CM = DEBYE_C_M * 1e5 / PLANCK_J_S * 1e-6  # μE/h of 1 D in 1 kV/cm: 503.4116...
 DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 
-# the set of ASE, in which molecules move classically: eV, Å, u, and what follows from them
+# units of ASE, used for classical motion: eV, Å, u, and those derived from them
 ASE_TIME_PS = 1e2 * math.sqrt(ATOMIC_MASS_KG / ELEMENTARY_CHARGE_C)  # 1 Å √(u/eV) in ps: 0.01018...
 HBAR_CLASSICAL = PLANCK_J_S / (2 * math.pi * 1e-10 * math.sqrt(ATOMIC_MASS_KG * ELEMENTARY_CHARGE_C))  # in Å √(u eV)
 NM2_MHZ_PER_CM = (
@@ -49,7 +49,10 @@ ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-
 
 _FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM, "K": MHZ_PER_K}
 _KINDS: dict[str, dict[str, float]] = {
-    "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K asked for is a temperature, K given also an energy
+    "temperature": {
+        "mK": 1e-3,
+        "K": 1.0,
+    },  # first: a quantity declared in K is a temperature, though a typed K may also be an energy
     "frequency": _FREQUENCY,
     "length": {
         "pm": 0.01,
@@ -102,7 +105,7 @@ _ALIASES = {
     "hbar": "ħ", "″": "arcsec",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
-LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
+LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # limits of molecular gases
 MOST_POINTS = 10_000_000  # of a grid: 80 MB of numbers
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 
@@ -112,7 +115,7 @@ def _kind_of(unit: str) -> str:
 
 
 def _factor(unit: str | None, expected: str, text: str) -> float:
-    """The factor of a unit, 1 of none."""
+    """The factor from a unit to the expected one; 1 without a unit."""
     if not unit:
         return 1.0
     unit = _ALIASES.get(unit, unit)
@@ -120,14 +123,14 @@ def _factor(unit: str | None, expected: str, text: str) -> float:
     if expected in ("", "fraction") and unit not in table:
         raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
     if unit not in table:
-        known = any(unit in other for other in _KINDS.values())
-        what = "does not measure the same thing as" if known else "is not a known unit; the default is"
+        is_unit = any(unit in other for other in _KINDS.values())
+        what = "does not measure the same thing as" if is_unit else "is not a known unit; the default is"
         raise ValueError(f"{text!r}: unit {unit!r} {what} {expected!r}; use one of {', '.join(table)}")
     return table[unit] / table[expected]
 
 
 def _number(text: str) -> tuple[float, str | None]:
-    """The number and the unit, if any, of `"9.2 GHz"`; a unicode minus is a minus."""
+    """Number and unit (if any) of a text such as "9.2 GHz"; a Unicode minus is accepted."""
     match = _NUMBER.match(text.replace("−", "-"))
     if not match:
         raise ValueError(f"{text!r} is not a number with an optional unit, such as '9.2' or '9.2 GHz'")
@@ -135,9 +138,9 @@ def _number(text: str) -> tuple[float, str | None]:
 
 
 def parse_quantity(value: float | str, unit: str) -> float:
-    """A number in `unit`, from a float already in it or from a string that may carry another unit.
+    """A number in `unit`, from a number in that unit or a text that may carry another unit.
 
-    Raises ValueError for text that is no number, a unit of another kind, or a value that is not finite.
+    Raises ValueError for a text without a number, a unit of another kind, and non-finite values.
 
     >>> parse_quantity("9.2 GHz", "MHz")
     9200.0
@@ -145,22 +148,23 @@ def parse_quantity(value: float | str, unit: str) -> float:
     29979.2458
     """
     if isinstance(value, str):
-        number, given = _number(value)
-        value = number * _factor(given, unit, value)
+        number, typed_unit = _number(value)
+        value = number * _factor(typed_unit, unit, value)
     if not math.isfinite(value):
         raise ValueError(f"{value!r} is not a finite number of {unit}")
     return float(value)
 
 
 def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
-    """Both ends of `start:stop` in `unit`, one unit at the end of either bound, and the count's text."""
+    """Both ends of `start:stop` in `unit`, and the text of the count; a unit at one end serves both."""
     parts = text.split(":")
     if len(parts) not in (2, 3) or not all(part.strip() for part in parts):
         raise ValueError(f"{text!r} is not a range; write start:stop or start:stop:count, such as '2:18GHz'")
 
     (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
     shared = unit_2 or unit_1
-    first, last = (number * _factor(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2)))
+    ends = ((start, unit_1), (stop, unit_2))
+    first, last = (number * _factor(end_unit or shared, unit, text) for number, end_unit in ends)
     if not first < last:
         numbers = f"{first:g} is not below {last:g} {unit}".rstrip()
         raise ValueError(f"{text!r}: the range must rise, but {numbers}")
@@ -168,7 +172,7 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
 
 
 def parse_range(text: str, unit: str) -> tuple[float, float]:
-    """The two ends of `start:stop`, in `unit`; one unit at the end of either bound serves both.
+    """Both ends of `start:stop` in `unit`; a unit at one end serves both.
 
     >>> parse_range("2:18GHz", "MHz")
     (2000.0, 18000.0)
@@ -180,7 +184,7 @@ def parse_range(text: str, unit: str) -> tuple[float, float]:
 
 
 def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.float64]:
-    """Points in `unit` from `start:stop:count` or a comma list whose last item may carry the unit; points: the count where none is given.
+    """Points in `unit` from `start:stop:count`, or from a comma list whose last item may carry the unit; points: default count.
 
     >>> parse_grid("0:200kV/cm:3", "kV/cm")
     array([  0., 100., 200.])

@@ -1,4 +1,4 @@
-"""The version of the package; the distribution takes it from here."""
+"""Version of the package, also read by the build of the distribution."""
 
 from __future__ import annotations
 

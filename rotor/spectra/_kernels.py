@@ -1,7 +1,7 @@
-"""Compiled form of the loop over lines: the columns of a pair of blocks in a single pass.
+"""Compiled loop over lines: the columns of a pair of blocks in a single pass.
 
-A tenth of the time of the plain form in `transitions`, to the same bits; the compiler takes half a second to load, so that
-only lists of some ten million lines load it.
+It takes a tenth of the time of the plain form in `transitions` and gives the same bits. Loading the compiler takes half a second, so that
+only lists of about ten million lines use it.
 """
 
 import numpy as np

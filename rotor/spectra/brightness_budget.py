@@ -1,13 +1,13 @@
-"""Error budget of the brightness of a source (`rotor.requests.budget`), at the line where it is brightest.
+"""Error budget of the brightness of a source (`rotor.requests.budget`) at its brightest line.
 
-T_B = C (1 - e^-τ), τ = τ0 exp(-4 ln 2 x²), x = (ν - ν0)/Δν. With u = τ the slope is |dT_B/dx| = C u e^-u 8 ln 2 |x|: at most
-√(8 ln 2/e) C τ0 for any depth (at one standard deviation of a thin line), and at most √(8 ln 2/e) C (1 + √ln τ0) of a thick line, where
-|x| = √(ln(τ0/u)/4 ln 2) and u e^-u is below 1/e. A frequency that is off by δ makes an error of so much times δ/Δν, and no more than the
-whole line. A line that is left out adds C τ at most, and T_B is off by at most the relative error of Q.
+T_B = C (1 - e^-τ), τ = τ0 exp(-4 ln 2 x²), x = (ν - ν0)/Δν. With u = τ the slope is |dT_B/dx| = C u e^-u 8 ln 2 |x|. It is at most
+√(8 ln 2/e) C τ0 for any depth (reached one standard deviation from the centre of a thin line), and at most √(8 ln 2/e) C (1 + √ln τ0) for
+a thick line, where |x| = √(ln(τ0/u)/4 ln 2) and u e^-u is below 1/e. A frequency error δ changes T_B by at most this slope times δ/Δν,
+and by at most the whole line. A neglected line adds at most C τ; the relative error of Q is at most that of T_B.
 
-Couplings of spins that are left out shift no line, to first order: they split it about its centre of gravity, and it loses a part f of its
-depth at the centre, of the brightness C (e^-τ(1-f) - e^-τ). f follows from the components of the line for quadrupole coupling
-(`rotor.quantum.estimates.splittings.depth_lost`); of the others, of size δ, it is 1 - exp(-4 ln 2 (δ/Δν)²) at most.
+To first order, neglected spin couplings do not shift a line: they split it about its centre of gravity. The centre loses a part f of its
+depth, that is C (e^-τ(1-f) - e^-τ) of its brightness. For quadrupole coupling f follows from the components of the line
+(`rotor.quantum.estimates.splittings.depth_lost`); for other couplings, of size δ, it is at most 1 - exp(-4 ln 2 (δ/Δν)²).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 SPLITTING = frozenset(
     {QUADRUPOLE, "spin-rotation", "spin-spin", ELECTRON_SPIN}
-)  # which split lines about their centre of gravity
+)  # couplings that split lines about their centre of gravity
 STEEPEST = math.sqrt(8 * math.log(2) / math.e)
 
 
@@ -47,7 +47,7 @@ def steepness(depth: float) -> float:
 
 
 def brightness_budget(answer: Any) -> ErrorBudget:
-    """The errors of T_B in K at the brightest line; those of the background alone where there is no line."""
+    """Error budget of T_B (K) at the brightest line, or of the background if there is no line."""
     request, peak = answer.request, answer.peak
     number = 0 if peak is None else int(answer.lines.molecule[peak.row])
     source, lines = request.sources[number], answer.emitted[number]
@@ -65,7 +65,7 @@ def brightness_budget(answer: Any) -> ErrorBudget:
         ),
         truncation=ErrorTerm(
             opaque * left_out + brightness * lines.q_error,
-            f"lines of an optical depth below {request.least_depth:g}, together {left_out:.1g} at the most, and Q",
+            f"lines of an optical depth below {request.least_depth:g}, together at most {left_out:.1g}, and Q",
             "a smaller least depth",
         ),
         model=_model(answer, number, per_mhz, opaque),
@@ -75,20 +75,20 @@ def brightness_budget(answer: Any) -> ErrorBudget:
 
 
 def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm:
-    """What frequencies that are off, and splittings that are left out, make of T_B at the centre of the brightest line."""
+    """Error of T_B at the centre of the brightest line from shifted frequencies and neglected splittings."""
     request, peak, lines = answer.request, answer.peak, answer.emitted[number]
     top, source = request.molecules[number], request.sources[number]
     if isinstance(top, CatalogueLines):
-        return ErrorTerm(None, "a catalogue does not say what its lines leave out")
+        return ErrorTerm(None, "a catalogue does not state what its lines neglect")
     limits = every_limit(top, populated_j(top, source.excitation_k), lines.effects)
-    splittings = [one for one in limits if one.name in SPLITTING and one.size_mhz is not None]
-    shifts = model_term([one for one in limits if one not in splittings])
+    splittings = [limit for limit in limits if limit.name in SPLITTING and limit.size_mhz is not None]
+    shifts = model_term([limit for limit in limits if limit not in splittings])
     if peak is None or not splittings:
         return _shifted(shifts, per_mhz, 0.0 if peak is None else abs(peak.brightness_k))
     split = _split(answer, number, splittings, opaque)
     if shifts.value is None:
-        known = len(splittings) == len(limits)
-        return split if known else replace(split, source=f"{split.source}; {shifts.source} not estimated")
+        complete = len(splittings) == len(limits)
+        return split if complete else replace(split, source=f"{split.source}; {shifts.source} not estimated")
     shift = _shifted(shifts, per_mhz, abs(peak.brightness_k))
     larger, smaller = sorted((shift, split), key=lambda term: -(term.value or 0.0))
     whole = min((larger.value or 0.0) + (smaller.value or 0.0), abs(peak.brightness_k))
@@ -96,7 +96,7 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
 
 
 def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:
-    """Shifts in MHz as a change of T_B, no more than the whole line."""
+    """Error of T_B from shifts in MHz, at most the whole line."""
     if term.value is None:
         return term
     text = f"lines shifted by {term.value:.2g} MHz: {term.source}"
@@ -104,27 +104,29 @@ def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:
 
 
 def _split(answer: Any, number: int, splittings: Sequence[Limit], opaque: float) -> ErrorTerm:
-    """What splittings take from T_B at the centre of the brightest line."""
+    """Loss of T_B at the centre of the brightest line through splittings."""
     peak, width = answer.peak, answer.peak.observed_mhz * answer.request.sources[number].fwhm_km_s / KM_PER_S
-    left = 1.0
-    for one in splittings:
-        of_quadrupole = one.name == QUADRUPOLE
-        left *= 1 - _of_quadrupole(answer, number, width) if of_quadrupole else _gaussian((one.size_mhz or 0.0) / width)
-    names = ", ".join(one.name for one in splittings)
+    remaining = 1.0
+    for limit in splittings:
+        if limit.name == QUADRUPOLE:
+            remaining *= 1 - _quadrupole_loss(answer, number, width)
+        else:
+            remaining *= _gaussian((limit.size_mhz or 0.0) / width)
+    names = ", ".join(limit.name for limit in splittings)
     return ErrorTerm(
-        opaque * math.exp(-peak.optical_depth) * math.expm1(peak.optical_depth * (1 - left)),
-        f"{names}: {100 * (1 - left):.2g} % of the depth split off the centre of the line",
+        opaque * math.exp(-peak.optical_depth) * math.expm1(peak.optical_depth * (1 - remaining)),
+        f"{names}: {100 * (1 - remaining):.2g} % of the depth split off the centre of the line",
         f"{splittings[0].name} in the calculation",
     )
 
 
 def _gaussian(x: float) -> float:
-    """Depth at x widths from the centre."""
+    """Relative depth of a line at x full widths from its centre."""
     return math.exp(-4 * math.log(2) * x**2)
 
 
-def _of_quadrupole(answer: Any, number: int, width_mhz: float) -> float:
-    """The part of the depth of the brightest line that quadrupole coupling takes from its centre."""
+def _quadrupole_loss(answer: Any, number: int, width_mhz: float) -> float:
+    """Part of the depth that quadrupole coupling takes from the centre of the brightest line."""
     top, row, quanta = answer.request.molecules[number], answer.peak.row, answer.emitted[number].quanta
     upper, lower = (text[row].split() for text in (answer.lines.upper, answer.lines.lower))
     k = 0 if top.kind == "linear" else abs(int(lower[quanta.index("k")])) if "k" in quanta else None

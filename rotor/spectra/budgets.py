@@ -1,4 +1,4 @@
-"""Error budgets of line lists: the errors of the levels behind them, at their strongest lines."""
+"""Error budgets of line lists, from the errors of their levels at the strongest lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rotor.quantum.estimates.beyond import Limit
     from rotor.quantum.levels import Levels
 
-STRONG = 0.1  # of the strongest line: weaker ones do not count in the error that the constants make
+STRONG = 0.1  # of the strongest line: weaker lines do not count for the error from the constants
 
 
 def frequencies_budget(
@@ -27,20 +27,20 @@ def frequencies_budget(
     source: str | None,
     of: str = "frequencies",
 ) -> ErrorBudget:
-    """The errors of frequencies of lines.
+    """Error budget of line frequencies.
 
     Parameters
     ----------
     levels : Levels
-        Behind the lines.
+        The levels of the lines.
     limits : sequence of Limit
-        What the calculation leaves out, at the J of the strongest lines.
+        Neglected effects at the J of the strongest lines.
     intensities : (n,) array
-        In any unit; lines above a tenth of the strongest count for `data`.
+        In any unit; only lines above a tenth of the strongest count for `data`.
     errors_mhz : (n,) array or None
-        One standard deviation of each line by the uncertainty of the constants; NaN where it is not known.
+        Standard deviation of each line from the uncertainty of the constants; NaN if unknown.
     source : str or None
-        Where they come from, or why there are none.
+        Source of these errors, or the reason why there are none.
     of : str, optional
         Name of the observable.
 
@@ -67,5 +67,5 @@ def _strong_line_error(intensities: Floats, errors_mhz: Floats | None, source: s
     if errors_mhz is None or not len(intensities):
         return data_term(None, source)
     strong = np.abs(intensities) >= STRONG * np.abs(intensities).max()
-    known = errors_mhz[strong & np.isfinite(errors_mhz)]
-    return data_term(known, f"{source}; largest of the lines above a tenth of the strongest")
+    errors = errors_mhz[strong & np.isfinite(errors_mhz)]
+    return data_term(errors, f"{source}; largest of the lines above a tenth of the strongest")

@@ -1,20 +1,20 @@
-"""The rotational band of a gas from its classical dipole correlation function, to be laid over the quantum lines.
+"""The rotational band of a gas from its classical dipole correlation function, for comparison with the quantum lines.
 
 With S(ν) = ∫ C1(t) cos(2πνt) dt of the classical gas, x = hν/kT and the constant of `lines.py`,
 
     σ(ν) = (8π³/3hc) ν (1 - e^-x) F(x) μ² S(ν),        ∫ S dν = 1 over positive and negative ν
 
-(R. G. Gordon, J. Chem. Phys. 43, 1307 (1965)). A classical S is even and knows no detailed balance; F restores it,
+(R. G. Gordon, J. Chem. Phys. 43, 1307 (1965)). A classical S is even and violates detailed balance; F restores it,
 S(-ν) = e^-x S(ν), and is a choice:
 
     harmonic     F = x/(1 - e^-x)       (1 - e^-x) F = x             keeps the integral of σ; exact for an oscillator
-    standard     F = 2/(1 + e^-x)                      2 tanh(x/2)   S symmetrised is taken for the classical one
+    standard     F = 2/(1 + e^-x)                      2 tanh(x/2)   the symmetrised S is replaced by the classical one
     schofield    F = e^(x/2)                           2 sinh(x/2)   P. Schofield, Phys. Rev. Lett. 4, 239 (1960)
-    egelstaff    the same, of C1(√(t² + (ħ/2kT)²))                   P. A. Egelstaff, Adv. Phys. 11, 203 (1962)
+    egelstaff    as schofield, with C1(√(t² + (ħ/2kT)²))                   P. A. Egelstaff, Adv. Phys. 11, 203 (1962)
 
-R. Ramírez et al., J. Chem. Phys. 121, 3973 (2004), compare them: the harmonic one alone agrees with the theorem of fluctuation
-and dissipation, and is the default; it is also what classical linear response gives, so that nothing is "corrected" in σ.
-For a rigid top the area of the band is the same in both worlds, at every temperature and for every spin weight, because
+R. Ramírez et al., J. Chem. Phys. 121, 3973 (2004), compare them: only the harmonic factor agrees with the fluctuation-dissipation theorem.
+It is the default, and also the result of classical linear response, so that σ contains no correction.
+For a rigid top the area of the band is the same in classical and quantum mechanics, at any temperature and for any spin weights, because
 [μ, [H, μ]] is a number:
 
     ∫ σ dν = (8π³/3hc) Σ_k B_k (μ² - μ_k²),     k = a, b, c, B_k = A, B, C.
@@ -47,18 +47,18 @@ if TYPE_CHECKING:
 Correction = Literal["harmonic", "standard", "schofield", "egelstaff"]
 
 HZ_PER_MHZ_PS = 1e-6  # MHz times ps is a pure number after this factor
-REACH = 6.0  # the band is followed to so many times its root mean square frequency
-WINDOW_SHARE = 0.25  # of the width asked for is given to the window in time, the rest to the convolution
-WINDOW_END = 1e-4  # what is left of the window at the last time
+REACH = 6.0  # upper end of the band, in units of its root mean square frequency
+WINDOW_SHARE = 0.25  # of the requested width comes from the window in time, the rest from the convolution
+WINDOW_END = 1e-4  # value of the window at the last time
 POINTS_PER_WIDTH = 16
 
 
 @dataclass(frozen=True)
 class BandComparison:
-    """Two bands side by side, the first in units of the second.
+    """Two bands compared, the first relative to the second.
 
-    area: ratio of the integrals. mean: ratio of the mean frequencies ∫νσ/∫σ. peak: ratio of the highest points. largest:
-    of |difference| on the grid over the highest point of the second; at_mhz: where that is.
+    area: ratio of the integrals. mean: ratio of the mean frequencies ∫νσ/∫σ. peak: ratio of the maxima. largest: largest |difference| on
+    the grid over the maximum of the second; at_mhz: its position.
     """
 
     area: float
@@ -69,7 +69,7 @@ class BandComparison:
 
 
 def dipole_band_area(top: Top) -> float:
-    """∫ σ dν of a rigid top in nm² MHz, classical or quantum, at any temperature; see the head of this file.
+    """∫ σ dν of a rigid top in nm² MHz, classical or quantum, at any temperature; see the head of this module.
 
     >>> from rotor.tops.top import Top
     >>> area = dipole_band_area(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)))
@@ -79,7 +79,7 @@ def dipole_band_area(top: Top) -> float:
     dipole = _dipole(top)
     total = float(dipole @ dipole)
     constants = top.rotational_constants_mhz
-    # a linear molecule has A infinite and its dipole along a: nothing turns about that axis
+    # a linear molecule has infinite A and no rotation about a
     return INTENSITY_NM2_MHZ * math.fsum(
         b * (total - m * m) for b, m in zip(constants, dipole, strict=True) if b < math.inf
     )
@@ -97,45 +97,45 @@ def classical_band(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Spectrum:
-    """The absorption cross section of a classical free gas of rigid tops, smoothed by a Gaussian.
+    """Absorption cross section of a classical free gas of rigid tops, smoothed by a Gaussian.
 
-    Times are chosen from the width and the band.
+    The times of the simulation follow from the width and the band.
 
     Parameters
     ----------
     top : Top
-        With a dipole; its A, B, C make it rigid.
+        With a dipole; only its A, B, C are used.
     grid_mhz : (n,) array
         Frequencies.
     fwhm_mhz : float
-        Full width of the Gaussian, as in `Spectrum.from_lines`, so that both can be laid over each other.
+        Full width at half maximum of the Gaussian, as in `Spectrum.from_lines`, so that both spectra can be compared.
     temperature_k : float, optional
-        Of the gas.
+        Temperature of the gas.
     correction : "harmonic", "standard", "schofield" or "egelstaff", optional
         The factor that restores detailed balance; see the head of the module.
     molecules : int, optional
-        How many are drawn; the scatter of σ falls as 1/√molecules, about 1 % of the peak for 2e5 of water with a width
+        Number of molecules; the scatter of σ falls as 1/√molecules. It is about 1 % of the peak for 2e5 water molecules and a width
         of a tenth of the band.
     rng : numpy.random.Generator
         Draws the gas.
     executor : ThreadPoolExecutor, optional
-        The molecules are spread over it.
+        Shares the work over molecules.
     progress : callable, optional
-        Called with a number of molecules as they are done.
+        Called with the number of molecules finished.
 
     Returns
     -------
     Spectrum
-        σ (n,) in nm² of one molecule.
+        σ (n,) in nm² per molecule.
 
     Raises
     ------
     ValueError
-        For a top without a dipole or with one of zero, and as `band_from_correlation` does.
+        For a top without a dipole, and as `band_from_correlation`.
 
     Notes
     -----
-    Neglected: quantum mechanics but for the factor `correction`, distortion, spin weights (a hot gas averages them).
+    Neglected: quantum effects except the factor `correction`, distortion, spin weights (a hot gas averages them).
     """
     dipole, moments = _dipole(top), np.array(top.moments_u_angstrom2)
     kt = units.EV_PER_K * temperature_k
@@ -152,7 +152,7 @@ def classical_band(
 
 
 def band_times(top: Top, temperature_k: float, fwhm_mhz: float) -> Floats:
-    """Times in ps (n,), evenly from 0, that carry a band and a width: until the window in time has closed."""
+    """Evenly spaced times in ps (n,) from 0 to the closing of the window, for the band of a top and a width."""
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     if not (math.isfinite(fwhm_mhz) and fwhm_mhz > 0):
@@ -174,14 +174,14 @@ def band_from_correlation(
     temperature_k: float,
     correction: Correction = "harmonic",
 ) -> Spectrum:
-    """The cross section of one molecule from its C1 at even times from 0, of a gas or of anything that turns.
+    """Cross section of one molecule from its dipole correlation C1 at even times from 0.
 
     Parameters
     ----------
     times_ps : (n,) array
-        Even times from 0, 8 or more.
+        Evenly spaced from 0, at least 8.
     correlation : (n,) array
-        C1 with what never decays taken off (it would be a line at frequency 0).
+        C1 without its constant part, which would be a line at frequency 0.
     dipole2_debye2 : float
         μ².
     grid_mhz : (m,) array
@@ -189,7 +189,7 @@ def band_from_correlation(
     fwhm_mhz : float
         Full width of the Gaussian that smooths the band.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     correction : "harmonic", "standard", "schofield" or "egelstaff", optional
         The factor that restores detailed balance.
 
@@ -201,8 +201,7 @@ def band_from_correlation(
     Raises
     ------
     ValueError
-        For an unknown correction, and for times that are not even or too short for the width: the window must have
-        closed by then.
+        For an unknown correction, and for times that are uneven or too short for the width: the window must have closed.
     """
     times, c1 = np.asarray(times_ps, dtype=float), np.asarray(correlation, dtype=float)
     grid = np.asarray(grid_mhz, dtype=float)
@@ -235,10 +234,10 @@ def band_from_correlation(
 
 
 def compare_bands(ours: Spectrum, theirs: Spectrum) -> BandComparison:
-    """Areas, mean frequencies, peaks and the largest difference of two spectra on one grid, by straight lines between points."""
+    """Ratios of areas, mean frequencies and peaks, and the largest difference, of two spectra on one grid (trapezoidal rule)."""
     nu, a, b = ours.frequency_mhz, ours.intensity, theirs.intensity
     if not np.array_equal(nu, theirs.frequency_mhz):
-        raise ValueError("the two spectra stand on different grids; make both on one")
+        raise ValueError("the two spectra are on different grids; compute both on one")
     areas = [float(np.trapezoid(y, nu)) for y in (a, b)]
     means = [float(np.trapezoid(y * nu, nu)) / area for y, area in zip((a, b), areas, strict=True)]
     at = int(np.argmax(np.abs(a - b)))
@@ -249,21 +248,19 @@ def compare_bands(ours: Spectrum, theirs: Spectrum) -> BandComparison:
 
 
 def rigid(top: Top) -> Top:
-    """This top without distortion constants, which a classical gas of rigid bodies can be compared with."""
+    """The top without distortion constants, for comparison with a classical gas of rigid bodies."""
     named: dict[str, Any] = {name: top.constants[name] for name in "ABC" if name in top.constants.values}
     return top.with_constants(Constants(**named, kind=top.kind), f"{top.source}, distortion left out")
 
 
 def lines_area(lines: Lines) -> float:
-    """Σ of the integrated absorption of all lines in nm² MHz: the quantum side of `dipole_band_area`."""
+    """Sum of the integrated absorption of all lines in nm² MHz, to compare with `dipole_band_area`."""
     return float(lines.intensity_nm2_mhz.sum())
 
 
 def _dipole(top: Top) -> Floats:
     if top.dipole_abc_debye is None or not any(top.dipole_abc_debye):
-        raise ValueError(
-            f"{top.name or 'this top'} has no dipole, or none that is known: there is no rotational absorption"
-        )
+        raise ValueError(f"{top.name or 'this top'} has no known dipole: there is no rotational absorption")
     return np.array(top.dipole_abc_debye)
 
 
@@ -278,7 +275,7 @@ def _window(times_ps: Floats, fwhm_mhz: float) -> Floats:
 
 
 def _closing(fwhm_mhz: float) -> float:
-    """a of `_window` in 1/ps²."""
+    """The constant a of `_window` in 1/ps²."""
     return (math.pi * fwhm_mhz * HZ_PER_MHZ_PS) ** 2 / (4.0 * math.log(2.0))
 
 
@@ -293,8 +290,8 @@ def _balance(x: Floats, correction: Correction) -> Floats:
 def _second_moment_density(times_ps: Floats, c1: Floats, fwhm_mhz: float, step_mhz: float) -> tuple[Floats, Floats]:
     """Frequencies in steps of at most `step_mhz`, and ν² S(ν) there in MHz, convolved with a Gaussian.
 
-    That is the transform of -C″ w/(2π)², w the window; with -C″ w = -(C w)″ + 2 (C w′)′ - C w″ no number is differentiated,
-    and the second moment of S, which is the area of the band, is not widened by the window.
+    This is the transform of -C″ w/(2π)² with the window w. The identity -C″ w = -(C w)″ + 2 (C w′)′ - C w″ avoids numerical derivatives
+    of C, and the window does not change the second moment of S, which is the area of the band.
     """
     from scipy.fft import next_fast_len, rfft
 
@@ -313,7 +310,7 @@ def _second_moment_density(times_ps: Floats, c1: Floats, fwhm_mhz: float, step_m
 
 
 def _at_later_times(times: Floats, c1: Floats, shift: float) -> Floats:
-    """C1(√(t² + shift²)); beyond the last time, where the window has closed, the last value."""
+    """C1(√(t² + shift²)); beyond the last time, where the window has closed, its last value."""
     from scipy.interpolate import CubicSpline
 
     later = np.minimum(np.hypot(times, shift), times[-1])
@@ -321,7 +318,7 @@ def _at_later_times(times: Floats, c1: Floats, shift: float) -> Floats:
 
 
 def _smoothed(grid: Floats, values: Floats, fwhm: float) -> Floats:
-    """Convolution with a Gaussian on an even grid from 0; as for lines, there is nothing below 0."""
+    """Convolution with a Gaussian on an even grid from 0; values below 0 are zero, as for lines."""
     step = grid[1]
     reach = math.ceil(3.0 * fwhm / step)
     kernel = gaussian(step * np.arange(-reach, reach + 1), fwhm)

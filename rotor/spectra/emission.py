@@ -5,13 +5,13 @@
     φ_i      a Gaussian at the rest frequency ν_i, of full width ν_i Δv/c at half maximum
     1+z_m  = (1+z) / (1 - v_m/c)                                         ν is the observed frequency, ν_i/(1+z_m) at a line
 
-The first is the equation of radiative transfer through a uniform layer, the background subtracted, as J. G. Mangum and Y. L. Shirley,
-Publ. Astron. Soc. Pac. 127 (2015) 266 (arXiv:1501.01703) set it out; with the molecules mixed evenly its source function is
-Σ τ_m J(T_m)/Σ τ_m. A redshift leaves I_ν/ν³ as it is, so a black body of T is seen as one of T/(1+z): the gas appears at
-T_m/(1+z_m), and T_bg is the temperature as observed (2.725 K for the cosmic background, at every z).
-N: molecules in the line of sight, all levels and spin species together, Q with the same spin weights as the lines. Velocities
-follow the radio convention v = c (1 - ν/ν_rest), counted in the frame of the redshift z. Widths are those in the source.
-Neglected: departures from one excitation temperature, scattering, and structure of the source within the beam but for f.
+The first line is the equation of radiative transfer through a uniform layer, with the background subtracted, as in J. G. Mangum and
+Y. L. Shirley, Publ. Astron. Soc. Pac. 127 (2015) 266 (arXiv:1501.01703). With uniformly mixed molecules its source function is
+Σ τ_m J(T_m)/Σ τ_m. A redshift leaves I_ν/ν³ unchanged, so that a black body at T appears as one at T/(1+z): the gas appears at
+T_m/(1+z_m), and T_bg is the observed temperature (2.725 K for the cosmic background at any z).
+N is the column density of molecules in all levels and spin species; Q has the spin weights of the lines. Velocities follow the radio
+convention v = c (1 - ν/ν_rest) in the frame of the redshift z. Widths are those in the source.
+Neglected: departures from one excitation temperature, scattering, and structure of the source within the beam except f.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from rotor.table import Table
 
 BACKGROUND_K = 2.725
 KM_PER_S = units.SPEED_OF_LIGHT_M_PER_S / 1e3
-_REACH = 4.0  # full widths at half maximum on either side: a Gaussian has fallen to 5e-20 of its peak
+_REACH = 4.0  # full widths on either side of a line: a Gaussian has fallen to 5e-20 of its peak
 
 # GHz; bands 3 to 9: ESO, ALMA System Specifications (eso.info/sci/facilities/alma/observing/specifications); bands 1, 2 and 10:
 # IRAM ARC, "ALMA in short" (web-archives.iram.fr/IRAMFR/ARC.1/alma-short.html), where bands 1 and 2 are those planned
@@ -43,7 +43,7 @@ BANDS_GHZ: dict[str, tuple[float, float]] = {
 
 
 class LinesAtRest(Protocol):
-    """Rest frequencies and integrated absorption (n,) at one temperature: `Lines`, or lines of a catalogue."""
+    """Rest frequencies and integrated absorption (n,) at one temperature: `Lines`, or lines from a catalogue."""
 
     @property
     def temperature_k(self) -> float:
@@ -51,21 +51,20 @@ class LinesAtRest(Protocol):
 
     @property
     def frequency_mhz(self) -> Floats:
-        """At rest."""
+        """Rest frequencies (n,) in MHz."""
 
     @property
     def intensity_nm2_mhz(self) -> Floats:
-        """I(T), integrated absorption of a molecule."""
+        """Integrated absorption I(T) of a molecule (n,) in nm² MHz."""
 
 
 @dataclass(frozen=True)
 class Source:
     """A uniform layer of gas in front of a uniform background.
 
-    column_per_cm2: molecules in the line of sight. excitation_k: of rotation. fwhm_km_s: full width of the lines at half maximum.
-    velocity_km_s: radio convention, receding positive, in the frame of the redshift. background_k: behind the layer, as observed.
-    filling: fraction of the beam that the layer covers. redshift: z. ValueError for what is not above 0, a filling above 1, a velocity
-    beyond that of light and a redshift of -1 or less.
+    column_per_cm2: molecules in the line of sight. excitation_k: excitation temperature of rotation. fwhm_km_s: full width of the lines at
+    half maximum. velocity_km_s: radio convention, receding positive, in the frame of the redshift. background_k: behind the layer, as
+    observed. filling: fraction of the beam that the layer covers. redshift: z. Raises ValueError for values out of range.
     """
 
     column_per_cm2: float
@@ -108,7 +107,7 @@ class Emission(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The sources, each by the names of its fields."""
+        """The sources, by the names of their fields."""
         return {"sources": [asdict(source) for source in self.sources], "rows": len(self)}
 
     @property
@@ -158,16 +157,16 @@ def band_mhz(name: str) -> tuple[float, float]:
 def emission(
     lines: LinesAtRest | Sequence[LinesAtRest], source: Source | Sequence[Source], grid_mhz: ArrayLike
 ) -> Emission:
-    """Optical depth and brightness temperature of a layer on a grid of frequencies.
+    """Optical depth and brightness temperature of a layer on a frequency grid.
 
     Parameters
     ----------
     lines : Lines or several
-        Of one molecule or of several in the same layer, each at the excitation temperature of its source.
+        One list for each molecule in the layer, at the excitation temperature of its source.
     source : Source or several
-        One for each list of lines, alike in background, filling and redshift; a single one counts for every list.
+        One for each list, with the same background, filling and redshift; a single source serves all lists.
     grid_mhz : (n,) array
-        Rising frequencies as they are observed.
+        Rising observed frequencies.
 
     Returns
     -------
@@ -176,7 +175,7 @@ def emission(
     Raises
     ------
     ValueError
-        For lines at another temperature than the source's, sources that do not form a layer, and a grid that does not rise.
+        For lines at another temperature than that of the source, sources that do not form a layer, and a grid that does not rise.
 
     Examples
     --------
@@ -194,7 +193,8 @@ def emission(
     lists = list(lines) if isinstance(lines, Sequence) else [lines]
     sources = (source,) * len(lists) if isinstance(source, Source) else tuple(source)
     require_layer(sources, len(lists))
-    return together([_molecule_emission(each, source, grid) for each, source in zip(lists, sources, strict=True)])
+    parts = [_molecule_emission(molecule, source, grid) for molecule, source in zip(lists, sources, strict=True)]
+    return together(parts)
 
 
 def _molecule_emission(lines: LinesAtRest, source: Source, grid: Floats) -> Emission:
@@ -205,7 +205,7 @@ def _molecule_emission(lines: LinesAtRest, source: Source, grid: Floats) -> Emis
 
 
 def together(parts: Sequence[Emission]) -> Emission:
-    """The layer of several molecules from those of each, on one grid: T_B = f Σ c_m τ_m (1 - e^-τ)/τ."""
+    """The layer of several molecules from their separate layers on one grid: T_B = f Σ c_m τ_m (1 - e^-τ)/τ."""
     if len(parts) == 1:
         return parts[0]
     sources = tuple(source for part in parts for source in part.sources)
@@ -226,7 +226,7 @@ def contrast_k(frequency_mhz: ArrayLike, source: Source) -> Floats:
 
 
 def require_layer(sources: Sequence[Source], count: int) -> None:
-    """ValueError for sources that do not form one layer of `count` molecules."""
+    """Raise ValueError unless the sources form one layer of `count` molecules."""
     if not count or len(sources) != count:
         raise ValueError(f"sources: {len(sources)} given for {count} molecules; expected one for each")
     for name in ("background_k", "filling", "redshift"):
@@ -245,7 +245,7 @@ def _refuse_other_temperature(lines: LinesAtRest, source: Source) -> None:
 
 
 def _optical_depth(grid: Floats, lines: LinesAtRest, source: Source) -> Floats:
-    """N Σ I φ (n,), every line within `_REACH` widths of its centre."""
+    """Optical depth N Σ I φ (n,); each line extends to `_REACH` widths from its centre."""
     depth = np.zeros_like(grid)
     rest = grid / source.frequency_ratio
     centre = lines.frequency_mhz
@@ -260,21 +260,21 @@ def _optical_depth(grid: Floats, lines: LinesAtRest, source: Source) -> Floats:
 
 
 def peak_depth(lines: LinesAtRest, source: Source) -> Floats:
-    """Optical depth (n,) at the centre of every line as if it stood by itself, N I 2 √(ln 2/π)/Δν."""
+    """Optical depth (n,) at the centre of each line alone: N I 2 √(ln 2/π)/Δν."""
     width = lines.frequency_mhz * source.fwhm_km_s / KM_PER_S
     area = source.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz
     return np.asarray(area * gaussian(np.zeros_like(width), width))
 
 
 def source_grid(first_mhz: float, last_mhz: float, source: Source, points_per_width: int = 8) -> Floats:
-    """Frequencies from first to last, each `points_per_width` to a line's full width: even in log ν.
+    """Frequencies from first to last with `points_per_width` points to the width of a line, evenly spaced in log ν.
 
     Parameters
     ----------
     first_mhz, last_mhz : float
         Ends of the range, rising and above 0.
     source : Source
-        Its full width in km/s is that of the lines.
+        Its full width in km/s is the width of the lines.
     points_per_width : int, optional
         Points to a full width at half maximum.
 
@@ -287,7 +287,7 @@ def source_grid(first_mhz: float, last_mhz: float, source: Source, points_per_wi
     ------
     ValueError
         For a range that does not rise or does not begin above 0.
-
+        For a range that does not rise or does not start above 0.
     Examples
     --------
     >>> len(source_grid(100e3, 100.1e3, Source(1e14, 10, 1.0)))

@@ -1,8 +1,8 @@
-"""A request for what a telescope sees of a source with one or several molecules, and what answers it.
+"""Request for the emission of a source with one or several molecules, and its answer.
 
-Optical depths add, τ = Σ_m N_m Σ_i I_i φ_i, each molecule at its own excitation temperature, velocity and width; T_B follows from the sum
-(`rotor.spectra.emission`). For each line by itself the answer has E_u/k, the optical depth at its centre, T_B there, and the integral
-∫T_B dv over its Gaussian, as if no other line were near.
+Optical depths add: τ = Σ_m N_m Σ_i I_i φ_i, where each molecule has an excitation temperature, velocity and width. T_B follows from the sum
+(`rotor.spectra.emission`). For each line the answer has E_u/k, the optical depth and T_B at its centre, and ∫T_B dv over its Gaussian,
+computed without overlap with other lines.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ from rotor.table import Table, TextOf, counted
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LEAST_DEPTH = 1e-6  # lines of less are left out
+LEAST_DEPTH = 1e-6  # weaker lines are left out
 MOST_POINTS = 5_000_000
 _ACROSS = np.linspace(-3.0, 3.0, 241)  # widths at half maximum: a Gaussian has fallen to 1e-11
 
 
 @dataclass(frozen=True)
 class LayerInput:
-    """The gas of a source, and what is behind it; what has several numbers is one for all molecules or one for each."""
+    """The gas of a source and its background; tuples have one number for all molecules or one for each."""
 
     column_per_cm2: tuple[float, ...] = declared(
         (1e14,), Each("1/cm2", above=0, metavar="N"), "Column density, one for all or one each: 1e14,3e13 (1/cm²)", option="--column",
@@ -64,14 +64,14 @@ class LayerInput:
         common=True,
     )  # fmt: skip
     filling: float = declared(
-        1.0, Quantity(above=0, most=1, metavar="F"), "Part of the beam that the source fills", "conditions.filling"
+        1.0, Quantity(above=0, most=1, metavar="F"), "Fraction of the beam that the source fills", "conditions.filling"
     )
     velocity_km_s: tuple[float, ...] = declared(
         (0.0,), Each("km/s", metavar="V"), "Velocity, one for all or one each; receding positive, radio convention (km/s)",
         "conditions.velocity", common=True,
     )  # fmt: skip
     redshift: float = declared(
-        0.0, Quantity(metavar="Z"), "Redshift of the source; velocities count from there", "conditions.redshift"
+        0.0, Quantity(metavar="Z"), "Redshift of the source; velocities are relative to it", "conditions.redshift"
     )
     fwhm_km_s: tuple[float, ...] = declared(
         (1.0,), Each("km/s", metavar="W"), "Full width of the lines at half maximum, one for all or one each (km/s)", "conditions.width",
@@ -79,13 +79,13 @@ class LayerInput:
     )  # fmt: skip
 
 
-_OF_EACH = ("column_per_cm2", "excitation_k", "fwhm_km_s", "velocity_km_s")
+_MOLECULE_FIELDS = ("column_per_cm2", "excitation_k", "fwhm_km_s", "velocity_km_s")
 
 
 def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
-    """The source of each molecule of a subject, which has what some of them have otherwise in `values`."""
-    count, of_molecule = len(subject.values["molecules"]), subject.departures
-    for name in _OF_EACH:
+    """The source of each molecule; `departures` of the subject override the layer's values."""
+    count, departures = len(subject.values["molecules"]), subject.departures
+    for name in _MOLECULE_FIELDS:
         values = getattr(layer, name)
         if len(values) not in (1, count):
             text = ",".join(f"{value:g}" for value in values)
@@ -95,21 +95,23 @@ def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
 
     def value(name: str, number: int) -> float:
         values = getattr(layer, name)
-        return float(of_molecule[number].get(name, values[number if len(values) > 1 else 0]))
+        return float(departures[number].get(name, values[number if len(values) > 1 else 0]))
 
     shared = {"background_k": layer.background_k, "filling": layer.filling, "redshift": layer.redshift}
-    return tuple(Source(**{name: value(name, number) for name in _OF_EACH}, **shared) for number in range(count))
+    return tuple(
+        Source(**{name: value(name, number) for name in _MOLECULE_FIELDS}, **shared) for number in range(count)
+    )
 
 
 def _saved_layer(sources: tuple[Source, ...], _: Any) -> LayerInput:
     first = sources[0]
-    several = {name: (getattr(first, name),) for name in _OF_EACH}
+    several = {name: (getattr(first, name),) for name in _MOLECULE_FIELDS}
     return LayerInput(**several, background_k=first.background_k, filling=first.filling, redshift=first.redshift)
 
 
 @dataclass(frozen=True)
 class WindowInput:
-    """What is looked at: range or band."""
+    """The observed range, or a receiver band."""
 
     range_mhz: tuple[float, float] | None = declared(
         None,
@@ -120,7 +122,7 @@ class WindowInput:
         example="86:116GHz",
     )
     band: tuple[float, float] | None = declared(
-        None, Custom(band_mhz, metavar="NAME"), "A receiver's band instead of a range: ALMA1 to ALMA10", "conditions.band", common=True,
+        None, Custom(band_mhz, metavar="NAME"), "Receiver band instead of a range: ALMA1 to ALMA10", "conditions.band", common=True,
         example="ALMA6",
     )  # fmt: skip
 
@@ -144,12 +146,11 @@ DEPTH = Knob(
 
 @dataclass(frozen=True)
 class EmissionRequest:
-    """What is looked at; every field is checked when the request is made.
+    """The observed source; fields are checked when the request is made.
 
-    molecules: tops, each with its dipole, or lines of catalogues with Q(T). sources: of each molecule its column density, excitation
-    temperature, velocity and width; background, filling and redshift are those of the layer, alike in all. range_mhz: as observed.
-    least_depth: optical depth at the centre of a line below which it is left out. effects: the Hamiltonian of each molecule; by default
-    the semi-rigid one, and nothing for a catalogue.
+    molecules: tops with dipoles, or catalogue lines with Q(T). sources: column density, excitation temperature, velocity and width of each
+    molecule; background, filling and redshift are common. range_mhz: as observed. least_depth: optical depth below which a line is left
+    out. effects: the Hamiltonian of each molecule; by default the semi-rigid one, and empty for a catalogue.
     """
 
     molecules: tuple[Top | CatalogueLines, ...]
@@ -158,7 +159,7 @@ class EmissionRequest:
         WindowInput, _window, lambda value, _: WindowInput(value), REQUIRED, single=True, why="give one of them"
     )
     least_depth: float = declared(
-        LEAST_DEPTH, Quantity(above=0), "Leave out lines of less optical depth", "observables.least_depth", knob=DEPTH
+        LEAST_DEPTH, Quantity(above=0), "Least optical depth of a line", "observables.least_depth", knob=DEPTH
     )
     effects: tuple[tuple[QuantumEffect, ...], ...] = effects_of_each_field()
 
@@ -167,7 +168,7 @@ class EmissionRequest:
         check_fields(self)
         if self.effects and len(self.effects) != len(self.molecules):
             raise ValueError(
-                f"effects: {len(self.effects)} given for {len(self.molecules)} molecules; expected those of each"
+                f"effects: {len(self.effects)} given for {len(self.molecules)} molecules; expected one Hamiltonian for each"
             )
         first, last = self.range_mhz
         if not 0 < first < last or math.isinf(last):
@@ -186,7 +187,7 @@ class EmissionRequest:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the molecules, all different."""
+        """Distinct names of the molecules."""
         names: list[str] = []
         for number, molecule in enumerate(self.molecules, start=1):
             name = molecule.name or f"molecule {number}"
@@ -196,10 +197,10 @@ class EmissionRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EmissionLines(Table):
-    """Lines of all molecules, (n,) each, rising in the observed frequency; T_B and its integral of each line by itself.
+    """Lines of all molecules, (n,) each, in order of observed frequency; T_B and its integral are those of the line alone.
 
-    names: of the molecules. molecule: index of the line's. row: index among the molecule's lines. frequency_mhz: at rest. observed_mhz.
-    energy_upper_k: E_u/k. g_upper, einstein_a_per_s. optical_depth: at the centre. brightness_k: there. integrated_k_km_s: ∫T_B dv.
+    names: of the molecules. molecule: index into names. row: index among the lines of its molecule. frequency_mhz: at rest.
+    observed_mhz: as observed. energy_upper_k: E_u/k. optical_depth, brightness_k: at the centre. integrated_k_km_s: ∫T_B dv.
     """
 
     names: tuple[str, ...]
@@ -221,7 +222,7 @@ class EmissionLines(Table):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The table by column; molecule is the name, upper and lower are the quantum numbers."""
+        """The table by column; molecule is a name, upper and lower are texts of quantum numbers."""
         numbers = ("frequency_mhz", "observed_mhz", "energy_upper_k", "g_upper", "einstein_a_per_s",
                    "optical_depth", "brightness_k", "integrated_k_km_s")  # fmt: skip
         names = np.array(self.names, dtype=np.str_)[self.molecule]
@@ -234,7 +235,7 @@ class EmissionLines(Table):
 
 @dataclass(frozen=True)
 class Peak:
-    """The line at whose centre the layer differs most from the background: row of the table, T_B and τ of everything there."""
+    """The line at whose centre the layer differs most from the background: its row, and T_B and τ of all molecules there."""
 
     row: int
     observed_mhz: float
@@ -244,9 +245,9 @@ class Peak:
 
 @dataclass(frozen=True, repr=False)
 class EmissionAnswer(TextOf):
-    """The spectrum of all molecules together, of each, and their lines.
+    """The spectrum of all molecules, that of each, and their lines.
 
-    emitted: lines, Q and Hamiltonian of each molecule. notes: what was said while they were made.
+    emitted: lines, Q and Hamiltonian of each molecule.
     """
 
     shown = "lines"
@@ -259,12 +260,12 @@ class EmissionAnswer(TextOf):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes of all molecules, each once."""
+        """Notes of all molecules, without repetition."""
         return tuple(dict.fromkeys(text for lines in self.emitted for text in lines.notes))
 
     @cached_property
     def peak(self) -> Peak | None:
-        """The line with the largest T_B of all molecules together at its centre; None without lines."""
+        """The line with the largest |T_B| of all molecules together at its centre; None without lines."""
         if not len(self.lines):
             return None
         observed = self.lines.observed_mhz
@@ -278,13 +279,13 @@ class EmissionAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the brightness of the brightest line can be trusted."""
+        """Error budget of the brightness at the brightest line."""
         from rotor.spectra.brightness_budget import brightness_budget
 
         return brightness_budget(self)
 
     def facts(self) -> dict[str, Any]:
-        """Everything but the tables, by the keys of docs/verbs."""
+        """All content except the tables, by the keys of docs/verbs."""
         request, layer, peak = self.request, self.request.sources[0], self.peak
         return {
             "molecules": [self._molecule_facts(number) for number in range(len(request.molecules))],
@@ -314,7 +315,7 @@ class EmissionAnswer(TextOf):
 
 
 def answer_emission(request: EmissionRequest) -> EmissionAnswer:
-    """The spectrum and the lines that a request asks for.
+    """The spectrum and the lines of a request.
 
     >>> from rotor.tops.top import Top
     >>> co = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11011, 0, 0), name="CO")
@@ -337,7 +338,7 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
 
 
 def _line_table(request: EmissionRequest, number: int, emitted: EmittedLines, source: Source) -> EmissionLines:
-    """The lines whose centre is in the range; those beyond its edges show their wings alone."""
+    """Table of the lines with their centre in the range; lines beyond its edges contribute only wings to the spectrum."""
     first, last = request.range_mhz
     centres = emitted.frequency_mhz * source.frequency_ratio
     rows = np.flatnonzero((centres >= first) & (centres <= last))
@@ -363,13 +364,13 @@ def _line_table(request: EmissionRequest, number: int, emitted: EmittedLines, so
 
 
 def _across(depth: float) -> float:
-    """∫ (1 - e^-τ(v)) dv in widths at half maximum of a Gaussian τ(v) with the depth at its centre, by the trapezoidal rule."""
+    """∫ (1 - e^-τ(v)) dv in full widths, for a Gaussian τ(v) with this depth at its centre (trapezoidal rule)."""
     absorbed = -np.expm1(-depth * np.exp(-4 * math.log(2) * _ACROSS**2))
     return float(absorbed.sum() * (_ACROSS[1] - _ACROSS[0]))
 
 
 def _joined(tables: Sequence[EmissionLines]) -> EmissionLines:
-    """All lines in one table, rising in the frequency that is observed."""
+    """All lines in one table, in order of observed frequency."""
     order = np.argsort(np.concatenate([table.observed_mhz for table in tables]), kind="stable")
     columns: dict[str, Any] = {"names": tables[0].names}
     for name in EmissionLines.__dataclass_fields__.keys() - columns:

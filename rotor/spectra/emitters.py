@@ -1,9 +1,9 @@
-"""Lines that a molecule of a source emits, at its excitation temperature: computed from a top, or those of a catalogue.
+"""Lines that a molecule of a source emits at its excitation temperature: computed from a top, or taken from a catalogue.
 
     I(T) = (8π³/3hc) ν g_I S μ² [exp(-E″/kT) - exp(-E′/kT)] / Q(T)          integrated absorption (`rotor.spectra.intensity`)
 
-A top is solved at the temperature; a catalogue has the lines, and Q(T) beside them. Lines that are left out are computed down to a
-thousandth of the least optical depth, so that what they add up to is known.
+A top is solved at the temperature; a catalogue has lines and Q(T). Lines below the least optical depth are computed down to a thousandth
+of it, so that the error from leaving them out is known.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from rotor.spectra.profiles import gaussian
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-EDGE_WIDTHS = 5.0  # beyond the edges of a range: a Gaussian is down to exp(-69) there
-BELOW = 1e-3  # of the least optical depth: lines of less are not computed
-BETWEEN = 1.25  # the sum of Gaussians between their centres over that at a centre: 1.07 of two lines, 1.22 of many
+EDGE_WIDTHS = 5.0  # full widths beyond the edges of a range: a Gaussian is down to exp(-69) there
+WEAKEST = 1e-3  # of the least optical depth: weaker lines are not computed
+BETWEEN = 1.25  # sum of Gaussians between their centres over that at a centre: 1.07 for two lines, 1.22 for many
 
 
 class Partition(Protocol):
-    """Q(T) with the spin weights of the lines."""
+    """Partition function Q(T) with the spin weights of the lines."""
 
     @property
     def source(self) -> str:
-        """Where Q is from."""
+        """Source of Q."""
 
     def at(self, temperature_k: float) -> float:
-        """Q at a temperature."""
+        """Q at a temperature in K."""
 
 
 @runtime_checkable
@@ -55,7 +55,7 @@ class CatalogueLines(Protocol):
 
     @property
     def source(self) -> str:
-        """Where the lines are from."""
+        """Source of the lines."""
 
     @property
     def partition(self) -> Partition:
@@ -63,7 +63,7 @@ class CatalogueLines(Protocol):
 
     @property
     def frequency_mhz(self) -> Floats:
-        """At rest."""
+        """Rest frequencies in MHz."""
 
     @property
     def energy_upper_k(self) -> Floats:
@@ -75,7 +75,7 @@ class CatalogueLines(Protocol):
 
     @property
     def einstein_a_per_s(self) -> Floats:
-        """Einstein coefficient of spontaneous emission."""
+        """Einstein coefficient of spontaneous emission in 1/s."""
 
     @property
     def upper(self) -> NDArray[np.str_]:
@@ -83,23 +83,22 @@ class CatalogueLines(Protocol):
 
     @property
     def lower(self) -> NDArray[np.str_]:
-        """And of the lower."""
+        """Quantum numbers of the lower level."""
 
     def intensity_nm2_mhz(self, temperature_k: float) -> Floats:
-        """I(T), integrated absorption of a molecule."""
+        """Integrated absorption I(T) of a molecule in nm² MHz."""
 
     def between(self, first_mhz: float, last_mhz: float) -> CatalogueLines:
-        """The lines of a range of frequencies."""
+        """The lines in a range of frequencies."""
 
 
 @dataclass(frozen=True, eq=False)
 class EmittedLines:
-    """Lines of a molecule, (n,) each, at one temperature, and what they were made from.
+    """Lines of a molecule, (n,) each, at one temperature.
 
     energy_upper_k: E′/k. q: partition function, with its source. quanta: names of the quantum numbers in upper and lower; empty for a
     catalogue, whose numbers are as printed. effects, hyperfine: of the Hamiltonian of a top; hyperfine is None without spins.
-    q_error: relative bound of the sum Q; 0 for a catalogue, whose Q is taken as it is. left_out_depth: bound of the optical depth that
-    the lines left out add up to anywhere.
+    q_error: relative bound of the sum Q; 0 for a catalogue. left_out_depth: bound of the optical depth of neglected lines, anywhere.
     """
 
     temperature_k: float
@@ -122,9 +121,9 @@ class EmittedLines:
     def where(self, rows: Ints) -> EmittedLines:
         """The lines of these rows."""
         columns = ("frequency_mhz", "intensity_nm2_mhz", "energy_upper_k", "g_upper", "einstein_a_per_s")
-        taken: dict[str, Any] = {name: getattr(self, name)[rows] for name in columns}
-        taken |= {name: tuple(getattr(self, name)[row] for row in rows.tolist()) for name in ("upper", "lower")}
-        return replace(self, **taken)
+        selected: dict[str, Any] = {name: getattr(self, name)[rows] for name in columns}
+        selected |= {name: tuple(getattr(self, name)[row] for row in rows.tolist()) for name in ("upper", "lower")}
+        return replace(self, **selected)
 
 
 def emitted_lines(
@@ -134,7 +133,7 @@ def emitted_lines(
     least_depth: float,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> EmittedLines:
-    """Lines of a molecule whose optical depth is large enough and whose profile is observed in a range, at least its wing.
+    """Lines of a molecule above a least optical depth whose profile, or wing, falls into the observed range.
 
     Parameters
     ----------
@@ -142,9 +141,9 @@ def emitted_lines(
     source : Source
         Column density, excitation temperature, width, velocity and redshift of the molecule.
     range_mhz : (float, float)
-        As observed.
+        Observed range.
     least_depth : float
-        Optical depth at the centre of the weakest line.
+        Optical depth of the weakest line, at its centre.
     effects : sequence of QuantumEffect, optional
         The Hamiltonian of a top.
 
@@ -155,7 +154,7 @@ def emitted_lines(
     Raises
     ------
     ValueError
-        For a catalogue whose Q(T) does not reach to the temperature.
+        For a catalogue whose Q(T) does not cover the temperature.
     """
     widths = EDGE_WIDTHS * source.fwhm_km_s / KM_PER_S
     first, last = (
@@ -169,14 +168,14 @@ def emitted_lines(
 def _top_lines(
     top: Top, source: Source, rest_mhz: tuple[float, float], least_depth: float, effects: tuple[QuantumEffect, ...]
 ) -> EmittedLines:
-    """The optical depth of a Gaussian at its centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the first frequency, gives the cut."""
+    """Lines of a top. The depth at a centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the lowest frequency, gives the cut."""
     width = rest_mhz[0] * source.fwhm_km_s / KM_PER_S
     depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
     least = math.log10(least_depth / depth_per_area)
     lines = line_list(
         top,
         temperature_k=source.excitation_k,
-        min_lgint=least + math.log10(BELOW),
+        min_lgint=least + math.log10(WEAKEST),
         range_mhz=rest_mhz,
         effects=effects or SEMI_RIGID,
     )
@@ -205,21 +204,21 @@ def _top_lines(
         hyperfine=hyperfine_facts(top, lines.levels),
         notes=(*_notes_of_geometry(top), *lines.warnings),
         q_error=lines.partition.relative_error,
-        left_out_depth=BELOW * least_depth + depth_of_blends(*weak, source),
+        left_out_depth=WEAKEST * least_depth + depth_of_blends(*weak, source),
     )
 
 
 def _notes_of_geometry(top: Top) -> Iterator[str]:
-    """That frequencies are those of a geometry, which a telescope's resolution makes useless for finding lines."""
+    """Note that frequencies from a geometry are too inaccurate to find lines with a telescope."""
     if top.molecule is not None and top.molecule.uncertainty and top.source == top.molecule.source:
         yield (
-            f"{top.name}: constants follow from a geometry good to {100 * top.molecule.uncertainty:.2g} %, frequencies are off by so much: "
-            "a catalogue of JPL or CDMS (.cat) has measured ones"
+            f"{top.name}: constants follow from a geometry good to {100 * top.molecule.uncertainty:.2g} %, frequencies have this error: "
+            "a catalogue of JPL or CDMS (.cat) has measured frequencies"
         )
 
 
 def depth_of_blends(frequency_mhz: Floats, depth: Floats, source: Source) -> float:
-    """Bound of the largest optical depth that Gaussian lines (n,) of these depths at their centres add up to.
+    """Bound of the optical depth that Gaussian lines (n,) of these central depths reach together.
 
     >>> narrow = Source(1e14, 10.0, 1.0)
     >>> round(depth_of_blends(np.array([1e5, 1e5, 2e5]), np.array([1e-7, 1e-7, 1e-7]), narrow) / 1e-7, 3)

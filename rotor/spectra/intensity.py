@@ -1,9 +1,9 @@
-"""Intensities of lines: the constants, the population of a level, and how far in J a list has to go for a cut.
+"""Intensities of lines: constants, populations of levels, and the J max that a cut requires.
 
     I(T) = (8π³/3hc) ν S μ² [exp(-E″/kT) - exp(-E′/kT)] g_I / Q(T)      absorption, integrated, nm² MHz
 
 (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eq. 1). Catalogues print log10 I (LGINT) with
-8π³/3hc = 4.16231e-5 nm² MHz / (MHz D²); every other intensity has the value of CODATA 2022, 4.16238e-5, 1.66e-5 larger.
+8π³/3hc = 4.16231e-5 nm² MHz / (MHz D²); all other intensities use the CODATA 2022 value, 4.16238e-5, which is larger by 1.66e-5 (relative).
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from rotor.quantum.levels import Levels
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LGINT_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it, in LGINT alone
+LGINT_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; for LGINT only
 EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
 INTENSITY_NM2_MHZ = EINSTEIN_PER_MHZ3 * units.SPEED_OF_LIGHT_M_PER_S**2 / (8 * math.pi)  # 8π³/3hc = (64π⁴/3hc³) c²/8π
 
 JMAX_DEFAULT_LIMIT = 600
 USUAL_CUT = -12.0
-MOST_LOG10 = 300  # of an intensity that a double can hold
-SUSPECT_BELOW_MHZ = 100.0  # A of a molecule is larger, in MHz; smaller ones may have lost their unit
+MOST_LOG10 = 300  # largest log10 of an intensity that a double holds
+SUSPECT_BELOW_MHZ = 100.0  # constants of molecules are larger; a smaller A may lack its unit
 
 
 def require_cut(min_lgint: float | None) -> None:
-    """ValueError for a cut that is no logarithm of an intensity that a double can hold; None and -inf are no cut."""
+    """Raise ValueError for a cut beyond the range of a double; None and -inf mean no cut."""
     if min_lgint is not None and min_lgint != -math.inf and not abs(min_lgint) <= MOST_LOG10:
         raise ValueError(
             f"min_lgint: {min_lgint:g}: expected a number from {-MOST_LOG10} to {MOST_LOG10}, or None for every allowed line"
@@ -42,10 +42,10 @@ def require_cut(min_lgint: float | None) -> None:
 
 
 def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k: float, q: float, cut: float) -> int:
-    """The J beyond which every line is weaker than 10^cut nm² MHz at this temperature.
+    """The J beyond which all lines are weaker than 10^cut nm² MHz at this temperature.
 
-    The lowest level of each J is above C J(J+1) in a rigid top, a line's strength is at most (J+1) μ² times the spin
-    weight, its frequency is taken as 2A(J+1).
+    Bounds for a rigid top: the lowest level of each J lies above C J(J+1), the strength of a line is at most (J+1) μ² times the spin
+    weight; the frequency is taken as 2A(J+1).
 
     Parameters
     ----------
@@ -54,21 +54,21 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
     dipole_abc : (float, float, float)
         Components of μ in debye.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     q : float
         Partition function.
     cut : float
-        log10 of nm² MHz; for -inf, no cut, the reach of the usual cut of -12 is taken.
+        log10 of nm² MHz; -inf (no cut) uses the usual cut of -12.
 
     Returns
     -------
     int
-        J max of the levels to solve.
+        Highest J of the levels to solve.
 
     Raises
     ------
     ValueError
-        Where more than J = 600 would be needed.
+        If more than J = 600 would be needed.
     """
     constants = top.rotational_constants_mhz
     a, c = max(x for x in constants if math.isfinite(x)), constants[2]
@@ -85,28 +85,28 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
             break
     if j > JMAX_DEFAULT_LIMIT:
         largest_mhz = f"a largest constant of {a:g} MHz is small for a molecule"
-        unit = f"; {largest_mhz}: numbers without a unit are MHz, so write GHz or cm-1 behind them where that is meant"
+        unit = f"; {largest_mhz}: numbers without a unit are MHz; write GHz or cm-1 if that is meant"
         raise ValueError(
             f"lines above 10^{math.log10(least):g} nm² MHz at {temperature_k:g} K reach to J = {j}, more than "
-            f"{JMAX_DEFAULT_LIMIT}; give J max yourself, a lower temperature or a higher cut"
+            f"{JMAX_DEFAULT_LIMIT}; give J max, a lower temperature or a higher cut"
             + (unit if a < SUSPECT_BELOW_MHZ else "")
         )
     return j
 
 
 def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
-    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight.
+    """The fraction of molecules in each level, per component and M, including its spin weight.
 
     Parameters
     ----------
     levels : Levels
         Energies and weights.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     q : float
-        Partition function, with the same spin weights.
+        Partition function with the same spin weights.
     ground_mhz : float, optional
-        The energy from which Q counts; that of the lowest of these levels that exists by default.
+        Zero of energy for Q; by default the lowest of these levels that exists.
 
     Returns
     -------
@@ -114,12 +114,12 @@ def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float
         Pure numbers.
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
-    exponent = np.minimum(-above_k / temperature_k, 600.0)  # levels that mean nothing may lie far below the ground
+    exponent = np.minimum(-above_k / temperature_k, 600.0)  # unphysical levels may lie far below the ground state
     return np.asarray(levels.weight_per_component / q * np.exp(exponent))
 
 
 def largest(values: Floats, count: int) -> Ints:
-    """Rows of the `count` largest values, the largest first, of equal ones the first.
+    """Rows of the `count` largest values in falling order; ties in order of rows.
 
     >>> largest(np.array([1.0, 3.0, 2.0, 3.0]), 3).tolist()
     [1, 3, 2]
@@ -135,9 +135,9 @@ def largest(values: Floats, count: int) -> Ints:
 
 @dataclass(frozen=True)
 class IntensityCut:
-    """Temperature, partition function and populations behind an intensity, and the weakest intensity that counts.
+    """Weakest intensity that counts, with the temperature and populations behind it.
 
-    population: (levels,) intensity per MHz and D² of a line from each state, the photon factor apart. kt_mhz: kT/h.
+    population: (levels,) intensity per MHz and D² of a line from each lower state, without the photon factor. kt_mhz: kT/h.
     """
 
     population: Floats
@@ -146,14 +146,14 @@ class IntensityCut:
 
     @property
     def needed(self) -> Floats:
-        """ν S in MHz D², (levels,), below which a line with this lower state is too weak at any photon factor."""
+        """ν S (levels,) in MHz D² below which a line from this lower state is too weak for any photon factor."""
         if not self.least:
             return np.zeros(len(self.population))
-        with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut
+        with np.errstate(divide="ignore", over="ignore"):  # zero population: no line from that state reaches the cut
             return np.asarray(self.least / self.population)
 
     def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
-        """Which lines are strong enough."""
+        """Mask of the lines that are strong enough."""
         scaled = frequency_mhz * strength * population
         return scaled * -np.expm1(-frequency_mhz / self.kt_mhz) >= self.least
 
@@ -161,25 +161,25 @@ class IntensityCut:
 def intensity_cut(
     levels: Levels, temperature_k: float, q: float, least_lgint: float, ground_mhz: float | None = None
 ) -> IntensityCut | None:
-    """The cut at an LGINT of `least_lgint`.
+    """The cut at log10 intensity `least_lgint`.
 
     Parameters
     ----------
     levels : Levels
         Energies and weights.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     q : float
         Partition function.
     least_lgint : float
-        log10 of nm² MHz of the weakest line that counts.
+        log10 of the weakest intensity in nm² MHz.
     ground_mhz : float, optional
         As in `population`.
 
     Returns
     -------
     IntensityCut or None
-        None for -inf, which cuts nothing.
+        None for -inf (no cut).
     """
     if math.isinf(least_lgint):
         return None

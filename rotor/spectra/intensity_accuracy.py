@@ -1,7 +1,7 @@
-"""Accuracy of intensities in percent: of every line (of Q and of its strength), and of all lines together, which a cut leaves incomplete.
+"""Accuracy of intensities in percent: for each line (from Q and its strength), and for the sum of all lines, which a cut makes incomplete.
 
-What a cut leaves out is the difference from a list with a cut a hundred times finer. Each decade of a cut holds about a tenth of what the
-decade before did (docs/accuracy.md), so that lines below the finer cut hold about a hundredth of that; `SPARE` covers a fourth.
+The loss from a cut is the difference from a list with a cut a hundred times finer. Each decade of a cut holds about a tenth of the
+intensity of the decade before (docs/accuracy.md), so that lines below the finer cut hold about a hundredth; `SPARE` covers a fourth.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from rotor.requests.field import declared_fields
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 
 SPARE = 1.25
-MOST_DECADES = 12  # by which a cut is lowered
-FINER = 2  # decades of the reference
+MOST_DECADES = 12  # largest lowering of a cut
+FINER = 2  # decades between a cut and its reference
 
 
 def error_of_intensities(answer: Any) -> float:
-    """The error of the intensity of a line in percent: of Q, and of strengths whose vectors are rounded."""
+    """Error of the intensity of a line in percent, from Q and from rounding of the strengths."""
     lines = answer.lines
     return 100.0 * (
         float(lines.partition.relative_error) + ROUNDING * max(1, int(lines.levels.rotational.max(initial=0)))
@@ -29,8 +29,8 @@ def error_of_intensities(answer: Any) -> float:
 
 @dataclass(frozen=True)
 class Cut:
-    """A cut of a list. name: of the field. lower: the cut some decades lower. left_out: the part in percent that an answer leaves out
-    beside another one. answer: of a request.
+    """An intensity cut. name: of the field. lower: returns the cut lowered by some decades. left_out: percentage that an answer lacks
+    compared with a reference. answer: computes a request.
     """
 
     name: str
@@ -39,9 +39,9 @@ class Cut:
     answer: Callable[[Any], Any]
 
     def choose(self, scene: Any, request: Any, accuracy: float) -> Choice:
-        """The cut as it is where the lines below it hold less than the accuracy, else the highest, in decades, with which they do.
+        """The cut unchanged if weaker lines hold less than the accuracy; else the highest cut, in decades, for which they do.
 
-        A higher cut than that of the request would be cheaper and leave out lines that are requested. A cut that is given by hand stays.
+        A higher cut would be cheaper but leave out requested lines. A cut set by the user is not changed.
         """
         structure: Any = type(request)
         field, cut = declared_fields(structure)[self.name], getattr(request, self.name)
@@ -51,9 +51,9 @@ class Cut:
             chosen = replace(request, **{self.name: self.lower(cut, decades)})
             answer = self.answer(chosen)
             finer = self.answer(replace(chosen, **{self.name: self.lower(cut, decades + FINER)}))
-            left, of_lines = SPARE * self.left_out(answer, finer), error_of_intensities(answer)
-            error = left + of_lines
-            if error <= accuracy or of_lines > accuracy:
+            missing, line_error = SPARE * self.left_out(answer, finer), error_of_intensities(answer)
+            error = missing + line_error
+            if error <= accuracy or line_error > accuracy:
                 break
-        how = f"{field.last} {getattr(chosen, self.name):g}, weaker lines hold {left:.1g} %"
+        how = f"{field.last} {getattr(chosen, self.name):g}, weaker lines hold {missing:.1g} %"
         return Choice(chosen, how, error)

@@ -1,10 +1,10 @@
-"""A line list: which transitions exist, how strong they are, and their columns.
+"""Line lists: which transitions exist, how strong they are, and their columns.
 
     I(T) = (8π³/3hc) ν g_I S μ² [exp(-E″/kT) - exp(-E′/kT)] / Q(T)      absorption, integrated, nm² MHz
     A    = (64π⁴ν³/3hc³) S μ² / (2J′+1)                                 1/s
 
-(H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eqs. 1 and 3). S μ² is summed over M and over
-all components that coincide in the line, g_I is the spin weight of one component, Q carries the same g_I.
+(H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eqs. 1 and 3). S μ² is summed over M and
+all components that coincide in the line; g_I is the spin weight of one component, and Q contains the same g_I.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ DEFAULT_MIN_LGINT = -12.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lines(TransitionTable):
-    """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
+    """Lines as columns of equal length, rising in frequency unless computed unsorted.
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
-    All other columns are computed when asked for. min_lgint, range_mhz and jmax say where the list was cut.
-    untrusted: how many lines were left out since a level of theirs is beyond the reach of the constants.
-    covariance: of the constants; without one, their uncertainties count where the top says that they are independent.
+    Other columns are computed on demand. min_lgint, range_mhz and jmax are the limits of the list.
+    untrusted: number of lines left out because one of their levels is beyond the reach of the constants.
+    covariance: of the constants; without it, their uncertainties count if the top states that they are independent.
     """
 
     top: Top
@@ -84,12 +84,12 @@ class Lines(TransitionTable):
 
     @property
     def jmax(self) -> int:
-        """The highest J of a level in the list's making."""
+        """The highest J of the levels."""
         return self.levels.jmax
 
     @cached_property
     def partition(self) -> PartitionFunction:
-        """Q(T) behind the intensities, summed when first asked for unless it was given."""
+        """Q(T) of the intensities; summed on first use unless it was given."""
         return self.given_partition or partition_function(self.top, self.temperature_k, effects=self.levels.effects)
 
     @property
@@ -99,9 +99,10 @@ class Lines(TransitionTable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Limits of the levels behind the lines and of the errors of frequencies."""
-        known = set(self.covariance_used.names) if self.covariance_used else set()
-        exact = [name for name in self._parameters if name not in known and ("(" not in name or "(" in "".join(known))]
+        """Limits of the levels, lines left out, and constants without uncertainty in the errors."""
+        uncertain = set(self.covariance_used.names) if self.covariance_used else set()
+        with_spins = "(" in "".join(uncertain)
+        exact = [name for name in self._parameters if name not in uncertain and ("(" not in name or with_spins)]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
         verb = "is" if self.untrusted == 1 else "are"
         beyond = (
@@ -109,36 +110,36 @@ class Lines(TransitionTable):
         )
         limits = () if self._tabulated else warnings_of(self.top, self.levels)
         limits += (beyond,) if self.untrusted else ()
-        return limits + ((partly,) if known and exact else ())
+        return limits + ((partly,) if uncertain and exact else ())
 
     @property
     def _tabulated(self) -> bool:
-        """Whether every line is between levels of the top's table, so that the distortion series does not matter."""
-        known = in_level_table(self.top, self.levels)
-        return known is not None and bool(known[self.upper].all() and known[self.lower].all())
+        """Whether all lines join levels of the top's table, so that the distortion series does not matter."""
+        in_table = in_level_table(self.top, self.levels)
+        return in_table is not None and bool(in_table[self.upper].all() and in_table[self.lower].all())
 
     @cached_property
     def spread(self) -> Floats | None:
-        """What the covariance of the constants makes of each level, see `uncertainty.level_spread`; None without one."""
+        """Contribution of the constants' covariance to each level (`uncertainty.level_spread`); None without a covariance."""
         if self.given_spread is not None or self.covariance_used is None:
             return self.given_spread
         return level_spread(self.top, self.levels, self.covariance_used)
 
     @property
     def covariance_used(self) -> Covariance | None:
-        """The covariance given, else what the top knows, see `uncertainty.known_covariance`."""
+        """The given covariance, else that of the top (`uncertainty.known_covariance`)."""
         return self.covariance or known_covariance(self.top, self._parameters)
 
     @cached_property
     def _parameters(self) -> tuple[str, ...]:
-        """The names of all parameters of the levels' effects; a fit may have had more, such as those of spins."""
+        """Names of all parameters of the levels' effects; a covariance from a fit may have more, such as those of spins."""
         return tuple(dict.fromkeys(name for effect in self.levels.effects for name in effect.parameters(self.top)))
 
     @property
     def error_mhz(self) -> Floats | None:
-        """One standard deviation of every frequency, from the uncertainty of the constants or of a level table; None where it is unknown.
+        """One standard deviation of each frequency, from uncertainties of the constants or of a level table; None if unknown.
 
-        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact. nan: a level is not in the table.
+        Neglected: errors of the Hamiltonian. Constants without uncertainty count as exact. nan: a level is not in the table.
         """
         if self.spread is None:
             return tabulated_line_errors(self.top, self.levels, self.upper, self.lower)
@@ -146,14 +147,14 @@ class Lines(TransitionTable):
 
     @property
     def errors_from(self) -> str | None:
-        """Which uncertainties the errors of frequencies come from, None where there are none."""
+        """Source of the uncertainties in the errors of frequencies; None if there are none."""
         return source_of_errors(self.top, self._parameters, self.covariance)
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the lines were made from: the top and its sources, the settings, Q."""
-        known = self.top.provenance
-        return (known if self.levels.of_named_constants else without_constants(known)) | {
+        """Origin of the lines: the top with its sources, the settings, Q."""
+        origin = self.top.provenance
+        return (origin if self.levels.of_named_constants else without_constants(origin)) | {
             "errors_from": self.errors_from,
             "temperature_k": self.temperature_k,
             "jmax": self.jmax,
@@ -167,7 +168,7 @@ class Lines(TransitionTable):
 
     @property
     def energy_lower_cm(self) -> Floats:
-        """E″ in cm⁻¹ from the lowest level that exists."""
+        """E″ in cm⁻¹ above the lowest existing level."""
         return (self.levels.energy_mhz[self.lower] - self.levels.ground_mhz) / units.MHZ_PER_CM
 
     @property
@@ -178,9 +179,9 @@ class Lines(TransitionTable):
     @property
     def intensity_nm2_mhz(self) -> Floats:
         """Integrated absorption I(T) in nm² MHz."""
-        below = population(self.levels, self.temperature_k, self.q)[self.lower]
+        lower_population = population(self.levels, self.temperature_k, self.q)[self.lower]
         photon = -np.expm1(-self.frequency_mhz / (self.temperature_k * units.MHZ_PER_K))
-        return np.asarray(INTENSITY_NM2_MHZ * self.frequency_mhz * self.strength_debye2 * below * photon)
+        return np.asarray(INTENSITY_NM2_MHZ * self.frequency_mhz * self.strength_debye2 * lower_population * photon)
 
     @property
     def intensity_cm_per_molecule(self) -> Floats:
@@ -190,17 +191,17 @@ class Lines(TransitionTable):
     @property
     def lgint(self) -> Floats:
         """log10 of I(T) in nm² MHz, with the value of 8π³/3hc that catalogues use."""
-        with np.errstate(divide="ignore"):  # a line of zero strength is -inf, as it should be
+        with np.errstate(divide="ignore"):  # -inf for a line of zero strength
             return np.log10(self.intensity_nm2_mhz * (LGINT_NM2_MHZ / INTENSITY_NM2_MHZ))
 
     @property
     def einstein_a_per_s(self) -> Floats:
-        """Einstein coefficient of spontaneous emission, 1/s, of one component and M averaged."""
+        """Einstein coefficient of spontaneous emission in 1/s, for one component, averaged over M."""
         states = self.levels.states[self.upper]
         return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states
 
     def where(self, chosen: NDArray[Any] | slice) -> Lines:
-        """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
+        """The lines selected by a slice, a boolean mask or an array of indices, in its order."""
         return replace(
             self,
             frequency_mhz=self.frequency_mhz[chosen],
@@ -212,7 +213,7 @@ class Lines(TransitionTable):
         )
 
     def sorted(self) -> Lines:
-        """These lines, rising in frequency."""
+        """The lines in order of rising frequency."""
         if (self.frequency_mhz[1:] >= self.frequency_mhz[:-1]).all():
             return self
         return self.where(rising_order(self.frequency_mhz))
@@ -223,9 +224,9 @@ class Lines(TransitionTable):
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name with unit, quantum numbers last (j_upper, ..., kc_lower).
+        """The columns by their names with unit, quantum numbers last (j_upper, ..., kc_lower).
 
-        `error_mhz` is among them where the uncertainty of a constant is known.
+        `error_mhz` is included if the uncertainty of a constant is known.
         """
         names = (
             "frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2",
@@ -237,7 +238,7 @@ class Lines(TransitionTable):
         return out | self.levels.quanta_columns(self.upper, "upper") | self.levels.quanta_columns(self.lower, "lower")
 
     def __getitem__(self, chosen: NDArray[Any] | slice | int) -> Lines:
-        """The same as `where`: lines[mask], lines[:10]; lines[3] is a list of one line."""
+        """`where` as indexing: lines[mask], lines[:10]; lines[3] is a list of one line."""
         return self.where(np.array([chosen]) if isinstance(chosen, int) else chosen)
 
     def _title(self) -> str:
@@ -246,16 +247,16 @@ class Lines(TransitionTable):
         return f"{counted(len(self), 'line')} of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
 
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
-        few = self.where(rows)
+        selected = self.where(rows)
         names = ["frequency_mhz", "strength_debye2", "energy_lower_cm", "g_upper"]
-        if few.given_partition is not None:  # Q is not summed for the sake of a text
+        if selected.given_partition is not None:  # a text alone does not trigger the sum of Q
             names.insert(1, "lgint")
-        texts = {name: [f"{value:.6g}" for value in getattr(few, name).tolist()] for name in names}
-        texts["frequency_mhz"] = [f"{value:.4f}" for value in few.frequency_mhz.tolist()]
+        texts = {name: [f"{value:.6g}" for value in getattr(selected, name).tolist()] for name in names}
+        texts["frequency_mhz"] = [f"{value:.4f}" for value in selected.frequency_mhz.tolist()]
         label = " ".join(heading(name) for name in self.quanta_names)
         return texts | {
-            f"upper {label}": self.levels.labels(few.upper),
-            f"lower {label}": self.levels.labels(few.lower),
+            f"upper {label}": self.levels.labels(selected.upper),
+            f"lower {label}": self.levels.labels(selected.lower),
         }
 
 
@@ -275,18 +276,18 @@ def line_list(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> Lines:
-    """Electric-dipole lines of a top: every transition that the selection rules allow, cut only where you say.
+    """Electric-dipole lines of a top: all transitions that the selection rules allow, within the given limits.
 
     Parameters
     ----------
     top : Top
         With a dipole in debye.
     temperature_k : float, optional
-        For intensities.
+        Temperature for intensities.
     jmax : int, optional
-        The highest J; by default the one beyond which no line can reach `min_lgint`.
+        Highest J; by default the J beyond which no line reaches `min_lgint`.
     min_lgint : float or None, optional
-        log10 of nm² MHz below which lines are left out; None for none left out.
+        log10 of nm² MHz below which lines are left out; None keeps all lines.
     range_mhz : (float, float), optional
         First and last frequency.
     q : float, optional
@@ -296,18 +297,18 @@ def line_list(
     vibrations : VibrationalStates, optional
         States or fundamentals whose factor at this temperature multiplies Q instead.
     covariance : Covariance, optional
-        Of the constants, for the errors of frequencies; by default the uncertainties that the constants carry,
-        uncorrelated, but not those of a fit whose correlations are unknown (the library's): they would make errors many
-        times too large.
+        Of the constants, for the errors of frequencies. The default is the stated uncertainties, uncorrelated; fitted uncertainties
+        whose correlations are unknown (as in the library) are not used, since without correlations the errors would be many times
+        too large.
     sort : bool, optional
-        Whether lines rise in frequency; False leaves them in the order in which they are found.
+        Whether to sort by frequency; False leaves the lines in the order of computation.
     untrusted : bool, optional
-        List lines of levels beyond the reach of the distortion constants too (`rotor.thermodynamics.trusted_levels`); by
-        default they are left out and counted.
+        Include lines of levels beyond the reach of the distortion constants (`rotor.thermodynamics.trusted_levels`); by
+        default these are left out and counted.
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        The Hamiltonian.
     executor : Executor, optional
-        J are spread over it.
+        Shares the work over J.
 
     Returns
     -------
@@ -317,12 +318,12 @@ def line_list(
     Raises
     ------
     ValueError
-        Where the top has no known dipole, for a temperature not above 0, and for J max below 0.
+        If the dipole is not known, for a temperature not above 0, and for J max below 0.
 
     Notes
     -----
-    Neglected: all but electric dipole, dependence of μ on J, and what the effects do not contain: nuclear hyperfine structure
-    comes with `effects=rotor.api.effects_of(top, True)`, of the constants of spins that the top has.
+    Neglected: all but electric dipole transitions, dependence of μ on J, and effects that are not in `effects`. For nuclear hyperfine
+    structure from the spin constants of the top use `effects=rotor.api.effects_of(top, True)`.
 
     Examples
     --------
@@ -387,32 +388,32 @@ def partition_of(
     vibrations: VibrationalStates | None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | None:
-    """Q as the user gave it, or the summed one times a vibrational factor.
+    """The given Q, or the summed Q times a vibrational factor.
 
     Parameters
     ----------
     top : Top
-        Whose levels are summed.
+        Top whose levels are summed.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     q : float or None
-        The partition function, where it is given.
+        The given partition function, if any.
     vibrational_factor : float
         Multiplies Q; 1 for none.
     vibrations : VibrationalStates or None
         States whose factor at this temperature multiplies Q instead.
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        The Hamiltonian.
 
     Returns
     -------
     PartitionFunction or None
-        None where Q is to be summed as it is.
+        None if Q is to be summed without a factor.
 
     Raises
     ------
     ValueError
-        For both kinds of vibrational factor at once, and for a Q or a factor that is not a finite number above 0.
+        For both kinds of vibrational factor at once, and for a Q or factor that is not finite and above 0.
     """
     if vibrations is not None:
         if vibrational_factor != 1.0:

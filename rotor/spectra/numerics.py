@@ -1,4 +1,4 @@
-"""Accuracy and plans of lists of lines and of Raman lines: frequencies, intensities, J max; widths that a list leaves out."""
+"""Accuracy goals, sweeps and plans for line lists and Raman lines; neglected line widths."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ from rotor.spectra.widths import doppler, pressure_width
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-SHARES_OF_J = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)  # of the J max of the scene
-BEYOND = 1.3  # times that J max: the reference
+SHARES_OF_J = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)  # settings of a sweep, as shares of the scene's J max
+BEYOND = 1.3  # J max of the reference, relative to that of the scene
 
 
 def line_error(answer: Any, reference: Any) -> float:
-    """The largest difference in MHz of a frequency of the reference's lines, from the levels of another list."""
+    """Largest difference in MHz of the frequencies of the reference's lines, computed from the levels of an answer."""
     energies = energies_like(reference.levels, answer.levels)
     return largest(energies[reference.upper] - energies[reference.lower] - reference.frequency_mhz)
 
 
 def shift_error(answer: Any, reference: Any) -> float:
-    """The largest difference in MHz of a Raman shift of the reference's lines, from the levels of another list."""
+    """Largest difference in MHz of the Raman shifts of the reference's lines, computed from the levels of an answer."""
     energies = energies_like(reference.levels, answer.levels)
     return largest(energies[reference.final] - energies[reference.initial] - reference.shift_mhz)
 
 
 def error_of_list(answer: Any) -> float:
-    """The error of the frequencies of lines in MHz."""
+    """Error of line frequencies in MHz."""
     return levels_error(answer, answer.lines.top, answer.lines.levels)
 
 
 def sweeps_of_lines(
     request: Any, answer: Callable[[Any], Any], measure: Measure, error: Callable[[Any, Any], float], of: str
 ) -> Sweeps:
-    """J max by a measure; orders of distortion and methods of hyperfine structure by the error of the frequencies."""
+    """Sweeps of J max (by `measure`), orders of distortion and hyperfine methods (by the error of frequencies)."""
     jmax = answer(request).lines.jmax
     fixed, beyond = replace(request, jmax=jmax), math.ceil(BEYOND * jmax) + 1
     values = sorted({max(1, round(share * jmax)) for share in SHARES_OF_J})
@@ -79,7 +79,7 @@ def _sweeps_of_raman(request: Any) -> Sweeps:
 
 
 def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
-    """J max of a list of lines, and why."""
+    """J max of a line list, and the reason."""
     from rotor.spectra.intensity import jmax_for_cut
     from rotor.thermodynamics import partition_function
 
@@ -89,14 +89,14 @@ def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
     cut = -math.inf if request.min_lgint is None else request.min_lgint
     q = request.q or partition_function(top, kelvin).q
     dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
-    return jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "what the cut needs"
+    return jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "as the cut requires"
 
 
 def allowed_lines(top: Top, jmax: int) -> int:
-    """How many dipole lines of a semi-rigid top the selection rules allow up to a J max: blocks that a component connects.
+    """Number of dipole lines of a semi-rigid top up to J max that the selection rules allow.
 
-    μ_a keeps the parity of Ka, μ_c that of Kc, μ_b changes both; lines of a linear or symmetric top have ΔJ = 1 and ΔK = 0. Levels
-    of spin weight 0 do not exist.
+    μ_a preserves the parity of Ka, μ_c that of Kc, μ_b changes both; linear and symmetric tops have ΔJ = 1 and ΔK = 0. Levels of spin
+    weight 0 do not count.
 
     >>> from rotor.tops.top import Top
     >>> allowed_lines(Top.from_constants("A=10 B=6 C=4 GHz", dipole_abc_debye=(1, 0, 0)), 1)  # 1(0,1)-0(0,0), 1(1,0)-1(1,1)
@@ -133,7 +133,7 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
 
 
 def plan_of_spectrum(request: Any) -> Plan:
-    """The plan of a list of lines."""
+    """The plan of a line list."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.request import answer_spectrum
 
@@ -148,17 +148,17 @@ def plan_of_spectrum(request: Any) -> Plan:
         lambda j: (j + 1.0) ** (1 if top.kind == "linear" else 2),
     )
     seconds = cost.seconds
-    lines = allowed_lines(top, jmax)  # after the calibration, which refuses a J that no list has
+    lines = allowed_lines(top, jmax)  # after the calibration, which rejects an impossible J
     _, b, c = top.rotational_constants_mhz
     pressure = request.layer.pressure_bar if request.layer else None
     lowest, highest = request.range_mhz or (0.0, math.inf)
-    frequency = min(max((b + c) * (j + 1), lowest), highest)  # of the lines that are most populated, inside the range
+    frequency = min(max((b + c) * (j + 1), lowest), highest)  # of the most populated lines, inside the range
     widths = [
         doppler(top, frequency, kelvin) if request.shape == "sticks" else None,
         pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
     ]
     described = of_top(top, j, request.effects)
-    absent = largest_first([*described.pop("left_out"), *(part for part in widths if part is not None)])
+    neglected = largest_first([*described.pop("left_out"), *(part for part in widths if part is not None)])
     return Plan(
         kind="spectrum",
         **described,
@@ -166,17 +166,17 @@ def plan_of_spectrum(request: Any) -> Plan:
         counts={"allowed lines of one state, without spins, before range and cut": lines},
         seconds=seconds,
         memory_mb=cost.memory_mb,
-        left_out=absent,
+        left_out=neglected,
     )
 
 
 def plan_of_raman(request: Any) -> Plan:
-    """The plan of Raman lines: milliseconds for what is not an asymmetric top."""
+    """The plan of Raman lines, from a complete run."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.raman_request import answer_raman
 
     def describe(answer: Any) -> dict[str, Any]:
-        """J max is that of the answer."""
+        """Fields of the plan; J max is that of the answer."""
         top, jmax = request.top, answer.lines.jmax
         parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
         described = of_top(top, populated_j(top, request.temperature_k), request.effects)
@@ -226,7 +226,7 @@ RAMAN = Numerics(
 
 
 def plan_of_emission(request: Any) -> Plan:
-    """The plan of a source; the whole request is timed, which takes seconds at the most."""
+    """The plan of a source, from a complete run, which takes at most seconds."""
     from rotor.spectra.emission_request import answer_emission
 
     return plan_of_whole("emission", lambda: answer_emission(request), lambda answer: _source_facts(request, answer))
@@ -236,22 +236,26 @@ def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
     from rotor.quantum.estimates.limits import populated_j
     from rotor.tops.top import Top
 
-    effects, absent = [], [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
+    effects: list[str] = []
+    neglected = [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
     for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
         if not isinstance(top, Top):
             continue
-        j, taken = populated_j(top, source.excitation_k), lines.effects
-        effects += [f"{name}: {text}" for text in effect_texts(top, j, taken)]
-        largest = [part for part in left_out_of_levels(top, j, taken) if part.size is not None][:1]
-        absent += [replace(part, name=f"{name}: {part.name}") for part in largest]
+        j, hamiltonian = populated_j(top, source.excitation_k), lines.effects
+        effects += [f"{name}: {text}" for text in effect_texts(top, j, hamiltonian)]
+        largest_effect = [part for part in left_out_of_levels(top, j, hamiltonian) if part.size is not None][:1]
+        neglected += [replace(part, name=f"{name}: {part.name}") for part in largest_effect]
     return {
         "effects": tuple(effects),
         "parts": (
-            ("method", "optical depths of all lines added, one excitation temperature a molecule, one background"),
-            ("grid", "eight points to a width of the lines"),
+            (
+                "method",
+                "sum of optical depths of all lines, one excitation temperature for each molecule, one background",
+            ),
+            ("grid", "eight points to the width of a line"),
         ),
         "counts": {"molecules": len(request.molecules), "lines": len(answer.lines), "points": len(answer.spectrum)},
-        "left_out": largest_first(absent),
+        "left_out": largest_first(neglected),
     }
 
 

@@ -1,11 +1,11 @@
-"""Opacity of a gas: how much of the light a layer of given pressure and length takes out, at a line's centre and across it.
+"""Opacity of a gas: absorption by a layer of given pressure and length, at a line's centre and across it.
 
     τ(ν) = N L σ(ν),    N = p/kT,    absorbed: 1 - exp(-τ)       τ_i(ν_i) = N L I_i s_i(0) at the centre of a line alone
 
 (Lambert-Beer; S. S. Penner, Quantitative Molecular Spectroscopy and Gas Emissivities, 1959, chapter 2). σ is the cross
-section of `Spectrum`, I_i the integrated absorption of `Lines`, stimulated emission in both, s_i a shape of unit area.
-The pressure is that of the absorbing molecules themselves, an ideal gas at the temperature of the lines. Neglected: what
-the pressure does to the width, which is the user's to state, and emission of the gas.
+section of `Spectrum`, I_i the integrated absorption of `Lines`, both with stimulated emission, s_i a shape of unit area.
+The pressure is the partial pressure of the absorbing molecules, an ideal gas at the temperature of the lines. Neglected:
+pressure broadening beyond the stated width, and emission of the gas.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ PASCAL_PER_BAR = 1e5
 
 
 def column_density_per_cm2(pressure_bar: float, path_cm: float, temperature_k: float) -> float:
-    """Molecules in the line of sight, N L = p L/kT, in 1/cm².
+    """Column density N L = p L/kT in 1/cm².
 
-    pressure_bar: of the molecules meant, bar. path_cm: length of the layer, cm. Raises ValueError unless all are above 0.
+    pressure_bar: partial pressure of the molecules. path_cm: length of the layer. Raises ValueError unless all are above 0.
 
     >>> f"{column_density_per_cm2(1.01325, 1.0, 273.15):.5e}"  # Loschmidt's number
     '2.68678e+19'
@@ -44,30 +44,30 @@ def column_density_per_cm2(pressure_bar: float, path_cm: float, temperature_k: f
 def line_optical_depth(
     lines: Lines, pressure_bar: float, path_cm: float, *, profile: str = "gaussian", fwhm_mhz: float | None = None
 ) -> Floats:
-    """Optical depth at the centre of every line, as if it were alone.
+    """Optical depth at the centre of each line alone.
 
     Parameters
     ----------
     lines : Lines
-        At their temperature.
+        Lines at the temperature of the layer.
     pressure_bar : float
-        Of the absorbing molecules themselves.
+        Partial pressure of the absorbing molecules.
     path_cm : float
         Length of the layer.
     profile : "gaussian", "lorentzian" or "voigt", optional
-        Shape, as `Spectrum.from_lines` takes it.
+        Line shape, as in `Spectrum.from_lines`.
     fwhm_mhz : float, optional
-        Full width at half maximum, as there; Doppler's by default.
+        Full width at half maximum, as there; by default the Doppler width.
 
     Returns
     -------
     (lines,) array
-        Pure numbers: absorbed is 1 - exp(-τ).
+        Optical depths τ; the absorbed fraction is 1 - exp(-τ).
 
     Raises
     ------
     ValueError
-        For a pressure or a path not above 0, and for a Doppler width without a mass.
+        For a pressure or path not above 0, and for a Doppler width without a mass.
 
     Examples
     --------
@@ -83,14 +83,12 @@ def line_optical_depth(
 
 
 def optical_depth(spectrum: Spectrum, pressure_bar: float, path_cm: float) -> Spectrum:
-    """The optical depth of a layer of gas on the grid of a spectrum of cross sections, all lines together.
+    """Optical depth of a layer of gas on the grid of a cross section, all lines together.
 
-    Raises ValueError for a spectrum that is not a cross section at a temperature, a pressure or a path not above 0.
+    Raises ValueError for a spectrum that is not a cross section at a temperature, and for a pressure or path not above 0.
     """
     if spectrum.unit != "nm^2" or spectrum.temperature_k is None:
-        raise ValueError(
-            f"a spectrum in {spectrum.unit}: an optical depth follows from a cross section in nm^2 of a gas"
-        )
+        raise ValueError(f"a spectrum in {spectrum.unit}: expected a cross section in nm^2 at a temperature")
     column = column_density_per_cm2(pressure_bar, path_cm, spectrum.temperature_k)
     return Spectrum(
         spectrum.frequency_mhz,
@@ -105,7 +103,7 @@ def optical_depth(spectrum: Spectrum, pressure_bar: float, path_cm: float) -> Sp
 
 
 def absorbed_fraction(depth: Spectrum) -> Floats:
-    """1 - exp(-τ) on the grid of an optical depth, to full precision where τ is small."""
+    """Absorbed fraction 1 - exp(-τ) on the grid of an optical depth, accurate for small τ."""
     if depth.unit != OPTICAL_DEPTH:
-        raise ValueError(f"a spectrum in {depth.unit}: what is absorbed follows from an optical depth")
+        raise ValueError(f"a spectrum in {depth.unit}: expected an optical depth")
     return -np.expm1(-depth.intensity)

@@ -1,4 +1,4 @@
-"""Hyperfine components that an instrument does not resolve, put together to one line each."""
+"""Merging of hyperfine components that an instrument does not resolve."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rotor.table import Table
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Patterns(Table):
-    """Lines of a list put together where components of one rotational line are closer than a resolution.
+    """Lines of a list with components of one rotational line merged if they are closer than a resolution.
 
-    frequency_mhz: mean of the components, weighted by intensity. intensity_nm2_mhz: their sum. components: how many. width_mhz: from
-    the first to the last. strongest: (n,) the row of the strongest component in `lines`.
+    frequency_mhz: mean of the components, weighted by intensity. intensity_nm2_mhz: their sum. components: their number. width_mhz:
+    from the first to the last. strongest: (n,) row of the strongest component in `lines`.
     """
 
     lines: Lines
@@ -34,7 +34,7 @@ class Patterns(Table):
 
     @property
     def columns(self) -> Mapping[str, NDArray[Any]]:
-        """Numbers, and the quantum numbers of the rotation of both levels."""
+        """Frequencies, intensities, counts and widths, and the rotational quantum numbers of both levels."""
         names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
         quanta = of_rotation(self.lines.levels.quanta)
@@ -44,7 +44,7 @@ class Patterns(Table):
 
 
 def patterns(lines: Lines, resolution_mhz: float) -> Patterns:
-    """Components of one rotational line put together where neighbours are closer than the resolution, by frequency.
+    """Merge neighbouring components of one rotational line that are closer than the resolution; sorted by frequency.
 
     >>> from rotor import read
     >>> from rotor.quantum.effects.of_top import effects_of
@@ -60,15 +60,15 @@ def patterns(lines: Lines, resolution_mhz: float) -> Patterns:
         return Patterns(lines, resolution_mhz, empty, empty, empty.astype(int), empty, empty.astype(int))
     quanta = of_rotation(lines.levels.quanta).values()
     names = np.stack([column[rows] for rows in (lines.upper, lines.lower) for column in quanta], axis=1)
-    of_line = np.unique(names, axis=0, return_inverse=True)[1].ravel()
-    order = np.lexsort((lines.frequency_mhz, of_line))
+    line_of_row = np.unique(names, axis=0, return_inverse=True)[1].ravel()
+    order = np.lexsort((lines.frequency_mhz, line_of_row))
     frequency, intensity = lines.frequency_mhz[order], lines.intensity_nm2_mhz[order]
-    new = (np.diff(of_line[order], prepend=-1) != 0) | (np.diff(frequency, prepend=-np.inf) >= resolution_mhz)
+    new = (np.diff(line_of_row[order], prepend=-1) != 0) | (np.diff(frequency, prepend=-np.inf) >= resolution_mhz)
     starts = np.flatnonzero(new)
     stops = np.append(starts[1:], len(order)) - 1
     total = np.add.reduceat(intensity, starts)
     weights = np.where(total[np.cumsum(new) - 1] > 0, intensity, 1.0)
-    offset = frequency - frequency[starts][np.cumsum(new) - 1]  # for the sake of digits
+    offset = frequency - frequency[starts][np.cumsum(new) - 1]  # relative to the first component, to save digits
     mean = frequency[starts] + np.add.reduceat(offset * weights, starts) / np.add.reduceat(weights, starts)
     by_strength = np.lexsort((-intensity, np.cumsum(new)))
     strongest = order[by_strength[starts]]

@@ -1,6 +1,6 @@
-"""Line shapes of unit area on plain arrays, their widths, and how far out they matter.
+"""Line shapes of unit area on plain arrays, their widths and reaches.
 
-All widths are full widths at half maximum. Any unit serves as long as it is the same throughout; a shape has its inverse.
+All widths are full widths at half maximum, in any unit that is the same throughout; a shape has the inverse unit.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def lorentzian(offset: ArrayLike, fwhm: ArrayLike) -> Floats:
 
 
 def voigt(offset: ArrayLike, fwhm_gaussian: ArrayLike, fwhm_lorentzian: ArrayLike) -> Floats:
-    """The convolution of a Gaussian and a Lorentzian, of unit area: Re w(z) / (σ √2π), z = (x + i w_L/2) / (σ √2).
+    """Convolution of a Gaussian and a Lorentzian, of unit area: Re w(z) / (σ √2π), z = (x + i w_L/2) / (σ √2).
 
     w(z) is the Faddeeva function (NIST Digital Library of Mathematical Functions, eqs. 7.19.1 and 7.19.3), to round-off.
     Either width may be 0.
@@ -54,11 +54,11 @@ def voigt(offset: ArrayLike, fwhm_gaussian: ArrayLike, fwhm_lorentzian: ArrayLik
 
 
 def doppler_fwhm(frequency: ArrayLike, temperature_k: float, mass_u: float) -> Floats:
-    """Full width at half maximum of a line by thermal motion, in the unit of the frequency: ν √(8 ln2 kT/(m c²)).
+    """Doppler width (full width at half maximum) in the unit of the frequency: ν √(8 ln2 kT/(m c²)).
 
-    Follows from a Maxwell distribution of the velocity along the line of sight, ν' = ν (1 + v/c), ⟨v²⟩ = kT/m; the usual
-    7.1623e-7 ν √(T/K · u/m) (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 13, where half of it, 3.581e-7,
-    is the half width). Raises ValueError for a temperature or a mass not above 0.
+    From the Maxwell distribution of velocities along the line of sight, ν' = ν (1 + v/c), ⟨v²⟩ = kT/m; numerically
+    7.1623e-7 ν √(T/K · u/m) (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 13, with 3.581e-7 for the half
+    width). Raises ValueError for a temperature or mass not above 0.
 
     >>> round(float(doppler_fwhm(115271.2018, 300.0, 27.9949)), 6)
     0.270269
@@ -71,7 +71,7 @@ def doppler_fwhm(frequency: ArrayLike, temperature_k: float, mass_u: float) -> F
 
 
 def gaussian_reach(fwhm: ArrayLike, outside: float) -> Floats:
-    """The distance from the centre beyond which a fraction `outside` of the area of a Gaussian lies: erfc.
+    """Distance from the centre beyond which a fraction `outside` of the area of a Gaussian lies.
 
     >>> round(float(gaussian_reach(1.0, 0.002)), 4)  # 3.09 standard deviations
     1.3123
@@ -82,7 +82,7 @@ def gaussian_reach(fwhm: ArrayLike, outside: float) -> Floats:
 
 
 def lorentzian_reach(fwhm: ArrayLike, outside: float) -> Floats:
-    """Reach of a Lorentzian: (w/2) cot(π outside/2), about w/(π outside).
+    """Distance beyond which a fraction `outside` of a Lorentzian lies: (w/2) cot(π outside/2), about w/(π outside).
 
     >>> round(float(lorentzian_reach(2.0, 0.5)), 12)  # half of it lies beyond its half width
     1.0

@@ -1,13 +1,13 @@
-"""Rotational Raman lines: Stokes and anti-Stokes shifts of every allowed transition, and their cross sections.
+"""Rotational Raman lines: Stokes and anti-Stokes shifts of all allowed transitions, and their cross sections.
 
     dσ/dΩ = (7/45) (2π ν_s)⁴ S (g_I/Q) exp(-E_i/kT),     ν_s = ν_laser - shift, in cm⁻¹
 
-is the power scattered by one line per molecule, steradian and unit of irradiance, in cm²/sr: laser polarised linearly,
-observed at right angles to its polarisation (backscattering among them), both polarisations of the scattered light
-together; 4/7 of it keeps the laser's polarisation, 3/7 is turned. It follows from the invariant γ² of randomly oriented
+is the power scattered by one line per molecule, steradian and unit of irradiance, in cm²/sr. The laser is linearly polarised and
+observed at right angles to its polarisation (which includes backscattering), with both polarisations of the scattered light
+together; 4/7 of the light has the laser's polarisation, 3/7 the perpendicular one. It follows from the invariant γ² of randomly oriented
 molecules, (45 a² + 4 γ²)/45 and 3 γ²/45 (D. A. Long, The Raman Effect, 2002, chapter 5; C. M. Penney, R. L. St. Peters and
-M. Lapp, J. Opt. Soc. Am. 64, 712 (1974), who measured it for N2, O2 and CO2). S is that of `raman_strengths`, its sum over
-final states (2J+1) γ². A count of photons goes with ν_laser ν_s³ instead of ν_s⁴.
+M. Lapp, J. Opt. Soc. Am. 64, 712 (1974), who measured it for N2, O2 and CO2). S is defined in `raman_strengths`; its sum over
+final states is (2J+1) γ². A photon count goes with ν_laser ν_s³ instead of ν_s⁴.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ DEFAULT_MIN_RELATIVE = 1e-6
 class RamanLines(TransitionTable):
     """Raman lines as columns of equal length, rising in shift.
 
-    shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones
-    negative. strength_angstrom6: (n,) S over all components, the same for both directions. initial, final: (n,) rows of
-    `levels`. weight: (n,) spin weight of one component. laser_nm: wavelength in vacuum. min_relative: cross section, of
-    the strongest line, below which lines were left out. All other columns are computed when asked for.
+    shift_mhz: (n,) laser frequency minus scattered frequency, positive for Stokes lines. strength_angstrom6: (n,) S over all
+    components, equal for both directions. initial, final: (n,) rows of `levels`. weight: (n,) spin weight of one component.
+    laser_nm: wavelength in vacuum. min_relative: cross section, relative to the strongest line, below which lines were left out.
+    Other columns are computed on demand.
     """
 
     top: Top
@@ -73,12 +73,12 @@ class RamanLines(TransitionTable):
 
     @property
     def jmax(self) -> int:
-        """The highest J of a level in the list's making."""
+        """The highest J of the levels."""
         return self.levels.jmax
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the lines were made from: the top and its sources, the settings, Q."""
+        """Origin of the lines: the top with its sources, the settings, Q."""
         return self.top.provenance | {
             "polarizability_abc_angstrom3": self.top.polarizability_abc_angstrom3,
             "polarizability_source": self.top.polarizability_source,
@@ -109,7 +109,7 @@ class RamanLines(TransitionTable):
 
     @property
     def energy_initial_cm(self) -> Floats:
-        """Energy of the initial state in cm⁻¹ above the lowest level that exists."""
+        """Energy of the initial state in cm⁻¹ above the lowest existing level."""
         return (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_CM
 
     @property
@@ -119,7 +119,7 @@ class RamanLines(TransitionTable):
 
     @property
     def cross_section_cm2_per_sr(self) -> Floats:
-        """Differential cross section dσ/dΩ of every line, cm²/sr per molecule of the gas."""
+        """Differential cross section dσ/dΩ (n,) in cm²/sr per molecule of the gas."""
         energy_k = (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_K
         population = self.weight * np.exp(-energy_k / self.temperature_k) / self.partition.q
         photon = (2 * math.pi * self.scattered_cm) ** 4
@@ -127,17 +127,17 @@ class RamanLines(TransitionTable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Limits of the levels behind the lines."""
+        """Limits of the levels."""
         return warnings_of(self.top, self.levels)
 
     def where(self, chosen: NDArray[Any] | slice) -> RamanLines:
-        """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
+        """The lines selected by a slice, a boolean mask or an array of indices, in its order."""
         names = ("shift_mhz", "strength_angstrom6", "initial", "final", "weight")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name with unit, quantum numbers last (j_initial, ..., kc_final)."""
+        """The columns by their names with unit, quantum numbers last (j_initial, ..., kc_final)."""
         names = (
             "shift_cm", "cross_section_cm2_per_sr", "wavelength_nm", "energy_initial_cm", "g_initial", "strength_angstrom6",
         )  # fmt: skip
@@ -159,28 +159,28 @@ def raman_lines(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> RamanLines:
-    """Rotational Raman lines of a top: every transition that its polarizability allows, cut only where you say.
+    """Rotational Raman lines of a top: all transitions that its polarizability allows, within the given limits.
 
     Parameters
     ----------
     top : Top
-        With `polarizability_abc_angstrom3`, as it is at the wavelength of the laser.
+        With `polarizability_abc_angstrom3` at the wavelength of the laser.
     temperature_k : float
-        Of the gas.
+        Temperature of the gas.
     laser_nm : float
         Wavelength in vacuum.
     jmax : int, optional
-        The highest J; by default the one beyond which no line can reach `min_relative`.
+        Highest J; by default the J beyond which no line reaches `min_relative`.
     min_relative : float, optional
-        Cross section, of that of the strongest line, below which lines are left out; None for none left out.
+        Cross section, relative to the strongest line, below which lines are left out; None keeps all lines.
     q : float, optional
         Partition function to use instead of the summed one, spin weights reduced by their common divisor.
     vibrations : VibrationalStates, optional
         States or fundamentals whose factor multiplies Q.
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        The Hamiltonian.
     executor : Executor, optional
-        J are spread over it.
+        Shares the work over J.
 
     Returns
     -------
@@ -190,12 +190,12 @@ def raman_lines(
     Raises
     ------
     ValueError
-        No polarizability; a temperature or wavelength not above 0; a cut not between 0 and 1; a J max below 0.
+        For an unknown polarizability, a temperature or wavelength not above 0, a cut not between 0 and 1, a J max below 0.
 
     Notes
     -----
-    Neglected: the dependence of the polarizability on J (0.2 % per J of H2, less of all others) and on the wavelength,
-    lines of vibrational states, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
+    Neglected: dependence of the polarizability on J (0.2 % per J for H2, less for all others) and on the wavelength,
+    lines in excited vibrational states, electron spin (lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))
@@ -221,12 +221,12 @@ def raman_lines(
 
 
 def _tensor_of(top: Top) -> Tensor:
-    """The polarizability; of a spherical top, whose is isotropic, no more has to be known."""
+    """The polarizability in Å³; zero for a spherical top without one, since its isotropic part has no rotational lines."""
     if top.polarizability_abc_angstrom3 is not None:
         return top.polarizability_abc_angstrom3
     if top.kind == "spherical":
-        none = (0.0, 0.0, 0.0)
-        return none, none, none
+        zero = (0.0, 0.0, 0.0)
+        return zero, zero, zero
     raise ValueError(f"the polarizability of {top.name or 'this top'} is not known; give one, in principal axes")
 
 
@@ -266,18 +266,18 @@ def _both_ways(
 
 
 def band_cross_section(lines: RamanLines) -> float:
-    """dσ/dΩ summed over all lines, Stokes and anti-Stokes, cm²/sr.
+    """dσ/dΩ summed over all lines, Stokes and anti-Stokes, in cm²/sr.
 
-    For many levels it tends to (3/4) (7/45) (2π ν)⁴ γ² for a linear molecule, the other quarter being Rayleigh's.
+    For many levels of a linear molecule it tends to (3/4) (7/45) (2π ν)⁴ γ²; the remaining quarter is Rayleigh scattering.
     """
     return float(lines.cross_section_cm2_per_sr.sum())
 
 
 def jmax_for_raman(top: Top, temperature_k: float, min_relative: float) -> int:
-    """The J beyond which every line of a rigid top is weaker than `min_relative` of the strongest.
+    """The J beyond which all lines of a rigid top are weaker than `min_relative` of the strongest.
 
     A line from J has S ≤ (2J+1) γ² and an energy above C J(J+1); the strongest has at least 0.05 (2J+1) γ² of the most
-    populated level of energy below A J(J+1). Raises ValueError where more than J = 600 would be needed.
+    populated level of energy below A J(J+1). Raises ValueError if more than J = 600 would be needed.
     """
     a, _, c = top.rotational_constants_mhz
     kt_mhz, heaviest = temperature_k * units.MHZ_PER_K, max(top.spin_weights.values)
@@ -289,11 +289,11 @@ def jmax_for_raman(top: Top, temperature_k: float, min_relative: float) -> int:
         if j > JMAX_DEFAULT_LIMIT:
             raise ValueError(
                 f"Raman lines above {min_relative:g} of the strongest at {temperature_k:g} K reach beyond J = "
-                f"{JMAX_DEFAULT_LIMIT}; give J max yourself, a lower temperature or a higher cut"
+                f"{JMAX_DEFAULT_LIMIT}; give J max, a lower temperature or a higher cut"
             )
     return j
 
 
 def anisotropy_angstrom3(top: Top) -> float:
-    """γ of a top's polarizability in Å³, |α∥ - α⊥| of an axial one, 0 of a spherical top; ValueError if it is not known."""
+    """γ of a top's polarizability in Å³: |α∥ - α⊥| for an axial tensor, 0 for a spherical top; ValueError if unknown."""
     return math.sqrt(anisotropy_squared(_tensor_of(top)))

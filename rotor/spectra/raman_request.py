@@ -1,4 +1,4 @@
-"""A request for rotational Raman lines, and what answers it."""
+"""Request for rotational Raman lines, and its answer."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 
 def section_left_out(answer: Any, reference: Any) -> float:
-    """The part of the cross section in percent that a list leaves out."""
-    part, whole = (float(each.lines.cross_section_cm2_per_sr.sum()) for each in (answer, reference))
+    """Percentage of the total cross section that a list lacks compared with a reference."""
+    part, whole = (float(raman.lines.cross_section_cm2_per_sr.sum()) for raman in (answer, reference))
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 
@@ -58,11 +58,11 @@ RELATIVE_CUT = Knob(
 
 @dataclass(frozen=True)
 class RamanRequest:
-    """Rotational Raman lines to compute; every field is checked when the request is made.
+    """Rotational Raman lines to compute; fields are checked when the request is made.
 
-    top: with its polarizability; a spherical one needs none. temperature_k: of the gas. laser_nm: wavelength in vacuum.
-    jmax: the highest J; None: what the cut needs. min_relative: cross section, of the strongest line, below which lines
-    are left out; None: every allowed line. q, vibrations: as in a `SpectrumRequest`. effects: of the Hamiltonian.
+    top: with its polarizability; a spherical top needs none. temperature_k: of the gas. laser_nm: wavelength in vacuum.
+    jmax: highest J; None: as the cut requires. min_relative: cross section, relative to the strongest line, below which lines
+    are left out; None: all lines. q, vibrations: as in a `SpectrumRequest`. effects: the Hamiltonian.
     """
 
     top: Top
@@ -77,10 +77,10 @@ class RamanRequest:
         common=True,
     )
     jmax: int | None = declared(
-        None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40
+        None, Whole(0), "Highest J; by default as the cut requires", "numerics.jmax", common=True, example=40
     )
     min_relative: float | None = declared(
-        DEFAULT_MIN_RELATIVE, Quantity(above=0, below=1), "Leave out lines below X of the strongest; or 'none'",
+        DEFAULT_MIN_RELATIVE, Quantity(above=0, below=1), "Weakest line, relative to the strongest; or 'none'",
         "observables.min_relative", none="none", knob=RELATIVE_CUT,
     )  # fmt: skip
     q: float | None = declared(
@@ -104,7 +104,7 @@ class RamanRequest:
 
 @dataclass(frozen=True, repr=False)
 class RamanAnswer(TextOf):
-    """The Raman lines that a request asked for."""
+    """The Raman lines of a request."""
 
     shown = "lines"
 
@@ -112,30 +112,30 @@ class RamanAnswer(TextOf):
     lines: RamanLines
 
     def strongest(self, count: int) -> Ints:
-        """Rows of the `count` lines of largest cross section, in order of shift."""
+        """Rows of the `count` lines with the largest cross sections, in order of shift."""
         return np.sort(largest(self.lines.cross_section_cm2_per_sr, count))
 
     @property
     def jmax_source(self) -> str:
-        """How the highest J was chosen."""
+        """Reason for the highest J."""
         if self.request.jmax is not None:
             return "given"
         return f"beyond it no line reaches {self.request.min_relative or DEFAULT_MIN_RELATIVE:g} of the strongest"
 
     @property
     def why_no_lines(self) -> str:
-        """Why the list is empty; nothing where it is not."""
+        """Reason for an empty list; empty text otherwise."""
         if len(self.lines):
             return ""
         if self.lines.top.kind == "spherical":
             return "the polarizability of a rigid spherical top is isotropic"
         if self.lines.jmax < 2:
-            return "J max leaves none"
+            return "there are none up to this J max"
         return "the polarizability is isotropic, or the levels that it connects do not exist"
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the shifts can be trusted."""
+        """Error budget of the shifts."""
         lines = self.lines
         top, effects = lines.top, lines.levels.effects
         parameters = parameter_names(top, lines.levels)
@@ -148,7 +148,7 @@ class RamanAnswer(TextOf):
         return frequencies_budget(lines.levels, limits, lines.cross_section_cm2_per_sr, errors, source, "shifts")
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table of lines, by the keys of docs/verbs."""
+        """All content except the table of lines, by the keys of docs/verbs."""
         lines = self.lines
         return {
             **top_facts(lines.top),
@@ -168,7 +168,7 @@ class RamanAnswer(TextOf):
 
 
 def answer_raman(request: RamanRequest, executor: Executor | None = None) -> RamanAnswer:
-    """The Raman lines of a request. executor: J are spread over it.
+    """The Raman lines of a request. executor: shares the work over J.
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))

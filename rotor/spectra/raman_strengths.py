@@ -1,19 +1,18 @@
-"""Raman strengths of all transitions between solved levels: pairs of states and S of the polarizability's anisotropy.
+"""Raman strengths of all transitions between solved levels, from the anisotropy of the polarizability.
 
 S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = (2J+1) γ²,     γ² = (3 Σ α_gh² - (Σ α_gg)²)/2,
 
-the elastic term f = i among them, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
-209 (1933). Sums over M', M and p leave the squares of the reduced elements in `quantum.tensors`.
+including the elastic term f = i, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
+209 (1933). The sums over M', M and p give squares of the reduced elements in `quantum.tensors`.
 
-The polarizability does not act on spins, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the
+The polarizability does not act on spins. Each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... therefore multiplies the
 element by
 
     ⟨F₁' (N' I)‖T²‖F₁ (N I)⟩ = (-1)^(N'+I+F₁+2) √((2F₁'+1)(2F₁+1)) {N' F₁' I; F₁ N 2} ⟨N'‖T²‖N⟩
 
-(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.7; `spins.coupling.tensor_coefficients`). Summed over all F of two
-rotational levels that is Π(2I+1) times the strength without spins, since Σ (2F'+1)(2F+1) {N' F' I; F N 2}² = 2I+1. What nuclear
-spins make of the elastic line, components within one rotational level, belongs to Rayleigh's line and is not listed; what electron
-spins part is.
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.7; `spins.coupling.tensor_coefficients`). The sum over all F of two
+rotational levels is Π(2I+1) times the strength without spins, since Σ (2F'+1)(2F+1) {N' F' I; F N 2}² = 2I+1. Components that nuclear
+spins form within one rotational level belong to the Rayleigh line and are not listed; components from electron spins are listed.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
 from rotor.tops.spins.spin_weights import SpinWeights
 
 NO_WEIGHTS = SpinWeights()
-ROUND_OFF = 1e-6  # of a tensor: what differs less from an axial or an isotropic one is the rounding of a frame
+ROUND_OFF = 1e-6  # relative deviation from an axial or isotropic tensor that counts as rounding
 
 
 @dataclass(frozen=True)
 class RamanTransitions:
-    """Columns (n,): S in Å⁶ over all components, rows of the two states in the levels, the lower in energy first.
+    """Columns (n,): S in Å⁶ over all components, and the rows of both states in the levels, the lower in energy first.
 
-    weight: spin weight of one component, its mean by strength where components of different weight make the line.
+    weight: spin weight of one component; the mean, weighted by strength, if components of different weight form the line.
     """
 
     strength_angstrom6: Floats
@@ -53,7 +52,7 @@ class RamanTransitions:
 
 
 def anisotropy_squared(polarizability: ArrayLike) -> float:
-    """γ² of a polarizability (3, 3), in the square of its unit: (α∥ - α⊥)² of an axial one.
+    """γ² of a polarizability (3, 3), in the square of its unit: (α∥ - α⊥)² for an axial tensor.
 
     >>> anisotropy_squared([[3.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])
     4.0
@@ -66,18 +65,20 @@ def anisotropy_squared(polarizability: ArrayLike) -> float:
 def raman_transitions(
     levels: Levels, polarizability_abc: ArrayLike, spin_weights: SpinWeights = NO_WEIGHTS
 ) -> RamanTransitions:
-    """Every pair of different levels that a polarizability (3, 3) along a, b, c in Å³ connects, in no particular order.
+    """All pairs of different levels that a polarizability (3, 3) along a, b, c in Å³ connects, unordered.
 
     Selection rules: ΔJ = 2 for a linear molecule; ΔJ = 1, 2 and ΔK = 0 for a symmetric top with an axial tensor; ΔJ = 0,
-    1, 2 for an asymmetric top, between species of (Ka, Kc) parity that the tensor's elements connect (the same species
-    for the diagonal ones); none for a spherical top. Levels must start at J = 0. spin_weights: those of the levels. With spins
-    rules are those of N, and of every sum with a spin likewise.
-    Raises ValueError for a spherical top with an anisotropic tensor, and for a tensor without an axis beside spin weights by K.
+    1, 2 for an asymmetric top, between species of (Ka, Kc) parity that elements of the tensor connect (equal species for
+    diagonal elements); none for a spherical top. Levels must start at J = 0. spin_weights: of the levels. With spins,
+    the rules hold for N and likewise for each coupled angular momentum.
+    Raises ValueError for a spherical top with an anisotropic tensor, and for a non-axial tensor with spin weights by K.
     """
     tensor = np.asarray(polarizability_abc, dtype=float)
     if levels.kind == "spherical":
         if anisotropy_squared(tensor) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
-            raise ValueError("a spherical top's polarizability is isotropic, and this one is not; check the tensor")
+            raise ValueError(
+                "a spherical top has an isotropic polarizability, but this tensor is anisotropic; check it"
+            )
         return _joined([])
     if levels.representation is not None:
         if levels.blocks and _is_axial(levels.blocks[0]):
@@ -89,7 +90,7 @@ def raman_transitions(
 
 
 def _is_axial(block: Any) -> bool:
-    """Whether states with spins are made of functions of one sign of K, each of which stands for both."""
+    """Whether states with spins consist of functions with one sign of K, each of which stands for both signs."""
     from rotor.quantum.spins.blocks import SpinBlock
     from rotor.quantum.spins.operators import AxialState
 
@@ -97,12 +98,12 @@ def _is_axial(block: Any) -> bool:
 
 
 def _refuse_without_axis(levels: Levels, tensor: Floats) -> None:
-    """ValueError where a tensor connects different K, whose elements of both signs would add up."""
+    """Raise ValueError if a tensor connects different K, where elements of both signs of K would add up."""
     z = "abc".index(axes_of(str(levels.representation))[2])
     along = 1.5 * (tensor[z, z] - np.trace(tensor) / 3)
     if abs(anisotropy_squared(tensor) - along**2) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
         raise ValueError(
-            f"a {levels.kind} top with spins: expected a polarizability with its axis, along {'abc'[z]}; check the tensor"
+            f"a {levels.kind} top with spins: expected a polarizability with the axis of the top, {'abc'[z]}; check the tensor"
         )
 
 
@@ -118,7 +119,7 @@ def _joined(pieces: list[RamanTransitions]) -> RamanTransitions:
 
 
 def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight: Floats) -> RamanTransitions:
-    """Transitions between levels that exist, with a strength, the one lower in energy first."""
+    """Transitions of nonzero strength between existing levels, the lower in energy first."""
     exists = (strength > 0) & (weight > 0)
     strength, first, second = strength[exists], first[exists], second[exists]
     falls = levels.energy_mhz[second] < levels.energy_mhz[first]
@@ -126,9 +127,9 @@ def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight
 
 
 def _joint_weights(levels: Levels, first: Ints, second: Ints) -> Floats:
-    """Weight of one component where both states have the same; 0 where one of them does not exist."""
-    each = levels.weight_per_component
-    return np.asarray(np.where(each[second] > 0, each[first], 0.0))
+    """Spin weight of one component, where both states have the same weight; 0 if one of them does not exist."""
+    weight = levels.weight_per_component
+    return np.asarray(np.where(weight[second] > 0, weight[first], 0.0))
 
 
 # Linear and symmetric tops
@@ -145,7 +146,7 @@ def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
 
 
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
-    """ΔK = 0 where the tensor has the axis of the top; else, for a top symmetric by numbers alone, as in Wang's basis."""
+    """Transitions with ΔK = 0 if the tensor has the axis of the top; otherwise (numerically symmetric tops) in Wang's basis."""
     representation = AXIAL_REPRESENTATION[levels.kind]
     x, y, z = ("abc".index(axis) for axis in axes_of(representation))
     along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
@@ -162,7 +163,7 @@ def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> Ram
 
 
 def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
-    """K → K, J → J + ΔJ, both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
+    """K → K, J → J + ΔJ, for both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
     all_j, all_k = levels.quanta["j"], levels.quanta["k"]
     lower = all_j + delta_j <= levels.jmax
     j, k = all_j[lower], all_k[lower]
@@ -171,16 +172,18 @@ def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTrans
     factor = np.empty(len(j))
     for value in np.unique(j).tolist():
         factor[j == value] = coupling(value, value + delta_j, 2, 0, k[j == value])
-    state = {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}  # no polarizability connects two states
+    state = (
+        {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}
+    )  # the polarizability connects no two vibrational states
     first, second = np.flatnonzero(lower), levels.rows_of(j=j + delta_j, k=k, **state)
     strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
     return _ordered(levels, strength, first, second, _joint_weights(levels, first, second))
 
 
 def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, representation: str) -> RamanTransitions:
-    """Between Wang functions, which the states are whose K pairs have one weight each; one line for a pair of rows.
+    """Transitions between Wang functions; they are eigenstates if both members of a K pair have one weight. One line for a pair of rows.
 
-    Both functions of a K = 1 pair have different strengths: α_20 and α_2±2 add up in one and not in the other.
+    The two functions of a K = 1 pair have different strengths: α_20 and α_2±2 add in one of them and not in the other.
     """
     anisotropic = body_tensor(tensor, 2, representation)
     blocks = [
@@ -191,17 +194,17 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, rep
     pieces = []
     for up, low in connected_wang_blocks(blocks, anisotropic):
         strength = 1.5 * wang_amplitudes(up, low, anisotropic) ** 2
-        i, k = np.nonzero(_once(up, low))
+        i, k = np.nonzero(_distinct_pairs(up, low))
         first = levels.rows_of(j=np.full(len(k), low.basis.j), k=low.basis.k[k])
         second = levels.rows_of(j=np.full(len(i), up.basis.j), k=up.basis.k[i])
-        other = first != second
-        weight = np.full(int(other.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
-        pieces.append(_ordered(levels, strength[i, k][other], first[other], second[other], weight))
+        inelastic = first != second
+        weight = np.full(int(inelastic.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
+        pieces.append(_ordered(levels, strength[i, k][inelastic], first[inelastic], second[inelastic], weight))
     return _summed(levels, _joined(pieces))
 
 
 def _summed(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:
-    """One line for every pair of rows, its weight the mean by strength."""
+    """Merge transitions of the same pair of rows; the weight is the mean weighted by strength."""
     keys, place = np.unique(transitions.lower * len(levels) + transitions.upper, return_inverse=True)
     strength, weighted = np.zeros(len(keys)), np.zeros(len(keys))
     np.add.at(strength, place, transitions.strength_angstrom6)
@@ -213,7 +216,7 @@ def _summed(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:
 
 
 def _block_transitions(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
-    """Between solved blocks; several states have the polarizability of the first, and none connects two of them."""
+    """Transitions between solved blocks; all vibrational states have the same polarizability, which connects no two of them."""
     anisotropic = body_tensor(tensor, 2, str(levels.representation))
     tensors = {(v, v): anisotropic for v in np.unique(levels.quanta.get("v", np.zeros(1, dtype=np.int64))).tolist()}
     existing = [
@@ -226,29 +229,29 @@ def _block_transitions(levels: Levels, tensor: Floats) -> Iterator[RamanTransiti
 
 
 def _inelastic(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:
-    """The lines without those between components that nuclear spins make of one level."""
+    """The lines without transitions between hyperfine components of one level."""
     if "f" not in levels.quanta:
         return transitions
     spins = [name for name in levels.quanta if name in ("i_sym", "i_tot") or name.startswith("f")]
     numbers = np.column_stack([levels.quanta[name] for name in levels.quanta if name not in spins])
     _, level = np.unique(numbers, axis=0, return_inverse=True)
-    other = level[transitions.lower] != level[transitions.upper]
+    inelastic = level[transitions.lower] != level[transitions.upper]
     return RamanTransitions(
-        transitions.strength_angstrom6[other],
-        transitions.lower[other],
-        transitions.upper[other],
-        transitions.weight[other],
+        transitions.strength_angstrom6[inelastic],
+        transitions.lower[inelastic],
+        transitions.upper[inelastic],
+        transitions.weight[inelastic],
     )
 
 
-def _once(up: Block, low: Block) -> NDArray[np.bool_]:
-    """Which pairs of states of two blocks are counted: all, or of a block with itself one triangle."""
+def _distinct_pairs(up: Block, low: Block) -> NDArray[np.bool_]:
+    """Mask of distinct pairs of states of two blocks: all, or the strict lower triangle for a block with itself."""
     all_pairs = np.ones((len(up.energies_mhz), len(low.energies_mhz)), dtype=bool)
     return np.tril(all_pairs, -1) if up is low else all_pairs
 
 
 def _between(levels: Levels, up: Block, low: Block, strength: Floats) -> RamanTransitions:
-    """All transitions between two blocks; none of a state with itself."""
-    i, k = np.nonzero(_once(up, low))
+    """All transitions between the states of two blocks, except of a state with itself."""
+    i, k = np.nonzero(_distinct_pairs(up, low))
     first, second = k + low.start, i + up.start
     return _ordered(levels, strength[i, k], first, second, _joint_weights(levels, first, second))

@@ -1,6 +1,6 @@
-"""A request for a rotational spectrum, and what answers it: lines, their shape on a grid, the depth of a layer of gas.
+"""Request for a rotational spectrum, and its answer: lines, their shape on a grid, the optical depth of a layer of gas.
 
-The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` is the one function behind all of them.
+The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` computes all of them.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
-Q_TOO_SMALL, Q_TOO_LARGE = 0.9, 10.0  # of the sum: a given Q beyond has a note
+Q_TOO_SMALL, Q_TOO_LARGE = 0.9, 10.0  # ratio of a given Q to the sum, beyond which there is a note
 NO_DIPOLE = "none: a rigid spherical top has no rotational lines"
 
 
 @dataclass(frozen=True)
 class GasLayer:
-    """A layer of gas: partial pressure of the molecules meant in bar, length in cm."""
+    """A layer of gas: partial pressure of the absorbing molecules in bar, length in cm."""
 
     pressure_bar: float = declared(
         None, Quantity("bar", above=0, metavar="P"), "Pressure of these molecules (bar), for optical depths; with the path",
@@ -68,14 +68,14 @@ class GasLayer:
         check_fields(self)
 
 
-COARSER_CUTS = (5.0, 4.0, 3.0, 2.0, 1.0, 0.0)  # decades above the cut of the scene
-COARSE_CUTS = (-4.0, -6.0, -8.0, -10.0, -12.0)  # of log10 of the intensity, where a scene has no cut
-FINER_CUT = 2.0  # decades below it: a hundred times finer
+COARSER_CUTS = (5.0, 4.0, 3.0, 2.0, 1.0, 0.0)  # settings of a sweep: decades above the cut of the scene
+COARSE_CUTS = (-4.0, -6.0, -8.0, -10.0, -12.0)  # settings without a cut in the scene: log10 of the intensity
+FINER_CUT = 2.0  # decades between the scene's cut and the reference
 
 
 def intensity_left_out(answer: Any, reference: Any) -> float:
-    """The part of the intensity in percent that a list leaves out."""
-    part, whole = (float(each.lines.intensity_nm2_mhz.sum()) for each in (answer, reference))
+    """Percentage of the total intensity that a list lacks compared with a reference."""
+    part, whole = (float(spectrum.lines.intensity_nm2_mhz.sum()) for spectrum in (answer, reference))
     return 100.0 * max(1.0 - part / whole, 0.0) if whole else 0.0
 
 
@@ -89,14 +89,14 @@ CUT = Knob(
 
 @dataclass(frozen=True)
 class SpectrumRequest:
-    """A spectrum to compute; every field is checked when the request is made.
+    """A spectrum to compute; fields are checked when the request is made.
 
-    top: with its dipole; a spherical one needs none. temperature_k: of the intensities. jmax: the highest J; None: what the
-    cut needs. min_lgint: log10 of nm² MHz below which lines are left out; None: every allowed line. range_mhz: first and last
-    frequency. q: partition function instead of the summed one. vibrational_factor: multiplies Q; vibrations: states whose
-    factor does so instead. covariance: of the constants, for the errors of frequencies. profile: sticks, gaussian, lorentzian
-    or voigt; None: gaussian where there is a width or a layer, else sticks. fwhm_mhz: full width at half maximum; None:
-    Doppler's. layer: of gas, for optical depths. untrusted: as in `line_list`. effects: what the Hamiltonian consists of.
+    top: with its dipole; a spherical top needs none. temperature_k: for intensities. jmax: highest J; None: as the cut requires.
+    min_lgint: log10 of nm² MHz below which lines are left out; None: all lines. range_mhz: first and last frequency.
+    q: partition function instead of the summed one. vibrational_factor: multiplies Q; vibrations: states that give this factor instead.
+    covariance: of the constants, for errors of frequencies. profile: sticks, gaussian, lorentzian or voigt; None: gaussian with a width
+    or a layer, else sticks. fwhm_mhz: full width at half maximum; None: the Doppler width. layer: of gas, for optical depths.
+    untrusted: as in `line_list`. effects: the Hamiltonian.
     """
 
     top: Top
@@ -104,10 +104,10 @@ class SpectrumRequest:
         300.0, Quantity("K", above=0, metavar="T"), "Temperature (K)", "conditions.temperature", common=True
     )
     jmax: int | None = declared(
-        None, Whole(0), "Highest J; by default what the cut needs", "numerics.jmax", common=True, example=40
+        None, Whole(0), "Highest J; by default as the cut requires", "numerics.jmax", common=True, example=40
     )
     min_lgint: float | None = declared(
-        DEFAULT_MIN_LGINT, Quantity(least=-300, most=300), "Leave out lines with log10(nm² MHz) below; or 'none'",
+        DEFAULT_MIN_LGINT, Quantity(least=-300, most=300), "Least log10 of the intensity in nm² MHz; or 'none'",
         "observables.min_lgint", none="none", common=True, knob=CUT,
     )  # fmt: skip
     range_mhz: tuple[float, float] = declared(
@@ -125,7 +125,9 @@ class SpectrumRequest:
         "observables.q",
         example=1000.0,
     )
-    vibrational_factor: float = declared(1.0, Quantity(above=0), "Multiplies Q", "observables.vibrational_factor")
+    vibrational_factor: float = declared(
+        1.0, Quantity(above=0), "Factor of Q for vibrations", "observables.vibrational_factor"
+    )
     vibrations: VibrationalStates | None = vibrations_field()
     covariance: Covariance | None = None
     profile: str | None = declared(
@@ -137,12 +139,12 @@ class SpectrumRequest:
         example="gaussian",
     )
     fwhm_mhz: float | None = declared(
-        None, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum (MHz); by default Doppler's", "observables.fwhm",
+        None, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum (MHz); by default the Doppler width", "observables.fwhm",
         common=True, example="1 MHz",
     )  # fmt: skip
     layer: GasLayer | None = part(GasLayer, identical, identical, whole=True, why="an optical depth needs both")
     untrusted: bool = declared(
-        False, Flag(), "List lines of levels beyond the reach of the constants too", "observables.untrusted"
+        False, Flag(), "Also list lines of levels beyond the reach of the constants", "observables.untrusted"
     )
     effects: tuple[QuantumEffect, ...] = effects_field()
 
@@ -165,18 +167,18 @@ class SpectrumRequest:
         if self.shape == "sticks" and self.fwhm_mhz is not None:
             raise ValueError("fwhm_mhz: sticks have no width; leave it out or choose another profile")
         if self.shape == "sticks" and self.layer is not None:
-            raise ValueError("profile: an optical depth needs a width, and sticks have none; choose another one")
+            raise ValueError("profile: an optical depth needs a width, and sticks have none; choose another profile")
         if self.shape in ("lorentzian", "voigt") and self.fwhm_mhz is None:
             raise ValueError(f"profile {self.shape}: expected the full width of the Lorentzian, fwhm_mhz")
         doppler = self.shape == "voigt" or (self.shape == "gaussian" and self.fwhm_mhz is None)
         if doppler and self.top.mass_u is None:
             raise ValueError(
-                "a Doppler width needs a mass, which constants alone do not have; give fwhm_mhz, and not the profile voigt"
+                "a Doppler width needs a mass, which constants alone do not have; give fwhm_mhz, with another profile than voigt"
             )
 
     @property
     def shape(self) -> str:
-        """The profile: as given, else gaussian where there is a width or a layer of gas, else sticks."""
+        """The profile: as given, else gaussian with a width or a layer, else sticks."""
         if self.profile is not None:
             return self.profile
         return "sticks" if self.fwhm_mhz is None and self.layer is None else "gaussian"
@@ -184,7 +186,7 @@ class SpectrumRequest:
 
 @dataclass(frozen=True, repr=False)
 class SpectrumAnswer(TextOf):
-    """The lines that a request asked for, and what follows from them."""
+    """The lines of a request, and quantities derived from them."""
 
     shown = "lines"
 
@@ -193,7 +195,7 @@ class SpectrumAnswer(TextOf):
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """The limits of the lines, and a partition function that was given and is far from the sum over levels."""
+        """Limits of the lines, and a given partition function that is far from the sum over levels."""
         stated, lines = self.request.q, self.lines
         if stated is None or not lines.levels.of_named_constants:
             return tuple(lines.warnings)
@@ -201,19 +203,19 @@ class SpectrumAnswer(TextOf):
             expected = _expected_q(lines)
         except ValueError:  # the sum does not converge
             expected = None
-        if expected is None:  # the value that was given stands alone
+        if expected is None:  # nothing to compare with
             return tuple(lines.warnings)
-        summed, of_states = expected
+        summed, estimated = expected
         if Q_TOO_SMALL * summed <= stated <= Q_TOO_LARGE * summed:
             return tuple(lines.warnings)
         factor = f"intensities differ by a factor of {summed / stated:.3g}"
-        sum_text = f"about {summed:.2g}" if of_states else f"{summed:.4g}"
+        sum_text = f"about {summed:.2g}" if estimated else f"{summed:.4g}"
         text = f"Q = {stated:g} is given where the sum over the levels is {sum_text}: {factor}"
         return (*lines.warnings, f"{text}; vibration makes Q larger, other spin weights change it by a whole number")
 
     @property
     def column_per_cm2(self) -> float | None:
-        """Molecules in the line of sight, 1/cm²; None without a layer."""
+        """Column density in 1/cm²; None without a layer."""
         layer = self.request.layer
         if layer is None:
             return None
@@ -223,7 +225,7 @@ class SpectrumAnswer(TextOf):
 
     @cached_property
     def optical_depth(self) -> Floats | None:
-        """Optical depth (lines,) at the centre of every line, as if it were alone; None without a layer."""
+        """Optical depth (lines,) at the centre of each line alone; None without a layer."""
         layer = self.request.layer
         if layer is None:
             return None
@@ -234,7 +236,7 @@ class SpectrumAnswer(TextOf):
 
     @cached_property
     def spectrum(self) -> Spectrum:
-        """The lines with their shape on a grid that resolves each: a cross section, or the optical depth of the layer."""
+        """Cross section, or optical depth of the layer, on a grid that resolves each line."""
         if self.request.shape == "sticks":
             raise ValueError("profile: sticks have no profile; choose gaussian, lorentzian or voigt")
         from rotor.spectra.opacity import optical_depth
@@ -244,12 +246,12 @@ class SpectrumAnswer(TextOf):
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
         lines = self._lines_of_profile(shape)
         grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
-        made = replace(Spectrum.from_lines(lines, grid, **shape), lines=self.lines)
+        spectrum = replace(Spectrum.from_lines(lines, grid, **shape), lines=self.lines)
         layer = self.request.layer
-        return made if layer is None else optical_depth(made, layer.pressure_bar, layer.path_cm)
+        return spectrum if layer is None else optical_depth(spectrum, layer.pressure_bar, layer.path_cm)
 
     def _lines_of_profile(self, shape: Mapping[str, Any]) -> Lines:
-        """The lines of the list, and those centred beyond the edges of a finite range whose wings reach into it."""
+        """The lines of the list, and lines outside a finite range whose wings reach into it."""
         from rotor.spectra.spectrum import reach_at
 
         first, last = self.request.range_mhz
@@ -265,7 +267,7 @@ class SpectrumAnswer(TextOf):
 
     @property
     def jmax_source(self) -> str:
-        """How the highest J was chosen."""
+        """Reason for the highest J."""
         if self.request.jmax is not None:
             return "given"
         if self.request.min_lgint is None:
@@ -274,30 +276,30 @@ class SpectrumAnswer(TextOf):
 
     @property
     def typical_j(self) -> int:
-        """The J at which effects are compared: the most populated one, as far as the list goes."""
+        """The J at which effects are compared: the most populated J within the list."""
         return min(populated_j(self.lines.top, self.lines.temperature_k), max(self.lines.jmax, 1))
 
     @property
     def why_no_lines(self) -> str:
-        """Why the list is empty; nothing where it is not."""
+        """Reason for an empty list; empty text otherwise."""
         if len(self.lines):
             return ""
         if self.lines.top.kind == "spherical":
             return "a rigid spherical top has none (the calculation has neither a field nor the dipole that distortion makes)"
         if not any(self.lines.top.dipole_abc_debye or ()):
             return "without a permanent dipole there is no rotational absorption"
-        return "none of the allowed ones is inside the range and above the cut; widen the range or lower the cut"
+        return "no allowed line is inside the range and above the cut; widen the range or lower the cut"
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the frequencies can be trusted."""
+        """Error budget of the frequencies."""
         lines = self.lines
         named = lines.levels.of_named_constants
         limits = every_limit(lines.top, self.typical_j, lines.levels.effects) if named else ()
         return frequencies_budget(lines.levels, limits, lines.intensity_nm2_mhz, lines.error_mhz, lines.errors_from)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table of lines, by the keys of docs/verbs."""
+        """All content except the table of lines, by the keys of docs/verbs."""
         lines, layer = self.lines, self.request.layer
         facts = {
             **top_facts(lines.top),
@@ -326,27 +328,27 @@ class SpectrumAnswer(TextOf):
 
 
 def _expected_q(lines: Lines) -> tuple[float, bool] | None:
-    """Q summed over the levels, and whether it is estimated; None with two equivalent nuclei, where neither is a matter of seconds.
+    """Q summed over the levels, and whether it is estimated; None with two equivalent nuclei, where both would take long.
 
     Q = Q_0 n Σ_v e^(-E_v/kT) w_v/w_0 with the levels of state 0 without spins, E_v the energy of a state, w_v its mean spin weight,
-    and n the number of functions of the spins; of three equivalent nuclei a third of it, as one in three exists with a function of the
-    rotation. What the own constants of a state, couplings and spins change is far below the tenth that a note is about.
+    and n the number of spin functions; with three equivalent nuclei a third of n, since one in three exists with a function of the
+    rotation. Constants of the other states, couplings and splittings change Q far less than the tenth that gives a note.
     """
     from rotor.thermodynamics import partition_function
 
     top, effects, kelvin = lines.top, lines.levels.effects, lines.temperature_k
-    of_states = [effect for effect in effects if effect.states(top)]
-    others = tuple(effect for effect in effects if effect not in of_states and not effect.spins(top))
+    state_effects = [effect for effect in effects if effect.states(top)]
+    others = tuple(effect for effect in effects if effect not in state_effects and not effect.spins(top))
     if len(others) == len(effects):
         return partition_function(top, kelvin, effects=effects).q, False
     from rotor.quantum.spins.scheme import scheme_of
 
     scheme = scheme_of(top, effects)
-    if scheme.equivalent == 2:  # which of their functions exist follows from the weights of the rotation
+    if scheme.equivalent == 2:  # the weights of the rotation decide which functions exist
         return None
     bare = replace(top, states=None, spin_constants=None, level_table=None, symmetry_checked=False)
     first, sums = partition_function(bare, kelvin, effects=others).q, 1.0
-    for effect in of_states:
+    for effect in state_effects:
         values = effect.parameters(top)
         for state in effect.states(top):
             energy = state.operators(values).get((0, 0, 0), 0.0)
@@ -357,9 +359,9 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
 
 
 def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) -> SpectrumAnswer:
-    """The lines of a request. executor: J are spread over it.
+    """The lines of a request. executor: shares the work over J.
 
-    Raises ValueError where no answer is reached, such as a partition function that does not converge.
+    Raises ValueError if no answer is reached, as for a partition function that does not converge.
 
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0))
@@ -368,7 +370,7 @@ def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) 
     ([115271.936, 230543.872], 'given')
     """
     top = request.top
-    if top.dipole_abc_debye is None:  # a spherical top, see the check of the request
+    if top.dipole_abc_debye is None:  # a spherical top: the request refuses others without a dipole
         top = top.with_dipole((0.0, 0.0, 0.0), NO_DIPOLE)
     lines = line_list(
         top,

@@ -1,4 +1,4 @@
-"""A spectrum: lines given a shape on a grid of frequencies.
+"""Spectra: lines with a shape, on a frequency grid.
 
     σ(ν) = Σ_i I_i s_i(ν - ν_i),     ∫ s_i dν = 1
 
@@ -19,25 +19,26 @@ from rotor.spectra.lines import Lines
 from rotor.spectra.profiles import doppler_fwhm, gaussian, gaussian_reach, lorentzian, lorentzian_reach, voigt
 from rotor.table import Table
 
-# Fraction of the area of a line that may lie outside of the points it is computed at: 3 widths of a Gaussian, but
-# 3183 of a Lorentzian, whose wings fall as 1/x².
+# Fraction of the area of a line that may lie outside its computed points: 3 widths for a Gaussian, but
+# 3183 for a Lorentzian, whose wings fall as 1/x².
 OUTSIDE = {"gaussian": 1e-12, "lorentzian": 1e-4, "voigt": 1e-4}
-PIECE = 1_000_000  # points of lines that are worked on at a time, for bounded memory
+PIECE = 1_000_000  # points computed at a time, to bound memory
 MOST_POINTS = 20_000_000  # of a grid that resolves every line
 
-_STEP = 0.1  # a resolving grid goes in steps of a fortieth of the width at a centre, of a tenth of the distance far out
-_BACKGROUND = 2001  # and has so many even points
+_STEP = (
+    0.1  # a resolving grid has steps of a fortieth of the width at a centre, and of a tenth of the distance far from it
+)
+_BACKGROUND = 2001  # evenly spaced points in addition
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spectrum(Table):
     """Intensity on a grid of frequencies.
 
-    frequency_mhz, intensity: (n,) arrays. unit: of the intensity, "nm^2" for a cross section,
-    "optical depth" for that of a layer of gas (`opacity`). temperature_k: of the gas.
-    profile, fwhm_mhz: shape of the lines and its width, None for Doppler's. outside: the fraction of the area of each
-    line that may have been left out far from its centre. lines: what it was made from, None for a spectrum that is not
-    made of lines.
+    frequency_mhz, intensity: (n,) arrays. unit: of the intensity: "nm^2" for a cross section,
+    "optical depth" for a layer of gas (`opacity`). temperature_k: of the gas.
+    profile, fwhm_mhz: line shape and width, None for the Doppler width. outside: fraction of the area of each
+    line that may be missing far from its centre. lines: source of the spectrum; None for a spectrum not computed from lines.
     """
 
     frequency_mhz: Floats
@@ -59,7 +60,7 @@ class Spectrum(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the spectrum was made from: its lines, their shape, the unit."""
+        """Origin of the spectrum: its lines, their shape, the unit."""
         return (self.lines.provenance if self.lines is not None else {}) | {
             "profile": self.profile,
             "fwhm_mhz": self.fwhm_mhz,
@@ -78,21 +79,21 @@ class Spectrum(Table):
         profile: str = "gaussian",
         outside: float | None = None,
     ) -> Spectrum:
-        """The absorption cross section in nm² of lines on a grid, each with the area of its integrated absorption.
+        """Absorption cross section in nm² of lines on a grid; each line has the area of its integrated absorption.
 
         Parameters
         ----------
         lines : Lines
-            At their temperature; `lines.top.mass_u` is needed for a Doppler width.
+            With `lines.top.mass_u` for a Doppler width.
         grid_mhz : (n,) array
             Rising frequencies, evenly spaced or not; `resolving_grid` makes one.
         fwhm_mhz : float, optional
-            Full width at half maximum: of the Gaussian (Doppler's if left out) or of the Lorentzian.
+            Full width at half maximum of the Gaussian (by default the Doppler width) or of the Lorentzian.
         profile : "gaussian", "lorentzian" or "voigt"
-            A Voigt profile has Doppler's Gaussian and a Lorentzian of `fwhm_mhz`.
+            A Voigt profile combines the Doppler width with a Lorentzian of `fwhm_mhz`.
         outside : float, optional
-            Each line is computed out to where so much of its area is left, 1e-12 for a Gaussian and 1e-4 for the others
-            unless given. The relative error of an area is below it; that of the intensity at a point is below the sum
+            Each line is computed out to where this fraction of its area remains; by default 1e-12 for a Gaussian and 1e-4 for the
+            others. It bounds the relative error of an area. The error of the intensity at a point is below the sum
             of I_i s_i(reach) over the lines i further away than their reach: at most 2.5e-8 of their peaks.
 
         Returns
@@ -103,7 +104,7 @@ class Spectrum(Table):
         Raises
         ------
         ValueError
-            A grid that does not rise, a width not above 0, a shape that is not known, a Doppler width without a mass.
+            For a grid that does not rise, a width not above 0, an unknown shape, a Doppler width without a mass.
 
         Notes
         -----
@@ -124,7 +125,7 @@ class Spectrum(Table):
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """The two columns by their names with unit."""
+        """Frequency and intensity by their names with unit."""
         name = {"nm^2": "cross_section_nm2", "optical depth": "optical_depth"}.get(self.unit, "intensity")
         return {"frequency_mhz": self.frequency_mhz, name: self.intensity}
 
@@ -137,22 +138,22 @@ def resolving_grid(
     range_mhz: tuple[float, float] | None = None,
     outside: float | None = None,
 ) -> Floats:
-    """Frequencies that follow every line: close at its centre, wider away from it, and even in between.
+    """Frequencies that resolve each line: dense at its centre, sparser away from it, with evenly spaced points in between.
 
-    Straight lines between its points enclose the area of a line within 0.2 %.
+    The trapezoidal rule on these points gives the area of a line within 0.2 %.
 
     Parameters
     ----------
     lines : Lines
-        Their frequencies and, for a Doppler width, the mass of their top.
+        With the mass of their top for a Doppler width.
     fwhm_mhz : float, optional
         Full width at half maximum, as in `Spectrum.from_lines`.
     profile : "gaussian", "lorentzian" or "voigt", optional
-        Shape.
+        Line shape.
     range_mhz : (float, float), optional
-        First and last frequency; by default all lines with their reach.
+        First and last frequency; by default the range of all lines with their reach.
     outside : float, optional
-        Share of a line's area beyond its reach, as in `Spectrum.from_lines`.
+        Fraction of a line's area beyond its reach, as in `Spectrum.from_lines`.
 
     Returns
     -------
@@ -162,7 +163,7 @@ def resolving_grid(
     Raises
     ------
     ValueError
-        For a range that does not rise, and for a grid of more than 20 million points: a narrower range has fewer lines.
+        For a range that does not rise, and for a grid of more than 20 million points.
     """
     shape = _shape(lines, profile, fwhm_mhz)
     width, reach = shape.fwhm(), shape.reach(_fraction(profile, outside))
@@ -185,12 +186,12 @@ def resolving_grid(
 def reach_at(
     frequency_mhz: Sequence[float], lines: Lines, *, profile: str, fwhm_mhz: float | None
 ) -> tuple[float, ...]:
-    """How far the profile of a line at each frequency reaches, MHz; lines: whose temperature and mass give Doppler's width.
+    """Reach in MHz of the profile of a line at each frequency; `lines` gives temperature and mass for the Doppler width.
 
     >>> from rotor.spectra.lines import line_list
     >>> from rotor.tops.top import Top
     >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=1)
-    >>> [round(one, 1) for one in reach_at([1e5], lines, profile="gaussian", fwhm_mhz=10.0)]
+    >>> [round(reach, 1) for reach in reach_at([1e5], lines, profile="gaussian", fwhm_mhz=10.0)]
     [30.3]
     """
     probes = replace(lines, frequency_mhz=np.asarray(frequency_mhz, dtype=np.float64))
@@ -198,29 +199,29 @@ def reach_at(
 
 
 def _arm(reach: float) -> Floats:
-    """Distances from a centre in widths: ever wider steps out to the reach, and one just behind it."""
+    """Distances from a centre in widths: increasing steps out to the reach, and a point just beyond it."""
     half = 0.25 * np.sinh(np.arange(_STEP, np.arcsinh(4 * reach), _STEP))
     half = np.append(half, [reach * (1 - 1e-9), reach * (1 + 1e-9)])
     return np.concatenate([-half[::-1], [0.0], half])
 
 
 def _ends(lines: Lines, reach: Floats) -> tuple[float, float]:
-    """The first and last frequency where a line has anything to show."""
+    """First and last frequency at which a line contributes."""
     if not len(lines):
-        raise ValueError("there are no lines to make a grid for; give a range")
+        raise ValueError("a grid without lines needs a range")
     first, last = (lines.frequency_mhz - reach).min(), (lines.frequency_mhz + reach).max()
     return max(float(first), 0.0), float(last)
 
 
 @dataclass(frozen=True)
 class _Shape:
-    """The widths of a Gaussian and a Lorentzian part for every line, (lines,) arrays; None for a missing part."""
+    """Widths (lines,) of the Gaussian and the Lorentzian part of each line; None for a missing part."""
 
     gaussian: Floats | None
     lorentzian: Floats | None
 
     def at(self, offset: Floats, rows: NDArray[np.int64]) -> Floats:
-        """The shape of the lines `rows` at a distance from their centres."""
+        """The shape of the lines `rows` at these distances from their centres."""
         if self.lorentzian is None:
             assert self.gaussian is not None
             return gaussian(offset, self.gaussian[rows])
@@ -229,7 +230,7 @@ class _Shape:
         return voigt(offset, self.gaussian[rows], self.lorentzian[rows])
 
     def reach(self, outside: float) -> Floats:
-        """How far from its centre each line has all but `outside` of its area.
+        """Distance from the centre of each line within which all but `outside` of its area lies.
 
         A Voigt profile is the density of a sum x + y: |x + y| > a + b needs |x| > a or |y| > b, half of `outside` each.
         """
@@ -238,7 +239,7 @@ class _Shape:
         return np.asarray(reach + (0.0 if self.lorentzian is None else lorentzian_reach(self.lorentzian, share)))
 
     def fwhm(self) -> Floats:
-        """The whole width of every line; of a Voigt profile to 0.02 %.
+        """Full width of each line; for a Voigt profile accurate to 0.02 %.
 
         0.5346 w_L + √(0.2166 w_L² + w_G²): J. J. Olivero and R. L. Longbothum, J. Quant. Spectrosc. Radiat. Transf. 17,
         233 (1977).
@@ -252,12 +253,12 @@ class _Shape:
 
 
 def line_widths(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
-    """Full width at half maximum in MHz of every line, (lines,), of a profile as `Spectrum.from_lines` takes it."""
+    """Full width at half maximum (lines,) in MHz for a profile as in `Spectrum.from_lines`."""
     return _shape(lines, profile, fwhm_mhz).fwhm()
 
 
 def line_peaks(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
-    """Value of the shape of unit area at the centre of every line, (lines,), in 1/MHz."""
+    """Value (lines,) in 1/MHz of the shape of unit area at the centre of each line."""
     return _shape(lines, profile, fwhm_mhz).at(np.zeros(len(lines)), np.arange(len(lines)))
 
 
@@ -295,7 +296,7 @@ def _rising(grid_mhz: ArrayLike) -> Floats:
 
 
 def _summed(grid: Floats, centres: Floats, areas: Floats, shape: _Shape, outside: float) -> Floats:
-    """Σ area × shape on the grid, every line over the points within its reach."""
+    """Sum of area × shape on the grid, each line over the points within its reach."""
     reach = shape.reach(outside)
     first = np.searchsorted(grid, centres - reach, side="left")
     count = np.searchsorted(grid, centres + reach, side="right") - first
@@ -311,7 +312,7 @@ def _summed(grid: Floats, centres: Floats, areas: Floats, shape: _Shape, outside
 
 
 def _pieces(count: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Rows of lines with any points, so many at a time that a piece has about `PIECE` points."""
+    """Rows of lines that have points, in pieces of about `PIECE` points."""
     rows = np.flatnonzero(count)
     cuts = np.flatnonzero(np.diff(np.cumsum(count[rows]) // PIECE)) + 1
     yield from (piece for piece in np.split(rows, cuts) if len(piece))

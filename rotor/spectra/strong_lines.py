@@ -1,8 +1,8 @@
-"""Lines between the Wang blocks of neighbouring J that may reach an intensity: few large products, and bounds before them.
+"""Lines between Wang blocks of neighbouring J that may reach an intensity cut, found by bounds and few large matrix products.
 
-A line of the frequency ν and the strength S can only reach a cut where ν S is at least what the larger population of both states
-needs (the photon factor, at most 1, left out). The highest frequency there can be in a product of two blocks stands for ν at
-first, so that two comparisons of S suffice for most of its elements.
+A line of frequency ν and strength S can reach a cut only if ν S is at least the value that the larger population of its two states
+requires (the photon factor, at most 1, is left out). At first ν is replaced by the highest frequency in a product of two blocks, so
+that two comparisons of S suffice for most elements.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.stacked_blocks import Product, Stack, Vector, stacks_by_j
 from rotor.quantum.tensors import BodyTensor
 
-SMALLEST_MHZ = 1e-30  # in place of 0 between states that all have one energy
-ROUND_OFF = 1e-9  # of a threshold, by which a line that is compared exactly later may miss it
+SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy
+ROUND_OFF = 1e-9  # relative margin of a threshold for lines that are compared exactly later
 
 StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
 
@@ -26,25 +26,25 @@ StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D
 def strong_lines(
     levels: Levels, blocks: Sequence[SolvedBlock], dipole: BodyTensor, needed: Floats, highest_mhz: float
 ) -> Iterator[StrongLines]:
-    """Rows of both states and strengths of all lines that may reach a cut, and of some that do not, block by block.
+    """Rows of both states and strengths of all lines that may reach a cut (and of some that do not), block by block.
 
     Parameters
     ----------
     levels : Levels
         With eigenvectors in Wang blocks.
     blocks : sequence of SolvedBlock
-        Those between which lines count, whole and in the order of J.
+        Complete blocks between which lines count, in order of J.
     dipole : BodyTensor
         A vector, in debye.
     needed : (levels,) array
-        ν S in MHz D² that a line with this lower state needs.
+        ν S in MHz D² that a line with this lower state requires.
     highest_mhz : float
         Frequency above which lines do not count.
 
     Returns
     -------
     iterator of tuples of (n,) arrays
-        Row of one state, row of the other, S in D².
+        Row of the first state, row of the second, S in D².
     """
     vector, most = Vector(dipole), sum(abs(part) ** 2 for part in dipole.components)
     counts = reaching(levels, needed, most)
@@ -54,21 +54,21 @@ def strong_lines(
     lower = {block.basis.j for block in blocks if counts[block.start]}
     near = lower.union(*({j - 1, j + 1} for j in lower))
     for j, stacks in stacks_by_j([block for block in blocks if block.basis.j in near]):
-        of_up: dict[int, tuple[SolvedBlock, list[Product]]] = {}
+        by_upper: dict[int, tuple[SolvedBlock, list[Product]]] = {}
         for lows in (below, stacks) if before == j - 1 else (stacks,):
             for up, product in vector.products(stacks, lows):
-                of_up.setdefault(up.start, (up, []))[1].append(product)
-        for up, products in of_up.values():
+                by_upper.setdefault(up.start, (up, []))[1].append(product)
+        for up, products in by_upper.values():
             for part in _parts(up, products, counts):
                 yield _strong_lines(*part, levels.energy_mhz, needed, highest_mhz, memory)
         below, before = stacks, j
 
 
 def reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
-    """How many of the states of each Wang block, from the lowest on, may be the lower state of a line that reaches the cut.
+    """Number of states of each Wang block, from the lowest on, that may be the lower state of a line above the cut.
 
-    Over all upper states of one lower state the strengths add up to (2J+1) μ² (the sum rule of direction cosines), so that one is
-    not larger; ν is at most the distance to the highest level of J - 1, J and J + 1.
+    The strengths of one lower state add up to (2J+1) μ² over all upper states (sum rule of direction cosines), which bounds each of them;
+    ν is at most the distance to the highest level of J - 1, J and J + 1.
     """
     starts = np.array([block.start for block in levels.blocks])
     j, sizes = levels.quanta["j"], np.diff(np.append(starts, len(levels)))
@@ -83,13 +83,13 @@ def reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
 
 Part = tuple[
     int, int, list[tuple[Product, int, int]]
-]  # first state and number of the upper block; first and last of each low
+]  # first state and number of states of the upper block; for each product, first and last state of the lower block
 
 
 def _parts(up: SolvedBlock, products: list[Product], counts: Mapping[int, int]) -> Iterator[Part]:
-    """The parts of blocks between which a line may reach the cut: all with the lowest states of one side, or of the other."""
-    of_up, all_up = counts[up.start], len(up.energies_mhz)
-    if of_up == all_up:
+    """Parts of blocks between which a line may reach the cut: those with low-lying states of either block."""
+    reaching_up, all_up = counts[up.start], len(up.energies_mhz)
+    if reaching_up == all_up:
         yield up.start, all_up, [(product, 0, len(product.low.energies_mhz)) for product in products]
         return
     lowest = [(product, 0, split) for product in products if (split := counts[product.low.start])]
@@ -97,19 +97,19 @@ def _parts(up: SolvedBlock, products: list[Product], counts: Mapping[int, int]) 
         yield up.start, all_up, lowest
     others = [(product, counts[product.low.start], len(product.low.energies_mhz)) for product in products]
     others = [(product, first, last) for product, first, last in others if first < last]
-    if of_up and others:
-        yield up.start, of_up, others
+    if reaching_up and others:
+        yield up.start, reaching_up, others
 
 
 class _Memory:
-    """Arrays used again and again: products of one block, which of them may suffice, and the numbers of all levels."""
+    """Reused arrays: products of one block, masks of elements above the cut, and the numbers of all levels."""
 
     def __init__(self, levels: int) -> None:
         self.rows = np.arange(levels, dtype=np.int32)
         self._elements, self._keep, self._other = np.empty(0), np.empty(0, np.bool_), np.empty(0, np.bool_)
 
-    def of(self, shape: tuple[int, int]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """An array for elements, and two for whether they suffice."""
+    def arrays(self, shape: tuple[int, int]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """An array for elements, and two for masks."""
         size = shape[0] * shape[1]
         if len(self._elements) < size:
             self._elements, self._keep, self._other = np.empty(size), np.empty(size, np.bool_), np.empty(size, np.bool_)
@@ -124,10 +124,10 @@ def _strong_lines(
     start: int, count: int, products: list[tuple[Product, int, int]], energy: Floats, needed: Floats,
     highest_mhz: float, memory: _Memory,
 ) -> StrongLines:  # fmt: skip
-    """The lines of `count` states from `start` on with those of lower blocks whose strengths may suffice."""
+    """Lines between `count` states from `start` on and states of lower blocks, whose strengths may suffice."""
     stop = start + count
     others = np.concatenate([memory.rows[product.low.start + a : product.low.start + b] for product, a, b in products])
-    strength, keep, other = memory.of((count, len(others)))
+    strength, keep, other = memory.arrays((count, len(others)))
 
     at = 0
     for product, a, b in products:
@@ -137,7 +137,7 @@ def _strong_lines(
 
     lowest = min(
         [energy[start], *(product.low.energies_mhz[a] for product, a, _ in products)]
-    )  # of each block, energies rise
+    )  # energies rise within a block
     highest = max([energy[stop - 1], *(product.low.energies_mhz[b - 1] for product, _, b in products)])
     span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
     scale = (1 - ROUND_OFF) / span

@@ -1,6 +1,6 @@
-"""Pairs of states that make a line, with frequency and strength: from Wang blocks, or in closed form.
+"""Pairs of states that form a line, with frequency and strength: from Wang blocks, or in closed form.
 
-Nothing weak is left out here but what an `IntensityCut` or a range of frequencies excludes.
+All allowed lines are included except those that an `IntensityCut` or a frequency range excludes.
 """
 
 from __future__ import annotations
@@ -27,20 +27,22 @@ if TYPE_CHECKING:
     from rotor.quantum.spins.many_f_lines import Rows as ManyF
 
 EVERYTHING = (0.0, float("inf"))
-LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the compiler takes 0.6 s, the plain loop 20 ns a line more
+LONG_LIST = 30_000_000  # lines above which the compiled loop is used: loading it takes 0.6 s, the plain loop 20 ns more per line
 COMPILED = "rotor.spectra._kernels"
 
-BATCH = 30_000  # lines that are looked at together
+BATCH = 30_000  # lines processed together
 
 Vector = tuple[float, float, float]
-Rows = tuple[Indices, Indices, Floats]  # of both states of lines, and S in D²
-Amplitudes = Callable[[Any, Sequence[Any]], Floats]  # of a block with others, side by side: (n_up, sum of n_low)
-Pair = tuple[Block, Block]  # two blocks with an allowed transition, the one of higher or equal J first
+Rows = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
+Amplitudes = Callable[
+    [Any, Sequence[Any]], Floats
+]  # of a block with several others, side by side: (n_up, sum of n_low)
+Pair = tuple[Block, Block]  # two blocks with an allowed transition, the block of higher or equal J first
 
 
 @dataclass(frozen=True)
 class Transitions:
-    """Columns (n,): frequency in MHz, S μ² in D² over all components, rows of the two states in the levels."""
+    """Columns (n,): frequency in MHz, S μ² in D² over all components, rows of both states in the levels."""
 
     frequency_mhz: Floats
     strength_debye2: Floats
@@ -55,20 +57,20 @@ def all_transitions(
     cut: IntensityCut | None = None,
     moments: Sequence[Moment] = (),
 ) -> Transitions:
-    """Every transition between `levels` that is allowed, in the range and above the cut, in no particular order.
+    """All allowed transitions between `levels` in the range and above the cut, unordered.
 
     Parameters
     ----------
     levels : Levels
-        With eigenvectors where the top is asymmetric.
+        With eigenvectors for asymmetric tops.
     dipoles_abc : (float, float, float) or mapping of (int, int) to it
-        Components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once.
+        Components of μ along a, b, c in debye; for several vibrational states by pairs (v', v), each pair once.
     range_mhz : (float, float), optional
         First and last frequency.
     cut : IntensityCut, optional
-        The least intensity; by default nothing is cut.
+        Least intensity; by default no cut.
     moments : sequence of Moment, optional
-        Others than dipoles, of levels that were solved with spins.
+        Moments other than dipoles, for levels with spins.
 
     Returns
     -------
@@ -81,31 +83,31 @@ def all_transitions(
             [piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)]
         )
 
-    blocks, some_without = _blocks_with_weight(levels)
+    blocks, some_missing = _existing_blocks(levels)
     solved = [block for block in blocks if isinstance(block, SolvedBlock)]
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
         transitions = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
-        return _rows(transitions, levels.weight[transitions.lower] > 0) if some_without else transitions
+        return _rows(transitions, levels.weight[transitions.lower] > 0) if some_missing else transitions
     if (
         cut is not None
         and not moments
-        and (many := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
+        and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
     ):
-        return _rows(many, levels.weight[many.lower] > 0) if some_without else many
-    pairs, between = _acting(levels, blocks, dipoles, moments)
+        return _rows(stacked, levels.weight[stacked.lower] > 0) if some_missing else stacked
+    pairs, between = _connections(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
-        transitions = _every_pair(pairs, between)
+        transitions = _all_lines(pairs, between)
     else:
-        transitions = _chosen(levels, pairs, between, range_mhz, cut)
-    return _rows(transitions, levels.weight[transitions.lower] > 0) if some_without else transitions
+        transitions = _selected_lines(levels, pairs, between, range_mhz, cut)
+    return _rows(transitions, levels.weight[transitions.lower] > 0) if some_missing else transitions
 
 
-def _acting(
+def _connections(
     levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], moments: Sequence[Moment]
 ) -> tuple[list[Pair], Amplitudes]:
-    """Pairs of blocks that the moments connect, and the function that gives their amplitudes."""
+    """Pairs of blocks that the moments connect, and the function of their amplitudes."""
     if moments:
         from rotor.quantum.spins.moments import moments_of
 
@@ -119,17 +121,17 @@ def _acting(
     return pairs, _side_by_side(lambda up, low: amplitudes(up, low, tensors))
 
 
-def _side_by_side(of_pair: Callable[[Any, Any], Floats]) -> Amplitudes:
-    return lambda up, lows: np.hstack([of_pair(up, low) for low in lows])
+def _side_by_side(pair_amplitudes: Callable[[Any, Any], Floats]) -> Amplitudes:
+    return lambda up, lows: np.hstack([pair_amplitudes(up, low) for low in lows])
 
 
-def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
-    """Blocks in which a level exists by its spin weight, and whether one of them also holds levels that do not."""
+def _existing_blocks(levels: Levels) -> tuple[list[Block], bool]:
+    """Blocks with levels of nonzero spin weight, and whether some of them also contain levels of zero weight."""
     if (levels.weight > 0).all():
         return list(levels.blocks), False
     weights = [(block, levels.weight[block.start : block.start + len(block.energies_mhz)]) for block in levels.blocks]
-    with_some = [(block, weight) for block, weight in weights if (weight > 0).any()]
-    return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
+    existing = [(block, weight) for block, weight in weights if (weight > 0).any()]
+    return [block for block, _ in existing], any((weight <= 0).any() for _, weight in existing)
 
 
 def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
@@ -148,8 +150,8 @@ def _joined(pieces: list[Transitions]) -> Transitions:
     )
 
 
-def _every_pair(pairs: list[Pair], between: Amplitudes) -> Transitions:
-    """All lines of all pairs, written straight into columns of their final length."""
+def _all_lines(pairs: list[Pair], between: Amplitudes) -> Transitions:
+    """All lines of all pairs, written directly into columns of their final length."""
     sizes = [len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs]
     total = sum(sizes)
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
@@ -167,7 +169,7 @@ def _every_pair(pairs: list[Pair], between: Amplitudes) -> Transitions:
 
 
 def _fill_of(total: int) -> Callable[..., None]:
-    """The compiled loop for lists so long that loading the compiler pays, or where it is loaded already; to the same bits."""
+    """The compiled loop if loading it pays, or if it is loaded already; else the plain loop. Both give the same bits."""
     if total < LONG_LIST and COMPILED not in sys.modules:
         return _fill_pair
     from rotor.spectra._kernels import fill_pair
@@ -180,7 +182,7 @@ def _fill_pair(
     energies_up: Floats, energies_low: Floats, amplitude: Floats, start_up: int, start_low: int,
     frequency: Floats, strength: Floats, upper: Indices, lower: Indices,
 ) -> None:  # fmt: skip
-    """Frequency, strength and states of all lines between two blocks, the upper state being the one higher in energy."""
+    """Frequency, strength and states of all lines between two blocks; the upper state has the higher energy."""
     shape = amplitude.shape
     difference = np.subtract.outer(energies_up, energies_low)
     np.abs(difference, out=frequency.reshape(shape))
@@ -193,13 +195,13 @@ def _fill_pair(
     lower.reshape(shape)[...] = np.where(falls, first, second)
 
 
-def _chosen(
+def _selected_lines(
     levels: Levels, pairs: list[Pair], between: Amplitudes, range_mhz: tuple[float, float], cut: IntensityCut | None
 ) -> Transitions:
     """The lines of all pairs in a range and above a cut.
 
-    With the photon factor, at most 1, left out, a line can only reach the cut where ν S reaches the least over the larger of both
-    populations; what is found so is looked at once more.
+    Candidates are found without the photon factor (at most 1): their ν S reaches the requirement of the larger of both populations.
+    They are then compared exactly.
     """
     needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
     candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
@@ -210,7 +212,7 @@ def _many_f_transitions(
     levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
-    """All transitions of levels with spins that were solved for many F at once; None for other levels."""
+    """All transitions of levels with spins that were solved for many F together; None for other levels."""
     if not blocks or isinstance(blocks[0], SolvedBlock):
         return None
     from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
@@ -228,7 +230,7 @@ def _many_f_transitions(
 def _group_transitions(
     energies: Floats, needed: Floats, group: ManyF, range_mhz: tuple[float, float], cut: IntensityCut, space: Workspace
 ) -> Transitions:
-    """The lines between blocks of many F in a range and above a cut, see `_chosen`; beyond the levels of an F amplitudes are 0."""
+    """Lines between groups of blocks of many F in a range and above a cut (`_selected_lines`); padding of a group has amplitude 0."""
     up, low, amplitude, alike = group
     strength = np.multiply(amplitude, amplitude, out=amplitude)
     difference = space.array("difference", *amplitude.shape)
@@ -246,7 +248,7 @@ def _group_transitions(
 
 
 def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:
-    """Small pieces put together to some thousand lines each, so that what is computed of them stays in fast memory."""
+    """Pieces joined to some thousand lines each, so that their arrays stay in the processor's cache."""
     waiting: list[Rows] = []
     count = 0
     for piece in pieces:
@@ -268,7 +270,7 @@ def _with_frequencies(
     levels: Levels, first: Indices, second: Indices, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip
-    """Lines between rows of levels, in any order of the two, that lie in the range and reach the cut."""
+    """Lines between rows of levels, in either order, that lie in the range and reach the cut."""
     difference = levels.energy_mhz[first] - levels.energy_mhz[second]
     return _in_order_of_energy(first, second, difference, strength, range_mhz, cut)
 
@@ -277,7 +279,7 @@ def _in_order_of_energy(
     first: Indices, second: Indices, difference: Floats, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip
-    """Lines with the energies of the first states less those of the second, those that are in the range and reach the cut."""
+    """Lines from energy differences (first minus second state), those in the range and above the cut, with ordered states."""
     falls = difference < 0
     upper, lower = np.where(falls, second, first), np.where(falls, first, second)
     transitions = Transitions(np.abs(difference), strength, upper, lower)
@@ -290,7 +292,7 @@ def _in_order_of_energy(
 
 
 def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
-    """Each upper block with those that it makes lines with; a block with itself stands alone."""
+    """Each upper block with the lower blocks of its lines; a block with itself comes alone."""
     lows_of: dict[int, tuple[Block, list[Block]]] = {}
     for up, low in pairs:
         if up is low:
@@ -303,16 +305,18 @@ def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
 def _candidates(
     levels: Levels, up: Block, lows: list[Block], amplitude: Floats, needed: Floats, range_mhz: tuple[float, float]
 ) -> Rows:
-    """The lines between all states of a block and of others in the range that may reach the cut."""
+    """Lines between all states of a block and others in the range that may reach the cut."""
     rows = np.concatenate([np.arange(low.start, low.start + len(low.energies_mhz), dtype=np.int32) for low in lows])
     frequency = np.subtract.outer(up.energies_mhz, levels.energy_mhz[rows])
     np.abs(frequency, out=frequency)
     strength = amplitude * amplitude
-    of_up = needed[up.start : up.start + len(up.energies_mhz)]
-    keep = frequency * strength >= np.minimum.outer(of_up, needed[rows])
+    needed_up = needed[up.start : up.start + len(up.energies_mhz)]
+    keep = frequency * strength >= np.minimum.outer(needed_up, needed[rows])
     if range_mhz != EVERYTHING:
         keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
-    places = np.flatnonzero(np.tril(keep, -1) if up is lows[0] else keep)  # both ways round stand there
+    places = np.flatnonzero(
+        np.tril(keep, -1) if up is lows[0] else keep
+    )  # a block with itself contains each pair twice
     i, k = np.divmod(places, len(rows))
     return (i + up.start).astype(np.int32), rows[k], strength.ravel()[places]
 
@@ -324,7 +328,7 @@ def _closed_form(
     range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Iterator[Transitions]:
-    """Lines of linear and symmetric tops by one dipole; a spherical top without field or distortion has none."""
+    """Lines of linear and symmetric tops from one dipole; a spherical top without field or distortion has none."""
     if levels.kind == "spherical":
         return
     along, across2 = _split(levels.kind, dipole_abc)
@@ -346,13 +350,13 @@ def _closed_form(
 
 
 def _rises(along2: float, across2: float) -> list[tuple[int, int, float]]:
-    """ΔJ, ΔK and the square of the dipole for the branches that lead from one level to another, each line once."""
+    """(ΔJ, ΔK, squared dipole) of the branches, each line once."""
     steps = ((1, 0, along2), (0, 1, across2), (1, 1, across2), (1, -1, across2))
     return [(delta_j, delta_k, dipole2) for delta_j, delta_k, dipole2 in steps if dipole2]
 
 
 def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, float]:
-    """The dipole along the figure axis, and the square of what is across it."""
+    """The dipole along the figure axis, and the square of the component across it."""
     a, b, c = dipole_abc
     if kind == "linear":
         return a, 0.0
@@ -362,12 +366,12 @@ def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, fl
 def _hoenl_london(
     levels: Levels, delta_j: int, delta_k: int, states: tuple[int, int] = (0, 0)
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Rows of v, J, K and of v', J + ΔJ, K + ΔK, and S summed over both signs of K, for a unit dipole.
+    """Rows of (v, J, K) and (v', J + ΔJ, K + ΔK), and S summed over both signs of K, for a unit dipole.
 
-    Parallel: [(J+1)² - K²]/(J+1) for R, (2J+1) K²/(J(J+1)) for Q, within a state no change of energy. Perpendicular, with the square of the
-    dipole across the axis: Q: (2J+1)(J∓K)(J±K+1)/(2J(J+1)), R: (J±K+1)(J±K+2)/(2(J+1)), over both signs of K (the
+    Parallel: [(J+1)² - K²]/(J+1) for R, (2J+1) K²/(J(J+1)) for Q (within a state Q has no change of energy). Perpendicular, with the
+    squared dipole across the axis: (2J+1)(J∓K)(J±K+1)/(2J(J+1)) for Q, (J±K+1)(J±K+2)/(2(J+1)) for R, over both signs of K (the
     squares of `tensors.coupling`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
-    K - 1 is Q with K + 1 from the other side.
+    K - 1 is Q with K + 1 from the other level.
     """
     all_j = levels.quanta["j"]
     all_k = levels.quanta.get("k", np.zeros_like(all_j))
@@ -378,10 +382,10 @@ def _hoenl_london(
     if delta_j == delta_k == 0:
         here &= all_k > 0
     first = np.nonzero(here)[0]
-    reached = {"j": to_j[first]} | ({"k": to_k[first]} if "k" in levels.quanta else {})
+    target = {"j": to_j[first]} | ({"k": to_k[first]} if "k" in levels.quanta else {})
     if "v" in levels.quanta:
-        reached["v"] = np.full(len(first), states[1])
-    second = levels.rows_of(**reached)
+        target["v"] = np.full(len(first), states[1])
+    second = levels.rows_of(**target)
 
     j, k = all_j[first].astype(float), all_k[first].astype(float)
     if delta_k == 0 and delta_j == 0:

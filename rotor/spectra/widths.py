@@ -1,9 +1,9 @@
-"""Widths of lines that a list leaves out.
+"""Widths of lines, which a line list neglects.
 
-| left out | full width at half maximum |
+| neglected | full width at half maximum |
 |---|---|
 | Doppler width | ν √(8 ln2 kT/mc²) (`rotor.spectra.profiles`) |
-| pressure width | 2 n ⟨v⟩ σ/2π, σ = π (4 Å)² + π μ²/(2 · 4πε₀ ħ⟨v⟩): a hard core, and V. Weisskopf's radius of dipoles |
+| pressure width | 2 n ⟨v⟩ σ/2π, σ = π (4 Å)² + π μ²/(2 · 4πε₀ ħ⟨v⟩): hard cores and V. Weisskopf's radius of dipoles |
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from rotor.requests.plan import LeftOut
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-COLLISION_M = 4e-10  # a diameter of small molecules
+COLLISION_M = 4e-10  # diameter of small molecules
 HBAR_J_S = units.PLANCK_J_S / (2 * math.pi)
 MILLIBAR = 1e-3  # bar
 
 
 def doppler(top: Top, frequency_mhz: float, temperature_k: float) -> LeftOut | None:
-    """The Doppler width of a line; None of a top without a mass."""
+    """The Doppler width of a line; None for a top without a mass."""
     if top.mass_u is None:
         return None
     from rotor.spectra.profiles import doppler_fwhm
@@ -35,12 +35,12 @@ def doppler(top: Top, frequency_mhz: float, temperature_k: float) -> LeftOut | N
 
 
 def pressure_width(top: Top, temperature_k: float, pressure_bar: float | None) -> LeftOut | None:
-    """The width that collisions of these molecules among each other give a line; None of a top without a mass.
+    """The width from collisions of these molecules with each other; None for a top without a mass.
 
-    Without a pressure it is not estimated: it may be that of a cell, of a jet or of interstellar gas. Then the width at 1 mbar is named.
+    Without a pressure (of a cell, a jet or interstellar gas) it is not estimated; the text then gives the width at 1 mbar.
 
-    Neglected: resonance of the levels, higher multipoles, J. The factor ½ of the dipoles is one of order one, with which CO and OCS
-    come out within a factor of 3 of the measured ones.
+    Neglected: resonance of the levels, higher multipoles, dependence on J. The dipole term holds up to a factor of order one; with ½,
+    CO and OCS agree with measured widths within a factor of 3.
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6081.5 MHz", dipole_abc_debye=(0.715, 0, 0), mass_u=59.967)

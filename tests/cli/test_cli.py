@@ -427,7 +427,7 @@ def test_no_answer_is_another_exit_code(call, folder):
     )
     assert (code, out) == (1, "")
     assert err.startswith("error: lines above 10^-12 nm² MHz at 3000 K reach to J = 29481, more than 600; give J max")
-    assert "a largest constant of 1 MHz is small for a molecule: numbers without a unit are MHz, so write GHz" in err
+    assert "a largest constant of 1 MHz is small for a molecule: numbers without a unit are MHz; write GHz" in err
     _, _, err = call("spectrum", "--constants", "B=200 MHz", "--dipole-abc", "1,0,0", "--temperature", "3000")
     assert "reach to J" in err
     assert "GHz" not in err

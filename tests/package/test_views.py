@@ -117,7 +117,7 @@ def test_scales(call, folder, figures, command, axis, scale):
         (("zeeman", "OCS", "--g", "1", "--plot-title", "x"), "--plot-title: expected with --plot"),
         (
             ("cat", "a.cat", "--plot", "a.png", "--compare", "OCS", "--plot-vertical", "0:1"),
-            "--plot-vertical: a comparison",
+            "--plot-vertical: cannot be combined with --compare",
         ),
     ],
 )

@@ -128,7 +128,10 @@ def test_what_stays_is_no_absorption():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: classical_band(rotor.read("CO2"), [1.0], fwhm_mhz=1.0, rng=np.random.default_rng()), "no dipole"),
+        (
+            lambda: classical_band(rotor.read("CO2"), [1.0], fwhm_mhz=1.0, rng=np.random.default_rng()),
+            "no known dipole",
+        ),
         (lambda: band_times(OCS, 0.0, 1.0), "above 0 K"),
         (lambda: band_times(OCS, 300.0, -1.0), "width"),
         (lambda: linear_band(OCS, np.array([1.0]), CM, "wigner"), "is none of harmonic"),

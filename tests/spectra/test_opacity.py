@@ -104,7 +104,7 @@ def test_refusals():
     with pytest.raises(ValueError, match="Doppler width needs a mass"):
         line_optical_depth(line_list(bare, jmax=1), 1.0, 1.0)
     plain = Spectrum(np.array([1.0, 2.0]), np.array([1.0, 1.0]), "a.u.")
-    with pytest.raises(ValueError, match="follows from a cross section"):
+    with pytest.raises(ValueError, match="expected a cross section in nm"):
         optical_depth(plain, 1.0, 1.0)
-    with pytest.raises(ValueError, match="follows from an optical depth"):
+    with pytest.raises(ValueError, match="expected an optical depth"):
         absorbed_fraction(plain)

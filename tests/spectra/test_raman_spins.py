@@ -149,7 +149,9 @@ def test_levels_without_weight_in_a_block_do_not_hide_the_others():
 
 def test_a_tensor_without_the_axis_is_refused_with_spins():
     top = with_spins(Top.from_constants("A=9 B=3 GHz").with_polarizability(SKEW, "made up"), "chi_aa(14N)=-4.7 MHz")
-    with pytest.raises(ValueError, match="prolate top with spins: expected a polarizability with its axis, along a"):
+    with pytest.raises(
+        ValueError, match="prolate top with spins: expected a polarizability with the axis of the top, a"
+    ):
         raman_lines(top, jmax=2, effects=effects_of(top, True))
 
 

@@ -125,7 +125,7 @@ def test_a_grid_that_would_be_too_long_is_refused(lines, monkeypatch):
     monkeypatch.setattr(spectrum, "MOST_POINTS", 1000)
     with pytest.raises(ValueError, match="narrower range"):
         resolving_grid(lines, fwhm_mhz=1.0)
-    with pytest.raises(ValueError, match="no lines"):
+    with pytest.raises(ValueError, match="without lines"):
         resolving_grid(lines.where([]), fwhm_mhz=1.0)
 
 
