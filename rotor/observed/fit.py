@@ -323,6 +323,7 @@ class Contribution:
 
 def contributions(fit: SourceFit) -> list[Contribution]:
     """What each component explains that the others, fitted again without it, do not."""
+    _refuse(fit.spectrum, fit.components, fit.sight)
     out = []
     for k, component in enumerate(fit.components):
         others = _without(fit, k)

@@ -1,7 +1,8 @@
 """A gas cell: temperature and amount of gas from an absorption spectrum.
 
-    A(ν) = lg(I_0/I) = Σ_k τ_k(ν)/ln 10,    τ_k(ν) = N_k L Σ_i I_i(T) φ_i(ν)          (Lambert and Beer)
+    A(ν) = lg(P_0/P) = Σ_k τ_k(ν)/ln 10,    τ_k(ν) = N_k L Σ_i I_i(T) φ_i(ν)
 
+after the law of Beer and Lambert, P = P_0 10^(-A) (IUPAC Compendium of Chemical Terminology, 5th ed. (2025), doi 10.1351/goldbook.B00626),
 with one temperature T for all species, N_k L the molecules in the line of sight, and Gaussians of one relative width, as motion makes them.
 Neglected: pressure broadening, emission of the gas, and the response of the detector.
 """
@@ -10,17 +11,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.observed.model import Component, component_depth
+from rotor.observed.fit import FitChoices, SourceFit
+from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
+from rotor.observed.species import SpeciesLines
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
-from rotor.statistics.least_squares import Minimum, minimise
-from rotor.statistics.regression import Regression, regression
+from rotor.observed.variables import variables
+from rotor.statistics.least_squares import minimise
+from rotor.statistics.regression import regression
 
 _LN10 = math.log(10)
+_CHOICES = FitChoices(
+    free=("column_per_cm2", "excitation_k", "fwhm_km_s"), shared=("excitation_k", "fwhm_km_s"), priors=False
+)
+_START_K = (50.0, 100.0, 200.0, 300.0, 450.0)
+_START_CHANNELS = (2.0, 4.0, 8.0, 16.0, 32.0)  # widths of lines
+_UNIT_COLUMN = 1e6
 
 
 def absorbance(components: Sequence[Component], grid_mhz: Floats) -> Floats:
@@ -35,21 +46,76 @@ def absorbance(components: Sequence[Component], grid_mhz: Floats) -> Floats:
     )
 
 
-@dataclass(frozen=True)
-class CellFit:
-    """Fitted components, and standard errors: of every column density (cm⁻²), the temperature (K) and the width (km/s)."""
-
-    components: tuple[Component, ...]
-    column_errors: tuple[float, ...]
-    temperature_error_k: float
-    fwhm_error_km_s: float
-    statistics: Regression
-    minimum: Minimum
+@dataclass(frozen=True, eq=False, repr=False)
+class CellFit(SourceFit):
+    """A fitted gas cell: `SourceFit` of absorbance; `model_k`, `residuals_k` are absorbances here."""
 
     @property
     def temperature_k(self) -> float:
         """Temperature of the gas."""
         return self.components[0].excitation_k
+
+    @property
+    def temperature_error_k(self) -> float:
+        """Its standard error; inf where it is not determined."""
+        return float(self.parameters_of(0)["excitation_k"]["error"])
+
+    @property
+    def column_errors(self) -> tuple[float, ...]:
+        """Standard errors of N L (cm⁻²), of each component."""
+        return tuple(self.parameters_of(k)["column_per_cm2"]["error"] for k in range(len(self.components)))
+
+    def facts(self) -> dict[str, Any]:
+        """As of a source, `rms` and `noise` in absorbance."""
+        content = super().facts()
+        return content | {"rms": content.pop("rms_k"), "noise": content.pop("noise_k")}
+
+
+def start_cell(
+    spectrum: ObservedSpectrum,
+    species: Sequence[SpeciesLines],
+    temperature_k: float | None = None,
+    fwhm_km_s: float | None = None,
+) -> list[Component]:
+    """Components to begin a fit with: of some temperatures and widths those with the least χ², column densities linear in A.
+
+    Parameters
+    ----------
+    spectrum : ObservedSpectrum
+        Its unit is absorbance.
+    species : sequence of SpeciesLines
+    temperature_k, fwhm_km_s : float, optional
+        Where they are known.
+
+    Returns
+    -------
+    list of Component
+        At rest; of species that show nothing the column density is that of a third of the noise.
+
+    Raises
+    ------
+    ValueError
+        As `fit_cell`.
+    """
+    from scipy.optimize import nnls
+
+    _refuse(spectrum, species)
+    channel = spectrum.channel_mhz / float(np.median(spectrum.frequency_mhz)) * KM_PER_S
+    low = max(each.partition.range_k[0] for each in species)
+    high = min(each.partition.range_k[1] for each in species)
+    kelvin = [temperature_k] if temperature_k else sorted({min(max(t, low), high) for t in _START_K})
+    widths = [fwhm_km_s] if fwhm_km_s else [channels * channel for channels in _START_CHANNELS]
+    best: tuple[float, list[Component]] = math.inf, []
+    for t, width in ((t, width) for t in kelvin for width in widths):
+        trial = [Component(each, _UNIT_COLUMN, t, 0.0, width) for each in species]
+        bank = np.stack([absorbance([each], spectrum.frequency_mhz) / spectrum.noise for each in trial], axis=1)
+        norms = np.maximum(np.linalg.norm(bank, axis=0), 1e-300)
+        columns, left = nnls(bank / norms, spectrum.intensity / spectrum.noise)
+        if left < best[0]:
+            floor = 1 / 3 / np.maximum(bank.max(axis=0), 1e-300)
+            columns = _UNIT_COLUMN * np.maximum(columns / norms, floor)
+            best = left, [Component(each, float(n), t, 0.0, width) for each, n in zip(species, columns, strict=True)]
+    return best[1]
 
 
 def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
@@ -60,7 +126,7 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
     spectrum : ObservedSpectrum
         Its unit is absorbance.
     start : sequence of Component
-        The first one's temperature and width count for all.
+        The first one's temperature and width count for all; `start_cell` estimates them.
 
     Returns
     -------
@@ -71,40 +137,37 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
     ValueError
         For a spectrum in another unit, and a species without a line in its range.
     """
-    if spectrum.unit != ABSORBANCE:
-        raise ValueError(f"{spectrum.source or 'spectrum'}: in {spectrum.unit}; a gas cell is fitted in absorbance")
-    grid = spectrum.frequency_mhz
-    for component in start:
-        if not len(component.species.between(grid[0], grid[-1])):
-            raise ValueError(f"{component.species.name}: no lines from {grid[0]:.10g} to {grid[-1]:.10g} MHz")
-
-    def components(values: Floats) -> list[Component]:
-        *columns, kelvin, width = np.exp(np.clip(values, -300, 300)).tolist()
-        return [
-            replace(component, column_per_cm2=n, excitation_k=kelvin, fwhm_km_s=width)
-            for component, n in zip(start, columns, strict=True)
-        ]
+    _refuse(spectrum, [component.species for component in start])
+    grid, noise = spectrum.frequency_mhz, spectrum.noise
+    free = variables(start, _CHOICES.free, _CHOICES.shared, ())
 
     def evaluate(values: Floats) -> tuple[Floats, Floats]:
-        parts = components(values)
-        depths = [component_depth(component, grid, slopes=True) / _LN10 for component in parts]
-        kelvin, width = parts[0].excitation_k, parts[0].fwhm_km_s
-        slopes = [depth[0] for depth in depths]
-        slopes += [kelvin * sum(depth[2] for depth in depths), width * sum(depth[4] for depth in depths)]
-        seen = sum(depth[0] for depth in depths)
-        return (spectrum.intensity - seen) / spectrum.noise, np.stack(slopes, axis=1) / spectrum.noise[:, None]
+        parts = free.applied(start, values)
+        depths = np.stack([component_depth(component, grid, slopes=True) for component in parts]) / _LN10
+        slopes = np.concatenate([depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1)  # none of the size of a source
+        return (spectrum.intensity - depths[:, 0].sum(axis=0)) / noise, free.jacobian(parts, slopes) / noise[:, None]
 
-    first = np.log([*(component.column_per_cm2 for component in start), start[0].excitation_k, start[0].fwhm_km_s])
-    minimum = minimise(evaluate, first, tolerance=1e-3)
-    names = [*(component.species.name for component in start), "temperature", "width"]
-    statistics = regression(minimum.jacobian, names)
-    errors = statistics.errors * max(1.0, minimum.rms)
-    best = components(minimum.parameters)
+    minimum = minimise(evaluate, free.values(start), tolerance=1e-3)
+    best = free.applied(start, minimum.parameters)
     return CellFit(
-        tuple(best),
-        tuple(float(error * component.column_per_cm2) for error, component in zip(errors, best, strict=False)),
-        float(errors[-2] * best[0].excitation_k),
-        float(errors[-1] * best[0].fwhm_km_s),
-        statistics,
-        minimum,
+        spectrum=spectrum,
+        components=tuple(best),
+        variables=free,
+        values=minimum.parameters,
+        statistics=regression(minimum.jacobian, free.names(start)),
+        minimum=minimum,
+        model_k=absorbance(best, grid),
+        noise=noise,
+        sight=Sight(),
+        choices=_CHOICES,
+        start=tuple(start),
     )
+
+
+def _refuse(spectrum: ObservedSpectrum, species: Sequence[SpeciesLines]) -> None:
+    if spectrum.unit != ABSORBANCE:
+        raise ValueError(f"{spectrum.source or 'spectrum'}: in {spectrum.unit}; a gas cell is fitted in absorbance")
+    first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]
+    for each in species:
+        if not len(each.between(first, last)):
+            raise ValueError(f"{each.name}: no lines from {first:.10g} to {last:.10g} MHz")

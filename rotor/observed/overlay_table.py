@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats
+from rotor.observed.gas_cell import absorbance
 from rotor.observed.model import KM_PER_S, Component, Sight, model
-from rotor.observed.spectrum import ObservedSpectrum
+from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
 from rotor.table import Table
 
 VISIBLE = 3.0  # standard deviations of a modelled line that is listed
@@ -29,29 +32,45 @@ class ColumnTable(Table):
         return self.values
 
 
+def modelled(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> Floats:
+    """What components look like in the unit of a spectrum (n,): brightness in K, or the absorbance of a gas cell."""
+    if spectrum.unit == ABSORBANCE:
+        return absorbance(components, spectrum.frequency_mhz)
+    return model(components, spectrum.frequency_mhz, sight).brightness_k
+
+
 def overlay_table(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> ColumnTable:
-    """frequency_mhz, observed_k, noise_k, model_k, residual_k, optical_depth of every channel."""
-    seen = model(components, spectrum.frequency_mhz, sight)
+    """frequency_mhz, observed_k, noise_k, model_k, residual_k, optical_depth of every channel; without `_k` in absorbance."""
+    seen, unit = modelled(spectrum, components, sight), _suffix(spectrum)
+    if spectrum.unit == ABSORBANCE:
+        depth = seen * math.log(10)
+    else:
+        depth = model(components, spectrum.frequency_mhz, sight).optical_depth
     return ColumnTable(
         {
             "frequency_mhz": spectrum.frequency_mhz,
-            "observed_k": spectrum.intensity,
-            "noise_k": spectrum.noise,
-            "model_k": seen.brightness_k,
-            "residual_k": spectrum.intensity - seen.brightness_k,
-            "optical_depth": seen.optical_depth,
+            f"observed{unit}": spectrum.intensity,
+            f"noise{unit}": spectrum.noise,
+            f"model{unit}": seen,
+            f"residual{unit}": spectrum.intensity - seen,
+            "optical_depth": depth,
         }
     )
+
+
+def _suffix(spectrum: ObservedSpectrum) -> str:
+    return "" if spectrum.unit == ABSORBANCE else "_k"
 
 
 def line_table(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> ColumnTable:
     """Lines whose species is above three standard deviations at their centre, rising in frequency.
 
-    species, rest_mhz, observed_mhz, upper, lower, energy_upper_k, model_k (of the species alone), total_k, observed_k, blend.
+    species, rest_mhz, observed_mhz, upper, lower, energy_upper_k, model_k (of the species alone), total_k, observed_k,
+    blend; without `_k` in absorbance.
     """
     rows: list[tuple[Any, ...]] = []
-    total = model(components, spectrum.frequency_mhz, sight).brightness_k
-    alone = [model([component], spectrum.frequency_mhz, sight).brightness_k for component in components]
+    total = modelled(spectrum, components, sight)
+    alone = [modelled(spectrum, [component], sight) for component in components]
     for k, component in enumerate(components):
         species = component.species
         observed = species.frequency_mhz * (1 - component.velocity_km_s / KM_PER_S) / (1 + sight.redshift)
@@ -81,9 +100,7 @@ def line_table(spectrum: ObservedSpectrum, components: Sequence[Component], sigh
         "upper",
         "lower",
         "energy_upper_k",
-        "model_k",
-        "total_k",
-        "observed_k",
+        *(f"{name}{_suffix(spectrum)}" for name in ("model", "total", "observed")),
         "blend",
     )
     columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)

@@ -14,6 +14,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.observed.fit import SourceFit, prior_widths
 from rotor.observed.model import model
+from rotor.observed.spectrum import KELVIN
 from rotor.table import Table
 
 EXTRA = 'python -m pip install "molrotor[sampling]"'
@@ -84,6 +85,8 @@ def sample_source(fit: SourceFit, steps: int, *, walkers: int | None = None, see
     """
     if steps < 10:
         raise ValueError(f"sample: {steps} steps: expected 10 or more")
+    if fit.spectrum.unit != KELVIN:
+        raise ValueError(f"sample: a fit in {fit.spectrum.unit}; expected one of brightness in K")
     try:
         import emcee
     except ModuleNotFoundError as error:

@@ -223,8 +223,10 @@ def in_kelvin(spectrum: ObservedSpectrum, beam_arcsec: tuple[float, float] | Non
         return spectrum
     beam = beam_arcsec or spectrum.beam_arcsec
     if spectrum.unit != JANSKY_PER_BEAM:
+        fitting = {ABSORBANCE: "rotor emission --fit FILE (a gas cell)", VOLT: "rotor spectrum MOLECULE --over FILE"}
         raise ValueError(
-            f"{spectrum.source or 'spectrum'}: a spectrum in {spectrum.unit} has no brightness temperature"
+            f"{spectrum.source or 'spectrum'}: a spectrum in {spectrum.unit} has no brightness temperature; its temperature follows from "
+            f"{fitting[spectrum.unit]}"
         )
     if beam is None:
         raise ValueError(

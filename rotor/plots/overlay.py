@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.observed.model import Component, Sight, model
-from rotor.observed.overlay_table import line_table
-from rotor.observed.spectrum import ObservedSpectrum
+from rotor.observed.model import Component, Sight
+from rotor.observed.overlay_table import line_table, modelled
+from rotor.observed.spectrum import ABSORBANCE, KELVIN, ObservedSpectrum
 from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new_figure, save, styled
 
@@ -89,9 +89,7 @@ def overlay_figure(
 ) -> Any:
     """A matplotlib figure of some of the `count` panels of a spectrum."""
     edges = panel_ranges(spectrum, count)
-    brightness = (
-        model(components, spectrum.frequency_mhz, sight).brightness_k if components else np.zeros(len(spectrum))
-    )
+    brightness = modelled(spectrum, components, sight) if components else np.zeros(len(spectrum))
     lines = line_table(spectrum, components, sight).columns
     names = list(dict.fromkeys(component.species.name for component in components))
     with styled():
@@ -106,9 +104,8 @@ def overlay_figure(
             figure.canvas.draw()
             _name(axes, lines, names, spectrum, brightness)
         axes.set_xlabel("Frequency (GHz)")
-        figure.supylabel(
-            "Brightness temperature (K)" if spectrum.unit == "K" else f"Intensity ({spectrum.unit})", fontsize=9
-        )
+        titles = {KELVIN: "Brightness temperature (K)", ABSORBANCE: "Absorbance"}
+        figure.supylabel(titles.get(spectrum.unit, f"Intensity ({spectrum.unit})"), fontsize=9)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
     return figure
 
@@ -153,11 +150,14 @@ def _name(
 ) -> None:
     """Names above modelled lines in the colour of their species; a star marks a blend."""
     first, last = (1e3 * edge for edge in axes.get_xlim())
+    total, observed = (
+        lines[name] if name in lines else lines[f"{name}_k"] for name in ("total", "observed")
+    )  # brightness has its unit in the name
     rows = np.flatnonzero([first <= at <= last for at in lines["observed_mhz"].tolist()])
     peaks = [
         Peak(
             float(lines["observed_mhz"][i]) / 1e3,
-            max(float(lines["total_k"][i]), float(lines["observed_k"][i])),
+            max(float(total[i]), float(observed[i])),
             str(lines["species"][i]) + (" *" if lines["blend"][i] else ""),
             PALETTE[names.index(str(lines["species"][i])) % len(PALETTE)],
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.verbs import emission_cube
+from rotor.verbs.emission_cell import cell_fit, refuse_telescope
 from rotor.verbs.emission_cube import Mapped
 from rotor.verbs.observed_file import json_of, spectrum_facts
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
@@ -47,13 +48,14 @@ class Observed:
         import numpy as np
 
         from rotor.observed.fit import component_facts
-        from rotor.observed.model import model
+        from rotor.observed.overlay_table import modelled
 
         content: dict[str, Any] = {"spectrum": json_of(self.spectrum)}
         if self.fit is None:
-            modelled = model(self.components, self.spectrum.frequency_mhz, self.sight).brightness_k
+            seen = modelled(self.spectrum, self.components, self.sight)
             content["components"] = [component_facts(component) for component in self.components]
-            return content | {"rms_k": float(np.sqrt(np.mean((self.spectrum.intensity - modelled) ** 2)))}
+            name = "rms_k" if self.spectrum.unit == "K" else "rms"
+            return content | {name: float(np.sqrt(np.mean((self.spectrum.intensity - seen) ** 2)))}
         content |= self.fit.facts()
         names = ("species", "signal", "needed", "limit_per_cm2")
         content["contributions"] = [
@@ -71,8 +73,13 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
         raise ValueError(
             "--workers: spreads the rows of a cube; expected with --maps FILE (one spectrum is one process)"
         )
-    spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz)
+    spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz, gas_cell=True)
+    if in_absorbance := spectrum.unit == "absorbance":
+        refuse_telescope(request, work.files)
     sight = sight_of(spectrum, request)
+    if in_absorbance and request.fit is not None:
+        cell = cell_fit(spectrum, request, work.note)
+        return Observed(request, spectrum, sight, list(cell.components), cell)
     components = components_of(spectrum, species_in(spectrum, request, work.note), sight, request)
     if request.fit is None:
         return Observed(request, spectrum, sight, components)
@@ -190,15 +197,20 @@ def _show_fit(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Non
     show_facts([("fit", fit.minimum.reason), ("χ²/ν", chi)])
     print()
     show_table(_parameter_table(fit))
-    print()
-    rows = [(part.species, f"{part.signal:.1f}", "yes" if part.needed else "no", _limit(part)) for part in needed]
-    columns = ("species", "Δχ²", "needed", "limit, 3σ (1/cm²)")
-    show_table(Table("what each species contributes", columns, rows, LEFT))
+    if needed:
+        _show_needed(needed)
     facts = [("undetermined", combination.text) for combination in fit.statistics.undetermined]
     for section in (facts, [] if chain is None else [("sample", chain.text)]):
         if section:
             print()
             show_facts(section)
+
+
+def _show_needed(needed: Sequence[Contribution]) -> None:
+    print()
+    rows = [(part.species, f"{part.signal:.1f}", "yes" if part.needed else "no", _limit(part)) for part in needed]
+    columns = ("species", "Δχ²", "needed", "limit, 3σ (1/cm²)")
+    show_table(Table("what each species contributes", columns, rows, LEFT))
 
 
 def _limit(contribution: Contribution) -> str:

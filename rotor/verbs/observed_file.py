@@ -42,7 +42,7 @@ class SpectrumFile:
         None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
     )
     unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam", panel=PANEL
+        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam, absorbance", panel=PANEL
     )
     axis_unit: str | None = declared(
         None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, km/s", panel=PANEL
@@ -87,12 +87,14 @@ class SpectrumFile:
         names = ("axis_unit", "unit", "rest_mhz", "frame", "noise", "row")
         return ReadChoices(**{name: getattr(self, name) for name in names}, beam_arcsec=self.beam, pixel=pixel)
 
-    def read(self, file: str, range_mhz: tuple[float, float] = INFINITE) -> ObservedSpectrum:
-        """The spectrum in K, without its baseline, cut to a range."""
+    def read(self, file: str, range_mhz: tuple[float, float] = INFINITE, *, gas_cell: bool = False) -> ObservedSpectrum:
+        """The spectrum in K, for a gas cell in absorbance too, without its baseline, cut to a range."""
         from rotor.formats.spectra.read import read_spectrum
-        from rotor.observed.spectrum import in_kelvin, without_baseline
+        from rotor.observed.spectrum import ABSORBANCE, in_kelvin, without_baseline
 
-        spectrum = in_kelvin(read_spectrum(file, self.choices), self.beam)
+        spectrum = read_spectrum(file, self.choices)
+        if not (gas_cell and spectrum.unit == ABSORBANCE):
+            spectrum = in_kelvin(spectrum, self.beam)
         if range_mhz != INFINITE:
             spectrum = spectrum.between(*range_mhz)
         return spectrum if self.baseline is None else without_baseline(spectrum, self.baseline)
@@ -190,7 +192,8 @@ def json_of(spectrum: ObservedSpectrum) -> dict[str, Any]:
         "channels": len(spectrum),
         "range_mhz": [float(spectrum.frequency_mhz[0]), float(spectrum.frequency_mhz[-1])],
         "frame": spectrum.frame,
-        "noise_k": float(np.median(spectrum.noise)),
+        "unit": spectrum.unit,
+        "noise_k" if spectrum.unit == "K" else "noise": float(np.median(spectrum.noise)),
         "beam_arcsec": None if spectrum.beam_arcsec is None else list(spectrum.beam_arcsec),
         "notes": list(spectrum.notes),
     }

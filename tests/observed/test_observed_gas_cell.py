@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from observed_cases import artificial, rigid
 
-from rotor.observed.gas_cell import absorbance, fit_cell
+from rotor.observed.fit import contributions
+from rotor.observed.gas_cell import absorbance, fit_cell, start_cell
 from rotor.observed.model import Component
 from rotor.observed.spectrum import observed_spectrum
 
@@ -50,3 +51,20 @@ def test_mistakes_are_named() -> None:
     spectrum = observed_spectrum(GRID, np.zeros(len(GRID)), noise=1.0, unit="absorbance")
     with pytest.raises(ValueError, match="far: no lines"):
         fit_cell(spectrum, [Component(far, 1e15, 300.0)])
+
+
+def test_start_from_the_spectrum_and_what_brightness_alone_has() -> None:
+    """Two species, one of which is not there; a fit of absorbance has no contributions of brightness."""
+    present, absent = rigid(), rigid(7e3, "absent")
+    clean = absorbance([Component(present, 1e16, 250.0, 0.0, 3.0)], GRID)
+    noise = 0.01 * clean.max()
+    seen = clean + np.random.default_rng(3).normal(0, noise, len(GRID))
+    spectrum = observed_spectrum(GRID, seen, noise=noise, unit="absorbance")
+    start = start_cell(spectrum, [present, absent])
+    assert 0.3 < start[0].column_per_cm2 / 1e16 < 3
+    fit = fit_cell(spectrum, start)
+    assert abs(fit.temperature_k - 250.0) < 4 * fit.temperature_error_k
+    assert fit.components[1].column_per_cm2 < 5e14
+    assert "rms" in fit.facts()
+    with pytest.raises(ValueError, match="in absorbance; a fit needs brightness"):
+        contributions(fit)
