@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -18,11 +18,12 @@ from rotor.fitting.parameters import parameters, with_names
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species
 
+FitLines = Callable[[Assignments], Fit]
 MOST_DIFFERENCES = 300
 POOR_RMS = 1e9  # a poor fit is shown with its residuals, not refused
-POOR = 3.0  # weighted rms above which a wrong assignment is looked for
-BETTER = 0.3  # of the weighted rms, to which it falls without a wrong line
-TRIED = 3  # lines that are left out in turn
+POOR = 3.0  # weighted rms above which a wrong assignment is searched for
+BETTER = 0.3  # fraction of the weighted rms that remains without a wrong line, at most
+TRIED = 3  # measured frequencies that are left out, one at a time
 
 
 def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
@@ -75,59 +76,66 @@ def lines_from(assigned: Assignments, species: int, blend_from: int, default_err
 def fit_of(model: Model, lines: Mapping[int, Line]) -> Fit:
     """The fit of a species to its lines, from its constants, with its free constants.
 
-    Raises ValueError without lines or free constants, for more constants than lines, and for labels that no level has.
+    Raises ValueError without lines or free constants, for more constants than lines, and for labels without a level.
     """
-    record = model.record
+    assigned, fit = fit_problem(model, lines)
+    return fit(assigned)
+
+
+def fit_problem(model: Model, lines: Mapping[int, Line]) -> tuple[Assignments, FitLines]:
+    """The lines of a species as a fit takes them, and the fit as a function of lines."""
+    name, free = model.record.name, list(model.record.free)
     if not lines:
-        raise ValueError(f"{record.name}: no line is assigned to it; assign lines first")
-    if not record.free:
-        raise ValueError(f"{record.name}: no constant is free; mark those that the lines should determine")
+        raise ValueError(f"{name}: no line is assigned to it; assign lines first")
+    if not free:
+        raise ValueError(f"{name}: no constant is free; mark those that the lines should determine")
     assigned = assignments_of(model, lines)
-    begin = with_names(model.constants, list(record.free))
-    begin, _ = beside_zero(begin, list(record.free), assigned)
-    return fit_lines(assigned, begin, parameters(begin, list(record.free)), FitOptions(poor_rms=POOR_RMS))
+    start, _ = beside_zero(with_names(model.constants, free), free, assigned)
+    varied, options = parameters(start, free), FitOptions(poor_rms=POOR_RMS)
+    return assigned, lambda chosen: fit_lines(chosen, start, varied, options)
 
 
-def suspect(
-    fit: Fit, numbers: Sequence[int], again: Callable[[Assignments], Fit]
-) -> tuple[tuple[int, ...], float | None]:
-    """The lines, by number, of one measured frequency without which a poor fit is good, and the weighted rms then; empty without such.
+@dataclass(frozen=True)
+class WrongLines:
+    """Lines of a measured frequency that are probably assigned wrongly, and the weighted rms of the fit without them."""
 
-    To first order χ² falls by r²/(1 - h) when a datum of the weighted residual r and the leverage h is left out; the first few by
-    that number are left out in turn, and fitted `again`. numbers: of the lines of the fit.
+    numbers: tuple[int, ...] = ()
+    weighted_rms_without: float | None = None
+
+
+def probably_wrong(fit: Fit, numbers: Sequence[int], refit: FitLines) -> WrongLines:
+    """The lines without which a poor fit becomes good; empty where no measured frequency has so much influence.
+
+    To first order, χ² falls by r²/(1 - h) when a datum with the weighted residual r and the leverage h is left out. The data with
+    the largest fall are left out one at a time, and the others are fitted again. numbers: of the lines of the fit.
     """
     if not fit.weighted_rms > POOR or fit.degrees_of_freedom < 2:
-        return (), None
+        return WrongLines()
     count = len(fit.groups)
     left = 1 - fit.statistics.leverages[:count]
     falls = np.where(left > 1e-9, fit.residuals[:count] ** 2 / np.maximum(left, 1e-9), 0.0)
-    apart, least = tuple[int, ...](), BETTER * fit.weighted_rms
+    wrong, smallest = WrongLines(), BETTER * fit.weighted_rms
     for place in np.argsort(-falls)[:TRIED].tolist():
         members = fit.lines.blend == fit.lines.blend[fit.groups[place]]
         try:
-            without = again(replace(fit.lines, excluded=fit.lines.is_excluded | members))
+            without = refit(replace(fit.lines, excluded=fit.lines.is_excluded | members))
         except ValueError:
             continue  # too few lines are left
-        if without.converged and without.weighted_rms < least:
-            apart = tuple(numbers[i] for i in np.flatnonzero(members & fit.used).tolist())
-            least = without.weighted_rms
-    return (apart, least) if apart else ((), None)
+        if without.converged and without.weighted_rms < smallest:
+            smallest = without.weighted_rms
+            wrong = WrongLines(tuple(numbers[i] for i in np.flatnonzero(members & fit.used).tolist()), smallest)
+    return wrong
 
 
 def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
     """The record after a refit: constants with their errors, and the summary of the fit."""
-    record, fit = model.record, fit_of(model, lines)
+    record = model.record
+    assigned, fit_again = fit_problem(model, lines)
+    fit = fit_again(assigned)
     if not fit.converged:
         raise ValueError(f"{record.name}: the fit did not converge: {fit.reason}; the constants stay as they are")
-    fitted = fit.named
     rms, weighted = fit.rms_mhz(), fit.weighted_rms
-    lines_apart, rms_without = suspect(
-        fit,
-        list(lines),
-        lambda chosen: fit_lines(
-            chosen, with_names(model.constants, list(record.free)), fit.parameters, FitOptions(poor_rms=POOR_RMS)
-        ),
-    )
+    wrong = probably_wrong(fit, list(lines), fit_again)
     summary = FitSummary(
         converged=True,
         reason=fit.reason,
@@ -137,11 +145,11 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
         before=dict(record.constants),
         open=tuple(combination.text for combination in fit.statistics.undetermined),
         notes=fit.notes,
-        suspect=lines_apart,
-        rms_without=rms_without,
+        suspect=wrong.numbers,
+        rms_without=wrong.weighted_rms_without,
     )
-    errors = {name: error for name, error in fitted.uncertainties.items() if math.isfinite(error)}
-    return msgspec.structs.replace(record, constants=dict(fitted.values), errors=errors, fit=summary)
+    errors = {name: error for name, error in fit.named.uncertainties.items() if math.isfinite(error)}
+    return msgspec.structs.replace(record, constants=dict(fit.named.values), errors=errors, fit=summary)
 
 
 def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str, Any]:

@@ -9,8 +9,9 @@ from rotor.assignment.peak_finding import peaks_of_spectrum
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.observed.spectrum import ObservedSpectrum
-from rotor.viewer.actions import free_blend, number_of
 from rotor.viewer.fits import lines_from
+from rotor.viewer.line_actions import free_blend
+from rotor.viewer.messages import number_of
 from rotor.viewer.records import COLOURS, Record, Species, State, line_key, species_key
 
 MOST_SPECIES = 5

@@ -28,7 +28,7 @@ from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.top_constants import ConstantSet
 from rotor.fitting.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
-from rotor.viewer.fits import POOR_RMS, assignments_of, refitted, suspect
+from rotor.viewer.fits import POOR_RMS, WrongLines, assignments_of, probably_wrong, refitted
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species, State
 
@@ -136,7 +136,7 @@ def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Sp
     fit = fit_of(lines)
     if not fit.converged:
         raise ValueError(f"{names}: the fit did not converge: {fit.reason}; the constants stay as they are")
-    wrong = suspect(fit, [number for part in parts for number in part.lines], fit_of)
+    wrong = probably_wrong(fit, [number for part in parts for number in part.lines], fit_of)
     places = np.cumsum([0, *(len(part.free.names) for part in parts)]).tolist()
     return {
         part.number: _record(part, fit, slice(a, b), names, wrong)
@@ -202,7 +202,7 @@ def _joined_lines(parts: Sequence[Part], source: str) -> Assignments:
     return replace(joined, excluded=np.array([line.rejected for _, line in owners], dtype=bool))
 
 
-def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: tuple[tuple[int, ...], float | None]) -> Species:
+def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: WrongLines) -> Species:
     """A species after the fit: its constants with their errors, and how the fit describes its lines."""
     free, record = part.free, part.model.record
     values = dict(zip(free.constant_names, free.constants_of(fit.values[columns]).tolist(), strict=True))
@@ -213,11 +213,14 @@ def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: tuple[tuple
         if len(used) and np.isfinite(covariance[used, used]).all():
             errors[name] = float(np.sqrt(row[used] @ covariance[np.ix_(used, used)] @ row[used]))
     part.begin.replace(**values, uncertainties=errors)  # refuses what is no set of constants
+    summary = msgspec.structs.replace(
+        _summary(part, fit, names), suspect=wrong.numbers, rms_without=wrong.weighted_rms_without
+    )
     return msgspec.structs.replace(
         record,
         constants={**dict(part.begin.values), **values},
         errors={name: error for name, error in errors.items() if math.isfinite(error)},
-        fit=msgspec.structs.replace(_summary(part, fit, names), suspect=wrong[0], rms_without=wrong[1]),
+        fit=summary,
     )
 
 

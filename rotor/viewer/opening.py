@@ -13,10 +13,11 @@ import numpy as np
 from rotor.assignment.peaks import PeakList
 from rotor.formats.packed import first_bytes
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
-from rotor.viewer.actions import Context, add_species
+from rotor.viewer.messages import Context
 from rotor.viewer.records import SpectrumFile
 from rotor.viewer.service import Service
 from rotor.viewer.session import SUFFIX, Session, check_spectrum, is_session, read_session, spectrum_file
+from rotor.viewer.species_actions import add_species
 
 Note = Callable[[str], None]
 ALIKE = 0.1  # relative difference of neighbouring steps of a spectrum; those of a list of peaks are random

@@ -18,20 +18,13 @@ from rotor.arrays import Floats
 from rotor.assignment.peaks import PeakList
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.version import version
-from rotor.viewer.actions import (
-    ACTIONS,
-    REFITTED_AFTER,
-    Context,
-    constants_in,
-    import_lines,
-    number_of,
-    peak_in,
-    species_of,
-)
+from rotor.viewer.actions import ACTIONS, REFITTED_AFTER
 from rotor.viewer.exports import exported
 from rotor.viewer.fits import levels_of
 from rotor.viewer.joint_fits import lines_alone, refits, residuals_of, shared_blends
+from rotor.viewer.line_actions import import_lines, peak_in
 from rotor.viewer.loomis_wood import centres_of, rows_of, rows_of_labels
+from rotor.viewer.messages import Context, constants_of, number_of, species_of
 from rotor.viewer.prediction import Model, Predicted, Predictions, changed
 from rotor.viewer.pyramid import pyramid
 from rotor.viewer.records import Line, Record, Species, species_key
@@ -187,7 +180,7 @@ class Service:
         if "temperature_k" in preview:
             record = msgspec.structs.replace(record, temperature_k=number_of(preview, "temperature_k", above=0))
         if "constants" in preview:
-            record = changed(record, constants_in(preview))
+            record = changed(record, constants_of(preview))
         if "dipole_abc_debye" in preview:
             a, b, c = (float(x) for x in preview["dipole_abc_debye"])
             record = msgspec.structs.replace(record, dipole_abc_debye=(a, b, c))
