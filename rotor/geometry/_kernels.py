@@ -1,6 +1,6 @@
-"""Compiled forms of the quaternion algebra, for the kernels of other modules, and how a plain function is compiled.
+"""Compiled forms of the quaternion algebra for the kernels of other modules, and the compiler of plain functions.
 
-The source of each is the plain function of `quaternions.py`; nothing is written a second time.
+Each compiled form is made from the plain function in `quaternions.py`, so that no formula is written twice.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from rotor.geometry import quaternions
 
 
 def inlined(function: Callable[..., Any], **callees: Any) -> Any:
-    """The compiled form of a plain function, inlined where it is called and optimised as its caller is.
+    """The compiled form of a plain function, inlined into its caller and optimised with it.
 
-    `callees` are compiled forms of the plain functions that it calls, by the names that it calls them by.
+    `callees` : compiled forms of the plain functions that it calls, by name.
     """
     plain: Any = function
     copy = FunctionType(plain.__code__, {**plain.__globals__, **callees}, plain.__name__, plain.__defaults__)

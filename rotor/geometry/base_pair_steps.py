@@ -1,12 +1,12 @@
-"""Rigid base pairs of DNA: the step from one to the next by six parameters, and how stiff a chain of them is.
+"""Rigid base pairs of DNA: the six parameters of a base-pair step, and the persistence length of a chain.
 
-The parameters are shift, slide, rise (lengths along x, y, z) and tilt, roll, twist (degrees, about x, y, z) in the frame half way
+The parameters are shift, slide, rise (lengths along x, y, z) and tilt, roll, twist (degrees, about x, y, z) in the frame halfway
 between the two pairs (M. A. El Hassan, C. R. Calladine, J. Mol. Biol. 251, 648 (1995)):
 
     q = Z(twist/2) B Z(twist/2),   B = exp(tilt, roll, 0),   p = Z(twist/2) B^½ (shift, slide, rise).
 
-Multiplied out, q = (cos Γ/2 cos Ω/2, sin Γ/2 (tilt, roll)/Γ, cos Γ/2 sin Ω/2) with Γ = √(tilt² + roll²), Ω the twist, which gives
-the way back.
+Multiplied out, q = (cos Γ/2 cos Ω/2, sin Γ/2 (tilt, roll)/Γ, cos Γ/2 sin Ω/2) with Γ = √(tilt² + roll²) and Ω the twist. The
+inverse follows from this form.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.geometry.rotations import conjugate, exp, multiply, rotate, to_matrix
 
-NODES = 5  # of Gauss and Hermite in each angle: polynomials of order 9 in the angles are exact
+NODES = 5  # Gauss-Hermite points per angle: exact for polynomials of degree 9 in the angles
 
 
 def step_pose(parameters: ArrayLike) -> tuple[Floats, Floats]:
@@ -39,7 +39,7 @@ def step_pose(parameters: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def step_parameters(q: ArrayLike, position: ArrayLike) -> Floats:
-    """The six parameters (..., 6) of a step: the way back from `step_pose`, for bends below 180 degrees.
+    """The six parameters (..., 6) of a step, the inverse of `step_pose`, for bends below 180 degrees.
 
     >>> step_parameters(*step_pose([0.1, -0.2, 3.3, -1.4, 4.5, 35.1])).round(12).tolist()
     [0.1, -0.2, 3.3, -1.4, 4.5, 35.1]
@@ -57,7 +57,7 @@ def step_parameters(q: ArrayLike, position: ArrayLike) -> Floats:
 
 
 def mean_rotation(mean_degrees: ArrayLike, covariance_degrees2: ArrayLike) -> Floats:
-    """⟨R⟩ (..., 3, 3) of steps whose tilt, roll, twist are normal, by Gauss and Hermite's quadrature.
+    """⟨R⟩ (..., 3, 3) of steps with normally distributed tilt, roll, twist, by Gauss-Hermite quadrature.
 
     mean_degrees: (..., 3). covariance_degrees2: (..., 3, 3), of the three angles.
 
@@ -76,10 +76,10 @@ def mean_rotation(mean_degrees: ArrayLike, covariance_degrees2: ArrayLike) -> Fl
 
 
 def persistence_steps(rotation: ArrayLike) -> float:
-    """Steps over which the direction of a chain of independent steps decays by e, from ⟨R⟩ (3, 3) of a step.
+    """Number of independent steps over which the direction of a chain decays to 1/e, from ⟨R⟩ (3, 3) of a step.
 
-    ⟨z_0·z_n⟩ = zᵀ ⟨R⟩ⁿ z decays with the largest real eigenvalue λ of ⟨R⟩ (the complex pair belongs to directions that the
-    twist turns round): -1/ln λ.
+    This is -1/ln λ: ⟨z_0·z_n⟩ = zᵀ ⟨R⟩ⁿ z decays with the largest real eigenvalue λ of ⟨R⟩. (The complex pair belongs to
+    directions that rotate with the twist.)
 
     >>> round(persistence_steps(np.diag([0.5, 0.5, np.exp(-0.02)])), 9)
     50.0

@@ -1,6 +1,6 @@
-"""Sums and products of doubles with their rounding errors, exactly: the one place where a double is split in two.
+"""Exact rounding errors of sums and products of doubles.
 
-Each function takes floats or arrays and is compiled by `_kernels.py` for the kernels that need it.
+The functions accept floats or arrays; `_kernels.py` compiles them for kernels.
 
 T. J. Dekker, Numer. Math. 18, 224 (1971); D. E. Knuth, The Art of Computer Programming, volume 2, section 4.2.2.
 """
@@ -13,7 +13,7 @@ SPLITTER = 134217729.0  # 2^27 + 1
 
 
 def halves(a: Any) -> Any:
-    """a as the sum of a number of 26 bits and the rest (Veltkamp); not for |a| above 1e300, which overflows.
+    """a split into a number of 26 bits and the remainder (Veltkamp); overflows for |a| above 1e300.
 
     >>> halves(1.0 + 2.0**-30) == (1.0, 2.0**-30)
     True

@@ -1,6 +1,6 @@
-"""Inertia tensors of point masses, plates and solids, and the principal frame made unique.
+"""Inertia tensors of point masses, plates and solids, and a unique principal frame.
 
-I = Σ m (r² 1 - r rᵀ) about the centre of mass; bodies add after a shift by Steiner's rule I' = I + m (d² 1 - d dᵀ)
+I = Σ m (r² 1 - r rᵀ) about the centre of mass; tensors of bodies add after a shift by Steiner's rule I' = I + m (d² 1 - d dᵀ)
 (L. D. Landau and E. M. Lifshitz, Mechanics, § 32).
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 
-LINEAR_BELOW = 1e-6  # I_a / I_c below which a body is linear, unless the caller says otherwise
-EQUAL_MOMENTS = 1e-6  # relative difference below which two moments count as equal, unless the caller says otherwise
+LINEAR_BELOW = 1e-6  # default of I_a / I_c below which a body is linear
+EQUAL_MOMENTS = 1e-6  # default relative difference below which two moments count as equal
 _SAME = 1e-5  # relative difference below which two odd moments of the masses do not decide a sign
 
 # a^i b^j c^k whose sums over the masses distinguish frames that differ by the signs of two axes
@@ -95,7 +95,7 @@ def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Body:
 
 
 def triangle(mass: float, corners: ArrayLike) -> Body:
-    """A uniform triangular plate with corners (3, 3): the same as m/3 at the middle of each side."""
+    """A uniform triangular plate with corners (3, 3); it has the tensor of point masses m/3 at the middles of its sides."""
     r = np.asarray(corners, dtype=float)
     return point_masses([mass / 3] * 3, (r + np.roll(r, 1, axis=0)) / 2)
 
@@ -157,7 +157,7 @@ def principal_frame(
     body : Body
         Mass, centre and tensor.
     masses, positions : (n,) array, (n, 3) array, optional
-        The point masses that make the body; with them the frame is unique.
+        The point masses of the body; with them the frame is unique.
     equal : float
         Relative difference below which two moments count as equal.
 
@@ -168,9 +168,9 @@ def principal_frame(
 
     Notes
     -----
-    Of all frames that the tensor allows, the one is taken whose odd moments Σ m a³, Σ m b³, Σ m c³, Σ m a b², ... come first in
-    order of size. Frames that this does not distinguish are alike by symmetry. Where moments coincide within `equal`, candidates
-    inside the degenerate space point at the masses with the largest m ρ².
+    Among the frames that the tensor allows, that with the largest odd moments Σ m a³, Σ m b³, Σ m c³, Σ m a b², ... (compared in this
+    order) is chosen. Frames with the same odd moments are equivalent by symmetry. If moments are equal within `equal`, the candidate
+    axes in the degenerate space point at the masses with the largest m ρ².
 
     >>> frame = principal_frame(Body(1.0, np.zeros(3), np.array([[5.0, -2, 0], [-2, 8, 0], [0, 0, 13]])))
     >>> [round(float(m), 12) for m in frame.moments], np.round(frame.axes[0] * 5**0.5, 12).tolist()
@@ -197,7 +197,7 @@ def principal_frame(
 
 
 def _signed_by_components(axes: Floats) -> Floats:
-    """Signs where nothing but the tensor is known: the largest component of a and of b positive, c = a × b."""
+    """Signs without point masses: the largest component of a and of b is positive, c = a × b."""
     a, b = (axis * np.sign(axis[np.argmax(np.round(np.abs(axis), 9))]) for axis in axes[:2])
     return np.array([a, b, np.cross(a, b)])
 
@@ -216,7 +216,7 @@ def _unique(axes: Floats, moments: Floats, masses: Floats, positions: Floats, eq
 
 
 def _moment_tensors(masses: Floats, x: Floats) -> dict[int, Floats]:
-    """Σ m x_i x_j x_k ... of third, fourth and fifth order, (3, 3, 3) and so on: once for all frames, however many masses."""
+    """Σ m x_i x_j x_k ... of third, fourth and fifth order, (3, 3, 3) and so on, computed once for all frames."""
     pairs = np.einsum("ni,nj->nij", x, x).reshape(len(x), 9)
     triples = np.einsum("ni,nj->nij", pairs, masses[:, None] * x).reshape(len(x), 27)
     return {k: (rest.T @ triples).reshape((3,) * k) for k, rest in ((3, np.ones((len(x), 1))), (4, x), (5, pairs))}
@@ -236,7 +236,7 @@ def _right_handed(frame: Floats) -> Floats:
 
 
 def _frames(axes: Floats, moments: Floats, masses: Floats, positions: Floats, equal: float) -> Iterator[Floats]:
-    """All frames to choose from: the signs of two axes, and inside degenerate spaces the directions of far masses."""
+    """The candidate frames: both signs of two axes, and directions to far masses in degenerate spaces."""
     ab, bc = _close(moments[0], moments[1], equal), _close(moments[1], moments[2], equal)
     if ab and bc:
         bases = [
@@ -257,7 +257,7 @@ def _close(low: float, high: float, equal: float) -> bool:
 
 
 def _far(vectors: Floats, masses: Floats) -> list[Floats]:
-    """Unit vectors to the masses whose m ρ² is largest (all that tie), at most 60 of them."""
+    """Unit vectors to the masses with the largest m ρ² (ties included), at most 60."""
     weight = masses * (vectors**2).sum(axis=1)
     if weight.max() < 1e-12:
         return []
@@ -266,7 +266,7 @@ def _far(vectors: Floats, masses: Floats) -> list[Floats]:
 
 
 def _across(axis: Floats, positions: Floats, masses: Floats) -> list[Floats]:
-    """Principal directions of the positions projected across an axis; any direction where all lie on it."""
+    """Principal directions of the positions projected onto the plane across an axis; any direction if all lie on it."""
     across = positions - np.outer(positions @ axis, axis)
     spread = float((positions**2).sum(axis=1).max())
     if (across**2).sum(axis=1).max() > 1e-10 * spread:

@@ -1,8 +1,8 @@
-"""The algebra of quaternions and vectors by components: the one place where its products are written.
+"""The algebra of quaternions and vectors by components.
 
-Every function takes and returns tuples of components, (w, x, y, z) or three of a vector. A component is a float, or an
-array of any shape: `rotations.py` calls these functions with arrays, and compiled kernels compile these very functions
-(`_kernels.py`). Quaternions are of unit length, scalar first, body to space, as in `rotations.py`.
+All functions take and return tuples of components: (w, x, y, z), or three of a vector. A component is a float or an array of any
+shape: `rotations.py` calls these functions with arrays, and `_kernels.py` compiles them for kernels. Quaternions have unit length,
+scalar first, body to space, as in `rotations.py`.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def matrix(q: Any) -> Any:
 
 
 def to_third(direction: Any) -> Any:
-    """A rotation that takes a unit vector (three floats) to the third axis, by way of a half turn about the second if it is down.
+    """A rotation that takes a unit vector (three floats) to the third axis; downward vectors are first turned by π about the second.
 
     >>> to_third((0.0, 0.0, -1.0))
     (-0.0, 0.0, 1.0, 0.0)

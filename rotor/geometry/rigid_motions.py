@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.geometry.rotations import exp, log, multiply, rotate, to_matrix
 
-SERIES_BELOW = 1.0  # rad: under it the coefficients of exp and log are summed as series, which do not cancel
+SERIES_BELOW = 1.0  # rad: below it the coefficients of exp and log are summed as series to avoid cancellation
 TERMS = 10  # x²⁰/23! is below 1e-22 at x = 1
 
 
@@ -152,8 +152,8 @@ def screw_of(q: ArrayLike, position: ArrayLike) -> Screw:
 def bracket(first: ArrayLike, second: ArrayLike) -> Floats:
     """The Lie bracket (..., 6) of twists, (ω1 x ω2, ω1 x v2 - ω2 x v1).
 
-    Moving by s along the first, s along the second, and back along each, is exp(s² [first, second]) up to order s³: how motions
-    that are allowed make one that is not.
+    Moving by s along the first, s along the second, and back along each is exp(s² [first, second]) up to order s³: a sequence of
+    allowed motions can produce a motion that is not allowed.
 
     >>> bracket([0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]).tolist()  # turning and driving make a sideways motion
     [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]

@@ -1,9 +1,9 @@
 """Rigid parts of a body found from two positions of its points: the domains of a protein, and the screw of each.
 
-Each point with its neighbours gives a motion (the best superposition); the motion that carries most points to where they are found
-makes a part, is fitted again to its points until these stay the same, and the rest is searched likewise. The idea of clustering the
-motions of short pieces is that of S. Hayward and H. J. C. Berendsen, Proteins 30, 144 (1998); here points are counted that follow a
-motion within a tolerance.
+Each point with its neighbours gives a trial motion (the best superposition). The motion that most points follow within a tolerance
+defines a part; it is refitted to its points until these no longer change. The remaining points are searched in the same way.
+Clustering the motions of short pieces is the idea of S. Hayward and H. J. C. Berendsen, Proteins 30, 144 (1998); here points that
+follow a motion are counted instead.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rotor.geometry.rigid_motions import Screw, compose, screw_of
 from rotor.geometry.rotations import conjugate, rotate
 from rotor.geometry.superposition import superpose
 
-ROUNDS = 50  # of fitting a motion and counting again which points follow it; a part is settled after a few
+ROUNDS = 50  # most rounds of refitting a motion and recounting its points; a few suffice
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,23 +39,23 @@ class RigidPart:
 def rigid_parts(
     before: ArrayLike, after: ArrayLike, tolerance: float, smallest: int = 8, neighbours: int = 8
 ) -> list[RigidPart]:
-    """The rigid parts of n points, the largest first; points that follow none are in none.
+    """The rigid parts of n points, largest first; some points may belong to no part.
 
     Parameters
     ----------
     before, after : (n, 3) array
         Positions of the same points.
     tolerance : float
-        How far a point of a part may be from where its motion carries it.
+        Largest distance of a point from its position predicted by the motion of its part.
     smallest : int
-        Number of points of the smallest part.
+        Smallest number of points in a part.
     neighbours : int
-        Points of which a first motion is made.
+        Number of points for a trial motion.
 
     Returns
     -------
     list of RigidPart
-        Without a common point.
+        Disjoint parts.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def rigid_parts(
 
 
 def _largest(x: Floats, y: Floats, tolerance: float, neighbours: int) -> NDArray[np.bool_]:
-    """Which points (n,) follow the motion that most follow."""
+    """Which points (n,) follow the motion with the most followers."""
     apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
     near = np.argsort(apart, axis=-1, kind="stable")[:, :neighbours]
     seeds = superpose(x[near], y[near])

@@ -55,11 +55,11 @@ class FlowGradient:
 
 
 def superpose(mobile: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Superposition:
-    """The proper rotation and the translation that lay `mobile` (..., n, 3) best onto `target` (..., n, 3).
+    """The proper rotation and translation that best superpose `mobile` (..., n, 3) on `target` (..., n, 3).
 
     Minimises Σ w |R x + t - y|². With centred clouds and C = Σ w y xᵀ = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ
     (W. Kabsch, Acta Cryst. A32, 922 (1976); A34, 827 (1978)): a rotation for planar and mirrored clouds too.
-    weights: (..., n), not negative, e.g. masses; equal where left out.
+    weights: (..., n), not negative, e.g. masses; default: equal.
 
     >>> square = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     >>> fit = superpose(square, square @ np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]) + [1, 2, 3])  # a quarter turn

@@ -1,1 +1,1 @@
-"""Degrees of freedom, the test of equipartition, least squares and what a fit knows of its parameters."""
+"""Degrees of freedom, the test of equipartition, least squares, and the statistics of fitted parameters."""

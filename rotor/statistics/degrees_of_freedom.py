@@ -1,8 +1,8 @@
-"""How many degrees of freedom there are: the one count that temperatures, thermostats and tests of equipartition use.
+"""The number of degrees of freedom for temperatures, thermostats and tests of equipartition.
 
-A rigid body has 3 translations and 3 rotations; a linear one 2 rotations, an atom none. What is removed (the total
-momentum: 3) is subtracted. N atoms held together by forces instead have 3N - 6 vibrations, 3N - 5 in a line (G. Herzberg,
-Molecular Spectra and Molecular Structure II, chapter II, 2). Nothing is stored: each box is counted anew.
+A rigid body has 3 translations and 3 rotations; a linear body has 2 rotations, an atom none. Conserved totals that are removed from
+the motion (3 for the total momentum) are subtracted. A molecule of N atoms bound by forces has 3N - 6 vibrations, 3N - 5 if linear
+(G. Herzberg, Molecular Spectra and Molecular Structure II, chapter II, 2).
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.geometry.inertia import LINEAR_BELOW
 
-NEARLY = 1e3  # a body within this factor of the limit between linear and bent is listed in the notes
+NEARLY = 1e3  # bodies within this factor of the limit between linear and bent are noted
 
 
 @dataclass(frozen=True)
 class Degrees:
-    """The count for a box of rigid bodies.
+    """The degrees of freedom of a box of rigid bodies.
 
-    bodies: how many. translation, rotation: degrees that move, what is removed already subtracted. removed: how many
-    were. notes: bodies whose count depends on the rule for linear ones, with the number that decided.
+    bodies: their number. translation, rotation: degrees of freedom after subtraction of `removed`. removed: conserved totals.
+    notes: bodies near the limit between linear and bent, with the ratio that decided.
     """
 
     bodies: int
@@ -37,7 +37,7 @@ class Degrees:
         return self.translation + self.rotation
 
     def kt(self, kinetic_energy: float) -> float:
-        """kT = 2E/f of a kinetic energy in all f degrees, in the unit of the energy; ValueError where f is 0."""
+        """kT = 2E/f from the kinetic energy in all f degrees, in the unit of the energy; ValueError if f is 0."""
         if self.total == 0:
             raise ValueError(f"{self.bodies} bodies with no degree of freedom left have no temperature")
         return 2.0 * kinetic_energy / self.total
@@ -46,8 +46,8 @@ class Degrees:
 def rotating_axes(moments: ArrayLike, linear_below: float = LINEAR_BELOW) -> NDArray[np.bool_]:
     """Which principal axes a body can turn about, (..., 3), from its moments (..., 3); an atom has three moments of 0.
 
-    An axis counts when its moment is at least `linear_below` times the largest of the body: a ratio, so that small
-    moments in any unit still turn. A triatomic bent by 1e-3 rad (a ratio of 5e-8 to 8e-8) is linear by this rule.
+    An axis counts if its moment is at least `linear_below` times the largest moment of the body; a ratio does not depend on the
+    unit. A triatomic bent by 1e-3 rad (a ratio of 5e-8 to 8e-8) is linear by this rule.
 
     >>> rotating_axes([[0.0, 2.0, 2.0], [1e-30, 2e-30, 3e-30], [0.0, 0.0, 0.0]]).sum(axis=-1)
     array([2, 3, 0])
@@ -65,10 +65,10 @@ def rotating_axes(moments: ArrayLike, linear_below: float = LINEAR_BELOW) -> NDA
 
 
 def count_degrees(moments: ArrayLike, *, removed: int = 0, linear_below: float = LINEAR_BELOW) -> Degrees:
-    """The degrees of freedom of N rigid bodies with moments (N, 3), linear ones and atoms among them.
+    """The degrees of freedom of N rigid bodies with moments (N, 3), including linear bodies and atoms.
 
-    removed: conserved totals taken out of the motion, 3 where the total momentum is held at zero. They are subtracted
-    from the translations, which is where they were. Raises ValueError where more would be removed than there are.
+    removed: conserved totals, 3 if the total momentum is held at zero; subtracted from the translations. Raises ValueError if
+    `removed` exceeds the number of translations.
 
     >>> box = count_degrees([[0.6, 1.3, 1.9]] * 10 + [[0, 80, 80]] * 5 + [[0, 0, 0]], removed=3)
     >>> box.translation, box.rotation, box.total
@@ -84,7 +84,7 @@ def count_degrees(moments: ArrayLike, *, removed: int = 0, linear_below: float =
 
 
 def _doubts(moments: NDArray[np.float64], linear_below: float) -> tuple[str, ...]:
-    """One note for each kind of body that is within a factor `NEARLY` of the limit of linear ones."""
+    """A note for each kind of body within a factor `NEARLY` of the limit between linear and bent."""
     if not len(moments):
         return ()
     notes = []
@@ -111,10 +111,10 @@ def vibrational_degrees(atoms: int, linear: bool) -> int:
 
 
 def atomic_degrees(atoms: int, constraints: int = 0, removed: int = 0) -> int:
-    """Degrees of N atoms that move by themselves, 3N less independent constraints less removed totals.
+    """Degrees of freedom of N atoms: 3N minus independent constraints minus removed totals.
 
-    A rigid body of n atoms takes 3n - 6 constraints, a linear one 3n - 5: not the n(n-1)/2 distances, of which a line of
-    three has three where four degrees are gone. Rigid bodies are better counted as such, by `count_degrees`.
+    A rigid body of n atoms needs 3n - 6 constraints, a linear one 3n - 5. This is not the number n(n-1)/2 of distances: a linear
+    triatomic has 3 distances but 4 constraints. Rigid bodies are better counted by `count_degrees`.
 
     >>> atomic_degrees(3 * 216, 3 * 216, 3), count_degrees([[0.6, 1.3, 1.9]] * 216, removed=3).total
     (1293, 1293)

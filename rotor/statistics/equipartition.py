@@ -1,20 +1,20 @@
-"""Equipartition as a test of statistics: does each degree of freedom hold ½ kT, and its energies the right spread?
+"""Statistical test of equipartition: mean ½ kT and the correct distribution in each degree of freedom.
 
-In a classical canonical ensemble every momentum is a normal deviate, so that 2E/kT of one degree of one molecule follows χ²
-with one degree: mean 1, variance 2 (Landau and Lifshitz, Statistical Physics, section 44). Of n independent molecules
+In a classical canonical ensemble each momentum is normally distributed, so that 2E/kT of a degree of freedom of a molecule follows χ²
+with one degree: mean 1, variance 2 (Landau and Lifshitz, Statistical Physics, section 44). For n independent molecules
 
-    Σ 2E/kT  ~  χ²_n                                   exactly, and with it each mean, two-sided;
-    z_i, the same probability as a normal deviate,     says by how many σ degree i is off;
-    Σ_i z_i²  ~  χ²_k                                  over all k degrees: one statement for the family.
+    Σ 2E/kT  ~  χ²_n                          exactly; gives a two-sided test of each mean;
+    z_i, the equivalent normal deviate,       is the deviation of degree i in units of σ;
+    Σ_i z_i²  ~  χ²_k                         is a joint test of all k degrees.
 
-The shape of the distribution is tested by the largest distance of Kolmogorov and Smirnov, the smallest probability of k
-degrees by Šidák's rule. Accepted is what neither statement rejects, each at half of 1 - confidence (Bonferroni), so that an
-honest ensemble is rejected at most so often; which degrees fail is decided by Holm's rule.
+The shape of the distribution is tested by the Kolmogorov-Smirnov distance, with Šidák's rule for the smallest probability of k
+degrees. The ensemble is accepted if neither test rejects at (1 - confidence)/2 (Bonferroni), so that a correct ensemble is rejected
+with a probability of at most 1 - confidence. Failing degrees are identified by Holm's rule.
 
-Frames of a trajectory are correlated. The spread of a degree's mean over F frames is then var g/F, with the statistical
-inefficiency g = 1 + 2 Σ ρ(t) of its series of frame means, summed to the window t >= 5 g/2 (A. D. Sokal, in Functional
-Integration, NATO ASI B 361, 131 (1997), section 3.3), and Student's distribution instead of the normal one, with
-F/(5g + 1) degrees, the precision of that estimate (his equation 3.19). The effective sample size is 2/spread².
+Frames of a trajectory are correlated. The variance of a mean over F frames is then var g/F, with the statistical inefficiency
+g = 1 + 2 Σ ρ(t) of the series of frame means, summed up to t >= 5 g/2 (A. D. Sokal, in Functional Integration, NATO ASI B 361, 131
+(1997), section 3.3). Student's distribution replaces the normal one, with F/(5g + 1) degrees of freedom, the precision of g (his
+equation 3.19). The effective sample size is 2/spread².
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from rotor.table import Table
 
 Groups = list[tuple[str, NDArray[np.int64]]]
 
-WINDOW = 5.0  # correlation times after which the sum of correlations stops
-LEAST_INDEPENDENT = 25  # frames, in statistical inefficiencies, that a series must hold
-MOST_FOLLOWED = 256  # molecules whose own correlations are followed
+WINDOW = 5.0  # window of the sum of correlations, in correlation times
+LEAST_INDEPENDENT = 25  # smallest number of frames, in statistical inefficiencies
+MOST_FOLLOWED = 256  # molecules whose individual correlations are computed
 
 
 @dataclass(frozen=True)
 class KineticDegrees:
     """Kinetic energies by degree of freedom.
 
-    energies: by name, (n,) of n molecules or (frames, n). counts: how many degrees these n energies are together: n, less
-    the share of what was removed.
+    energies: by name, (n,) for n molecules or (frames, n). counts: number of degrees of freedom of these n energies: n minus the share
+    of removed totals.
     """
 
     energies: Mapping[str, Floats]
@@ -58,11 +58,11 @@ class KineticDegrees:
 
 @dataclass(frozen=True)
 class DegreeTest:
-    """One degree of freedom.
+    """Test of a degree of freedom.
 
     mean: of 2E/kT, 1 expected. spread: standard deviation of 2E/kT among molecules, √2 expected. mean_spread: expected
-    standard deviation of the mean. effective: how many independent energies would give that. sigma: how far the mean is off,
-    p_value: how often chance alone is as far. ks_distance, ks_p_value: of the distribution from χ²_1.
+    standard deviation of the mean. effective: effective number of independent energies. sigma: deviation of the mean in units of its
+    standard deviation. p_value: probability of such a deviation by chance. ks_distance, ks_p_value: comparison with χ²_1.
     """
 
     name: str
@@ -80,10 +80,10 @@ class DegreeTest:
 
 @dataclass(frozen=True, repr=False)
 class Equipartition(Table):
-    """The answer for all degrees.
+    """Test of all degrees of freedom.
 
-    kt: in the unit of the energies; given, or found from the data (`kt_given`). chi2, chi2_degrees, chi2_p: Σ z². ks_p: of
-    the worst distribution among all. p_value: of both statements together. failing: degrees rejected by Holm's rule.
+    kt: in the unit of the energies, given or estimated from the data (`kt_given`). chi2, chi2_degrees, chi2_p: Σ z². ks_p: of
+    the worst distribution. p_value: of both tests together. failing: degrees rejected by Holm's rule.
     """
 
     kt: float
@@ -100,7 +100,7 @@ class Equipartition(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the test found."""
+        """Result of the test for the provenance record."""
         return {
             "accepted": self.accepted,
             "p_value": self.p_value,
@@ -111,12 +111,12 @@ class Equipartition(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """One row for each degree."""
+        """A row for each degree of freedom."""
         names = DegreeTest.__dataclass_fields__
         return {name: np.array([getattr(degree, name) for degree in self.degrees]) for name in names}
 
     def __str__(self) -> str:
-        """One sentence: accepted or not, the figures behind it, and which degree is off by how many σ."""
+        """A sentence: accepted or not, the test values, and the largest deviation in σ."""
         worst = max(self.degrees, key=lambda degree: abs(degree.sigma))
         word = "accepted" if self.accepted else "rejected"
         named = f"; failing: {', '.join(self.failing)}" if self.failing else ""
@@ -137,18 +137,18 @@ def kinetic_degrees(
     momentum_removed: bool = False,
     linear_below: float = LINEAR_BELOW,
 ) -> KineticDegrees:
-    """Energies by degree of freedom of N rigid bodies, at one moment or along a trajectory, in any coherent units.
+    """Energies by degree of freedom of N rigid bodies, for one frame or a trajectory, in any coherent units.
 
     Parameters
     ----------
     masses, velocities : (N,) array, (N, 3) or (frames, N, 3) array, optional
-        Of the centres of mass.
+        Masses and centre-of-mass velocities.
     moments, momenta : (N, 3) array, (N, 3) or (frames, N, 3) array, optional
         Principal moments, and angular momenta in principal axes. Either pair may be left out.
     species : sequence of str, optional
-        N names, to test each kind by itself.
+        N names, to test species separately.
     momentum_removed : bool
-        The total momentum is held at zero; a species of mass fraction w then has n - w degrees along each direction.
+        Whether the total momentum is held at zero; a species of mass fraction w then has n - w degrees along each direction.
     linear_below : float
         Ratio of a moment to the body's largest below which an axis carries no degree of freedom.
 
@@ -160,7 +160,7 @@ def kinetic_degrees(
     Raises
     ------
     ValueError
-        Energy about an axis that carries no degree of freedom; shapes that do not fit.
+        Energy about an axis without a degree of freedom; inconsistent shapes.
 
     Examples
     --------
@@ -201,7 +201,7 @@ def _translations(mass: Floats, v: Floats, groups: Groups, removed: bool) -> lis
 
 
 def _rotations(inertia: Floats, m: Floats, groups: Groups, linear_below: float) -> list[tuple[str, Floats, float]]:
-    """Name, energies and count about each axis that bodies of a species can turn about."""
+    """Name, energies and count about each axis of rotation of a species."""
     turns = rotating_axes(inertia, linear_below)
     if np.any(~turns & (m != 0.0)):
         raise ValueError(
@@ -225,15 +225,14 @@ def equipartition(
     *,
     confidence: float = 0.99,
 ) -> Equipartition:
-    """Whether kinetic energies are those of thermal equilibrium, degree by degree and as one statement.
+    """Test whether kinetic energies are in thermal equilibrium, for each degree of freedom and jointly.
 
-    energies: of `kinetic_degrees`, or by name, (n,) of n independent molecules or (frames, n) of a trajectory (independent
-    frames are no trajectory: put them into one row). kt: the temperature that should be, in the unit of the energies;
-    None: that of the data, so that only differences between degrees are tested (k - 1 of them). confidence: an honest
-    ensemble is rejected with a probability of at most 1 - confidence.
+    energies: from `kinetic_degrees`, or by name, (n,) for n independent molecules or (frames, n) for a trajectory (put independent
+    frames into one row). kt: expected kT in the unit of the energies; None: estimated from the data, so that only the k - 1
+    differences between degrees are tested. confidence: a correct ensemble is rejected with a probability of at most 1 - confidence.
 
-    Raises ValueError for a series too short for its correlation (fewer than 25 statistical inefficiencies), which energies
-    that never change, as those of free flight, always are: give one moment of these.
+    Raises ValueError for a series too short for its correlation (fewer than 25 statistical inefficiencies). Constant energies, as
+    in free flight, are always too short: use a single frame.
 
     >>> rng = np.random.default_rng(7)
     >>> cold = {"x": rng.chisquare(1, 4000) / 2, "y": 0.9 * rng.chisquare(1, 4000) / 2}
@@ -259,7 +258,7 @@ def equipartition(
 
 @dataclass(frozen=True)
 class _Mean:
-    """Mean of 2E/kT, its expected spread, Student's degrees behind that (None: exact χ² of `count`), and z, p."""
+    """Mean of 2E/kT, its expected spread, Student's degrees of freedom (None: exact χ² of `count`), and z, p."""
 
     name: str
     count: float
@@ -299,7 +298,7 @@ def _checked(name: str, values: ArrayLike) -> Floats:
 
 
 def _mean_of(name: str, ratios: Floats, count: float) -> _Mean:
-    """The mean over molecules and frames and how far chance may take it."""
+    """The mean over molecules and frames, with its expected statistical spread."""
     if len(ratios) == 1:
         return _Mean(name, count, float(ratios.sum()) / count, math.sqrt(2.0 / count), None, 1)
     series = ratios.sum(axis=1) / count
@@ -321,8 +320,8 @@ def _mean_of(name: str, ratios: Floats, count: float) -> _Mean:
 def statistical_inefficiency(series: ArrayLike, mean: float | None = None, variance: float | None = None) -> float:
     """g = 1 + 2 Σ ρ(t) of series (frames, n), correlations averaged over the n columns; at least 1.
 
-    mean, variance: known ones; else each column's own mean is taken off and the variance is that of the data. The sum stops
-    at t >= 5 g/2 (Sokal's automatic window), or at the length of the series if it never gets there.
+    mean, variance: expected values; by default those of the data, with a separate mean for each column. The sum ends
+    at t >= 5 g/2 (Sokal's automatic window), or at the end of the series.
 
     >>> rng = np.random.default_rng(1)
     >>> 0.9 < statistical_inefficiency(rng.normal(size=(20000, 1))) < 1.1
@@ -337,14 +336,14 @@ def statistical_inefficiency(series: ArrayLike, mean: float | None = None, varia
     correlation = irfft(power.mean(axis=1), next_fast_len(2 * frames))[:frames] / (frames - np.arange(frames))
     scale = correlation[0] if variance is None else variance
     if not scale > 0.0:
-        return float(frames)  # nothing ever changes
+        return float(frames)  # constant series
     g = 2.0 * np.cumsum(correlation / scale) - correlation[0] / scale
     ends = np.flatnonzero(np.arange(frames) >= 0.5 * WINDOW * g)
     return max(1.0, float(g[ends[0]])) if len(ends) else float(frames)
 
 
 def _expected(means: Sequence[_Mean], from_data: bool) -> tuple[float, float]:
-    """What the means should be, and the variance of that: 1 exactly, or the common mean of all degrees."""
+    """The expected mean and its variance: exactly 1, or the common mean of all degrees."""
     if not from_data:
         return 1.0, 0.0
     if len(means) < 2:
@@ -354,7 +353,7 @@ def _expected(means: Sequence[_Mean], from_data: bool) -> tuple[float, float]:
 
 
 def _with_deviation(mean: _Mean, expected: float, variance: float) -> _Mean:
-    """z and two-sided p: of χ² where it is exact, else of Student's or the normal distribution."""
+    """z and two-sided p from χ² if it is exact, otherwise from Student's or the normal distribution."""
     from scipy.special import gammainc, gammaincc, ndtr, ndtri, stdtr
 
     off = (mean.mean - expected) / math.sqrt(mean.spread**2 - variance)
@@ -371,7 +370,7 @@ def _with_deviation(mean: _Mean, expected: float, variance: float) -> _Mean:
 
 
 def _wilson_hilferty(mean: _Mean) -> float:
-    """|z| of a χ² so far out that its probability underflows (E. B. Wilson and M. M. Hilferty, PNAS 17, 684 (1931))."""
+    """|z| of a χ² whose probability underflows (E. B. Wilson and M. M. Hilferty, PNAS 17, 684 (1931))."""
     share = 2.0 / (9.0 * mean.count)
     return abs(math.cbrt(mean.mean) - (1.0 - share)) / math.sqrt(share)
 
@@ -388,7 +387,7 @@ def _tested(mean: _Mean, ratios: Floats) -> DegreeTest:
 def _kolmogorov_smirnov(ratios: Floats) -> tuple[float, float]:
     """Largest distance of the sample from χ²_1, F(x) = erf √(x/2), and its probability.
 
-    Stephens's (√n + 0.12 + 0.11/√n) D for the asymptotic law, good to 1e-3 from n = 5 on (J. R. Statist. Soc. B 32, 115
+    The asymptotic law with Stephens's (√n + 0.12 + 0.11/√n) D is accurate to 1e-3 for n >= 5 (J. R. Statist. Soc. B 32, 115
     (1970)).
     """
     from scipy.special import erf, kolmogorov
@@ -418,7 +417,7 @@ def _family(kt: float, kt_given: bool, confidence: float, degrees: tuple[DegreeT
 
 
 def _homogeneity(degrees: Sequence[DegreeTest]) -> float:
-    """Σ (m_i - m)²/s_i² about the weighted mean, χ² of k - 1 degrees where all means are alike."""
+    """Σ (m_i - m)²/s_i² about the weighted mean m; χ² with k - 1 degrees if all means are equal."""
     means = np.array([degree.mean for degree in degrees])
     weights = np.array([1.0 / degree.mean_spread**2 for degree in degrees])
     return float(weights @ (means - weights @ means / weights.sum()) ** 2)

@@ -1,13 +1,13 @@
-"""Nonlinear least squares by Levenberg and Marquardt, in scaled variables, which says how it ended.
+"""Nonlinear least squares by the Levenberg-Marquardt method in scaled variables, with a statement how the search ended.
 
 With residuals r(p) = (observed - calculated)/σ and the Jacobian J = ∂(calculated/σ)/∂p, the step δ minimises
 
     |J δ - r|² + λ |D δ|²,       D the norms of the columns of J,
 
 (K. Levenberg, Q. Appl. Math. 2, 164 (1944); D. W. Marquardt, J. SIAM 11, 431 (1963); J. J. Moré, Lect. Notes Math. 630,
-105 (1978) for D). In the variables D p every column has the length 1, so that constants of 1e5 and of 1e-13 MHz stand
-side by side; the step comes from a QR and the singular values of R, never from JᵀJ, whose condition is squared. λ begins
-with 0: where the model is nearly linear, Gauss and Newton need a handful of steps.
+105 (1978) for D). In the variables D p all columns have length 1, so that constants of 1e5 and 1e-13 MHz can be fitted together. The
+step comes from a QR decomposition and the singular values of R, not from JᵀJ, whose condition number is squared. λ starts at 0: for a
+nearly linear model Gauss-Newton converges in a few steps.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ Evaluate = Callable[[Floats], tuple[Floats, Floats]]  # p (n,) -> r (m,), J (m, 
 Progress = Callable[["Iteration"], None]
 
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
-FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
-_FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
-BENT = 0.01  # standard errors that seem to be left at a minimum, above which the linear model does not hold there
-_NOTHING = 1e-9  # of χ², below which round-off of the residuals hides what a damped step does
-_PARTS = (1.0, 0.5, 0.25, 0.125)  # of a step that was refused, at which the bent way is looked at
-_MOST_BENT = 0.75  # of the step's length, beyond which the way bends more than its second order knows
-_WORTHWHILE = 0.1  # of what the straight step promised
-_UNFORESEEN = 1e-6  # of the length of the residuals, below which round-off may be what a step did not foresee
-_FINER = 0.01  # of the least λ tried so far, below which a smaller one is worth a try
-_NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
-ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
+FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ in the variables D p
+_FLOOR = 10.0  # times the tolerance: a shorter step that is not shorter than the last one is round-off
+BENT = 0.01  # standard errors left at a minimum above which the linear model does not hold
+_NOTHING = 1e-9  # relative to χ²: round-off of the residuals hides smaller changes by a damped step
+_PARTS = (1.0, 0.5, 0.25, 0.125)  # fraction of a refused step at which the curved path is evaluated
+_MOST_BENT = 0.75  # of the step's length: a larger second-order term makes the curved path unreliable
+_WORTHWHILE = 0.1  # of the decrease predicted for the straight step
+_UNFORESEEN = 1e-6  # of the length of the residuals: smaller deviations from the linear model may be round-off
+_FINER = 0.01  # a λ smaller than the smallest tried so far by this factor is worth trying
+_NOISE = 1e-7  # relative to χ²: for smaller changes round-off decides nothing, and the linear model is used
+ROUND_OFF = 1e-13  # singular values below this fraction of the largest carry no information
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """One step that was tried: its number, weighted rms before and after, λ, and whether it was taken.
+    """A trial step: its number, weighted rms before and after, λ, and whether it was accepted.
 
-    predicted : the decrease of χ² that the linear model expects of the step
+    predicted : the decrease of χ² in the linear model
     """
 
     number: int
@@ -55,16 +55,15 @@ class Iteration:
     taken: bool
 
     def gain(self, count: int) -> float:
-        """The decrease of χ² over what was expected; count : residuals."""
+        """The ratio of actual to predicted decrease of χ²; count : number of residuals."""
         return (self.rms_before**2 - self.rms_after**2) * count / self.predicted if self.predicted > 0 else -1.0
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a search ended.
+    """The end of a search.
 
-    parameters (n,), residuals (m,), jacobian (m, n) : at the best point found, which is what a search that did not end
-        well leaves too
+    parameters (n,), residuals (m,), jacobian (m, n) : at the best point, even if the search failed
     status : "converged", "stalled", "too many iterations" or "interrupted"
     gradient : largest |cosine| between the residuals and a column of the Jacobian, 0 at a minimum
     distance : length of the undamped step in standard errors, √(δᵀ JᵀJ δ), 0 at a minimum
@@ -90,7 +89,7 @@ class Minimum:
 
     @property
     def reason(self) -> str:
-        """The status in a sentence with numbers."""
+        """The status as a sentence with numbers."""
         count, left = len(self.iterations), f"{self.distance:.1e} standard errors"
         bends = ", of which χ² allows none: it bends upwards" if self.distance > BENT * max(1.0, self.rms) else ""
         return {
@@ -111,26 +110,25 @@ def minimise(
     progress: Progress | None = None,
     hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
 ) -> Minimum:
-    """The parameters that make Σ r² least, from a start.
+    """Minimise Σ r² over the parameters, from a start.
 
     Parameters
     ----------
     evaluate : callable
-        p (n,) to weighted residuals (m,) and the Jacobian (m, n) of what is calculated. Where p is out of bounds it raises
-        ValueError or returns numbers that are not finite: the step is then shortened.
+        p (n,) to weighted residuals (m,) and the Jacobian (m, n) of the calculated values. Out of bounds it raises ValueError or
+        returns numbers that are not finite; the step is then shortened.
     start : (n,) array
     tolerance : float
-        The search has converged when the full step would move the parameters by less than this many standard errors,
-        times the weighted rms where that is above 1; or where an undamped step has not halved what is left, which is then round-off,
-        and that is below ten times as much.
+        The search has converged if the full step is below this many standard errors (times the weighted rms if above 1). A step below
+        ten times this limit also suffices if an undamped step has not halved it, because it is then round-off.
     most_iterations : int
-        Evaluations after the first.
+        Largest number of evaluations after the first.
     floor : (n,) array, optional
-        Norms below which a column of the Jacobian is what round-off leaves of numbers that cancel: the parameter is not moved.
+        Norms below which a column of the Jacobian is round-off from cancellation; such a parameter is not moved.
     progress : callable, optional
-        Called with every `Iteration`. A KeyboardInterrupt, there or in `evaluate`, ends the search with the best point.
+        Called with each `Iteration`. A KeyboardInterrupt, there or in `evaluate`, ends the search with the best point.
     hopeless : callable, optional
-        Whether the iterations so far make further ones a waste: the search ends as if they were used up.
+        Whether further iterations are useless; the search then ends as if all iterations were used.
 
     Returns
     -------
@@ -143,13 +141,13 @@ def minimise(
 
     Notes
     -----
-    Neglected: second derivatives of the model (Gauss and Newton); a minimum may be a local one.
+    Second derivatives of the model are neglected (Gauss-Newton); the minimum may be local.
 
     >>> x = np.arange(5.0)
     >>> def decay(p):
     ...     return np.exp(-0.5 * x) - np.exp(-p[0] * x), (-x * np.exp(-p[0] * x))[:, None]
-    >>> found = minimise(decay, np.array([2.0]))
-    >>> found.status, round(float(found.parameters[0]), 3)
+    >>> minimum = minimise(decay, np.array([2.0]))
+    >>> minimum.status, round(float(minimum.parameters[0]), 3)
     ('converged', 0.5)
     """
     point = np.array(start, dtype=float)
@@ -157,7 +155,7 @@ def minimise(
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
     refused, arc = list[tuple[float, float]](), None
-    first = FIRST_DAMPING  # the least λ above 0, until nothing between it and the largest leads on
+    first = FIRST_DAMPING  # the smallest λ above 0 to try; lowered if no larger λ helps
     try:
         while True:
             scale = np.maximum(scale, state.norms)
@@ -190,7 +188,7 @@ def minimise(
             damping = max(10.0 * damping, first)
             if damping > MOST_DAMPING or (damping > first and predicted < _NOTHING * state.chi_squared):
                 if all(step.damping > 0 for step in _refused(taken)):
-                    damping = 0.0  # of the last point only damped steps are known
+                    damping = 0.0  # only damped steps were tried at this point
                 elif linear.weakest < _FINER * first:
                     damping = first = linear.weakest
                 else:
@@ -200,7 +198,7 @@ def minimise(
 
 
 def _judged(number: int, state: _State, trial: _State | None, damping: float, predicted: float) -> Iteration:
-    """A step that was tried: taken where χ² falls, or where round-off hides whether it does and the linear model decides."""
+    """A trial step, accepted if χ² decreases; if round-off hides the change, the linear model decides."""
     after = trial.rms if trial else math.inf
     step = Iteration(number, state.rms, after, damping, predicted, False)
     small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
@@ -208,18 +206,18 @@ def _judged(number: int, state: _State, trial: _State | None, damping: float, pr
 
 
 def _is_enough(distance: float, before: float, tolerance: float, state: _State) -> bool:
-    """Whether the full step is below the tolerance, or is round-off: it was no more than twice as long before an undamped step."""
+    """Whether the full step is below the tolerance, or is round-off: an undamped step has not halved it."""
     enough = tolerance * max(1.0, state.rms)
     return distance <= enough or before / 2 < distance <= min(_FLOOR * enough, math.sqrt(_NOISE * state.chi_squared))
 
 
 def _refused(taken: Sequence[Iteration]) -> list[Iteration]:
-    """The steps that were refused at the last point, the last one first."""
+    """The refused steps at the last point, latest first."""
     return list(takewhile(lambda step: not step.taken, reversed(taken)))
 
 
 def _relaxed(damping: float, gain: float, first: float) -> float:
-    """λ after a step that was taken: less where the linear model foretold its gain, more where it did not."""
+    """λ after an accepted step: smaller if the linear model predicted its gain, larger if not."""
     if gain < 0.25:
         return max(4.0 * damping, first)
     if gain > 0.75:
@@ -230,7 +228,7 @@ def _relaxed(damping: float, gain: float, first: float) -> float:
 def _without_decrease(
     linear: _Linear, state: _State, taken: Sequence[Iteration], refused: Sequence[tuple[float, float]]
 ) -> str:
-    """No step decreases χ²: a minimum has been reached if what is left to gain is small, else the search has stalled."""
+    """The end of a search without a decreasing step: a minimum if the remaining gain is small, otherwise stalled."""
     if not _are_smooth(refused, _UNFORESEEN * float(np.linalg.norm(state.residuals))):
         return STALLED
     left = min(linear.distance, math.sqrt(_left_to_gain(taken, len(state.residuals))))
@@ -238,25 +236,25 @@ def _without_decrease(
 
 
 def _are_smooth(refused: Sequence[tuple[float, float]], noise: float) -> bool:
-    """Whether what the linear model did not foresee of steps falls with their square: lengths and |r(p + δ) - r + J δ| of each.
+    """Whether the model is smooth: the deviation |r(p + δ) - r + J δ| from the linear model decreases with the square of |δ|.
 
-    Where levels exchange their names it falls with their length, or not at all. Then χ² bends upwards on one side alone, and a point where
-    no step is accepted is no minimum. Values below `noise` are ignored.
+    If levels exchange their labels, it decreases linearly or not at all. χ² then has a kink, and a point where no step is accepted is
+    not a minimum. refused : lengths and deviations of the refused steps; deviations below `noise` are ignored.
     """
-    known = sorted((length, off) for length, off in refused if off > noise)
-    longer = [(length, off) for length, off in known if length > 3 * known[0][0]]
-    if not longer or not known[0][0]:
+    significant = sorted((length, off) for length, off in refused if off > noise)
+    longer = [(length, off) for length, off in significant if length > 3 * significant[0][0]]
+    if not longer or not significant[0][0]:
         return True
-    (short, little), (long, much) = known[0], longer[0]
+    (short, little), (long, much) = significant[0], longer[0]
     return math.log(much / little) > 1.5 * math.log(long / short)
 
 
 def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
-    """By how much χ² may still fall, from the steps that were refused at the last point; count : residuals.
+    """Upper estimate of the remaining decrease of χ² from the refused steps at the last point; count : number of residuals.
 
-    A step that promises P and gains G gains 2 P t - (2 P - G) t² after its part t, to second order: at most P²/(2 P - G). Where χ²
-    bends more than the linear model knows, G is far below 0 and that is far below P. A step out of the model says nothing of that: all of
-    P may be left.
+    A step with predicted decrease P and actual decrease G decreases χ² by 2 P t - (2 P - G) t² at its fraction t, to second order: at
+    most P²/(2 P - G). If χ² is strongly curved, G is far below 0 and the estimate far below P. A step out of bounds gives no
+    information, so the estimate is P.
     """
     left = 0.0
     for step in _refused(taken):
@@ -289,7 +287,7 @@ def _rms(residuals: Floats) -> float:
 
 
 class _State(NamedTuple):
-    """A point with residuals and Jacobian, and the triangle R of the QR of (J, r), from which all else follows."""
+    """A point with residuals, Jacobian and the factor R of the QR decomposition of (J, r)."""
 
     parameters: Floats
     residuals: Floats
@@ -322,14 +320,14 @@ class _State(NamedTuple):
 
 
 def _triangle(stacked: Floats) -> Floats:
-    """R of the QR of (m, n), or the matrix itself where it has fewer rows than columns."""
+    """R of the QR decomposition of (m, n), or the matrix itself if it has fewer rows than columns."""
     if len(stacked) <= stacked.shape[1]:
         return stacked
     return np.asarray(np.linalg.qr(stacked, mode="r"))
 
 
 class _Linear(NamedTuple):
-    """The linear model at a point, D p its variables: singular values s, z = Uᵀ r, and D⁻¹ V."""
+    """The linear model at a point in the variables D p: singular values s, z = Uᵀ r, and D⁻¹ V."""
 
     s: Floats
     z: Floats
@@ -355,12 +353,12 @@ class _Linear(NamedTuple):
 
     @property
     def weakest(self) -> float:
-        """Half the square of the smallest singular value: with it as λ the combination known least moves by two thirds of its step."""
+        """Half the square of the smallest singular value; as λ it reduces the step of the least determined combination to two thirds."""
         used = self.s[self.s > 0]
         return float(used.min()) ** 2 / 2 if len(used) else math.inf
 
     def step(self, damping: float) -> tuple[Floats, float]:
-        """The step δ and the decrease of χ² that it promises, |r|² - |r - J δ|²."""
+        """The step δ and the predicted decrease of χ², |r|² - |r - J δ|²."""
         used = self.s > 0
         factor = np.where(used, self.s / np.where(used, self.s**2 + damping, 1.0), 0.0)
         along = factor * self.z
@@ -368,12 +366,11 @@ class _Linear(NamedTuple):
         return self.back @ along, float(promised)
 
     def arc(self, state: _State, scale: Floats, off: Floats, damping: float) -> tuple[Floats, float] | None:
-        """A point t δ + t² a of the way that bends as the model does, and the decrease of χ² foretold there; None where that is little.
+        """A point t δ + t² a on a curved path, and the predicted decrease of χ² there; None if the decrease is small.
 
-        From what the linear model did not foresee of a step, u = r(p + δ) - r + J δ, which is ½ δᵀ(∇²r)δ to lowest order, follow
-        a = (JᵀJ + λD²)⁻¹ Jᵀu and r(t) = r - t J δ + t² (u - J a): the geodesic acceleration of M. K. Transtrum and J. P. Sethna,
-        arXiv:1201.5885 (2012), from the residuals of a step that was refused in place of one more evaluation.
-        scale : D. off : u
+        The deviation from the linear model, u = r(p + δ) - r + J δ, is ½ δᵀ(∇²r)δ to lowest order. It gives the geodesic acceleration
+        a = (JᵀJ + λD²)⁻¹ Jᵀu and r(t) = r - t J δ + t² (u - J a) (M. K. Transtrum and J. P. Sethna, arXiv:1201.5885 (2012)). Here u
+        comes from a refused step, so that no additional evaluation is needed. scale : D. off : u
         """
         used = self.s > 0
         inverse = np.where(used, 1 / np.where(used, self.s**2 + damping, 1.0), 0.0)

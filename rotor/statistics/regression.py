@@ -1,12 +1,12 @@
-"""What a least-squares fit knows of its parameters: errors, correlations, condition, and what it does not know.
+"""Statistics of the parameters of a least-squares fit: errors, correlations, condition number, undetermined combinations.
 
-The weighted Jacobian X = J/σ is scaled to columns of length 1, X = Y D, and taken apart, Y = U S Vᵀ (the column-scaled
+The weighted Jacobian X = J/σ is scaled to columns of length 1, X = Y D, and decomposed, Y = U S Vᵀ (the column-scaled
 singular value decomposition of D. A. Belsley, E. Kuh and R. E. Welsch, Regression Diagnostics (1980), chapter 3). Then
 
     (XᵀX)⁻¹ = D⁻¹ V S⁻² Vᵀ D⁻¹
 
-without ever forming XᵀX. A singular value at round-off is a combination of parameters that the data do not fix; it is
-named, and every parameter that takes part in it has an infinite error instead of a small wrong one.
+without forming XᵀX. A singular value at round-off belongs to a combination of parameters that the data do not determine. The
+combination is reported, and all parameters in it get an infinite error.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import numpy as np
 
 from rotor.arrays import Floats
 
-UNDETERMINED = 1e-10  # singular values below this part of the largest say that a combination is not determined
-_PART = 1e-4  # of a combination below which a parameter has no part in it
+UNDETERMINED = 1e-10  # relative singular value below which a combination is not determined
+_PART = 1e-4  # smallest weight with which a parameter counts in a combination
 
 
 @dataclass(frozen=True)
 class Combination:
-    """A combination Σ weights · parameters/scale of unit length that the data do not determine, and its singular value."""
+    """An undetermined combination Σ weights · parameters/scale of unit length, and its singular value."""
 
     names: tuple[str, ...]
     weights: Floats
@@ -33,7 +33,7 @@ class Combination:
 
     @property
     def text(self) -> str:
-        """Such as `A - 0.71 DK`, in units of each parameter's own scale, leading part first; one parameter by name."""
+        """Text such as `A - 0.71 DK`, largest weight first, in units of the parameters' scales; a single parameter by name."""
         order = np.argsort(-np.abs(self.weights), kind="stable")
         if len(order) == 1:
             return self.names[0]
@@ -44,12 +44,12 @@ class Combination:
 
 @dataclass(frozen=True)
 class Regression:
-    """The linear model of a fit at its end.
+    """The linear model at the end of a fit.
 
-    names : parameters, in order. covariance : (n, n) from the stated errors of the data; infinite variances where a
-    parameter is not determined. singular_values : (n,) of the column-scaled Jacobian. scale : (n,) norms of its columns.
-    undetermined : combinations that the data leave open. left : (m, r) U of the determined part. inverse : (r, n), the
-    change of a parameter is U inverse times that of a datum in its standard deviations.
+    names : parameters, in order. covariance : (n, n) from the stated errors of the data; infinite variances of undetermined
+    parameters. singular_values : (n,) of the column-scaled Jacobian. scale : (n,) norms of the columns of the Jacobian.
+    undetermined : undetermined combinations. left : (m, r), U of the determined part. inverse : (r, n); left @ inverse is the
+    derivative (m, n) of the parameters by the weighted data.
     """
 
     names: tuple[str, ...]
@@ -62,17 +62,17 @@ class Regression:
 
     @property
     def rank(self) -> int:
-        """How many combinations are determined."""
+        """Number of determined combinations."""
         return int(self.left.shape[1])
 
     @property
     def errors(self) -> Floats:
-        """Standard errors (n,) from the stated errors of the data; infinite where not determined."""
+        """Standard errors (n,) from the stated errors of the data; infinite if not determined."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def condition(self) -> float:
-        """Largest over smallest singular value of the column-scaled Jacobian; infinite where one is at round-off."""
+        """Condition number of the column-scaled Jacobian; infinite if a singular value is at round-off."""
         if not len(self.singular_values):
             return 1.0
         least = float(self.singular_values[-1])
@@ -80,7 +80,7 @@ class Regression:
 
     @property
     def correlations(self) -> Floats:
-        """Correlation coefficients (n, n); nan in rows of parameters that are not determined."""
+        """Correlation coefficients (n, n); nan for undetermined parameters."""
         errors = self.errors
         with np.errstate(invalid="ignore", divide="ignore"):
             matrix = self.covariance / np.outer(errors, errors)
@@ -90,14 +90,14 @@ class Regression:
 
     @property
     def leverages(self) -> Floats:
-        """h (m,), the share of each datum in its own fitted value, 0 to 1; 1 fixes a combination alone."""
+        """Leverages h (m,), the derivative of each fitted value by its datum, 0 to 1; a datum with 1 alone determines a combination."""
         return np.asarray(np.einsum("ij,ij->i", self.left, self.left))
 
     def dfbetas(self, residuals: Floats) -> Floats:
-        """By how many standard errors each parameter moves when a datum is left out, (m, n).
+        """Shift of each parameter, in standard errors, if a datum is left out, (m, n).
 
-        b_j - b_j(i) over s(i) √(XᵀX)⁻¹_jj, with s(i) the weighted standard deviation without the datum (Belsley, Kuh and
-        Welsch, eq. 2.7), which needs two degrees of freedom. A datum of leverage 1 cannot be left out; its row is infinite.
+        (b_j - b_j(i)) / [s(i) √(XᵀX)⁻¹_jj], with s(i) the weighted standard deviation without datum i (Belsley, Kuh and
+        Welsch, eq. 2.7); needs two degrees of freedom. A datum with leverage 1 cannot be left out; its row is infinite.
         """
         h = self.leverages
         free = len(residuals) - self.rank
@@ -114,28 +114,30 @@ class Regression:
 def regression(jacobian: Floats, names: Sequence[str], floor: Floats | None = None) -> Regression:
     """The statistics of a weighted Jacobian (m, n).
 
-    floor : (n,) norms below which a column is round-off of numbers that cancel; such a parameter is not determined.
+    floor : (n,) norms below which a column is round-off from cancellation; such a parameter is not determined.
 
-    >>> one = regression(np.array([[1.0, 1.0], [1.0, 1.0], [2.0, 2.0]]), ["B", "C"])
-    >>> [c.text for c in one.undetermined], one.errors.tolist()
+    >>> statistics = regression(np.array([[1.0, 1.0], [1.0, 1.0], [2.0, 2.0]]), ["B", "C"])
+    >>> [c.text for c in statistics.undetermined], statistics.errors.tolist()
     (['B - 1 C'], [inf, inf])
     """
     scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
     blind = scale <= (np.zeros_like(scale) if floor is None else floor)
     safe = np.where(blind, 1.0, scale)
     u, s, vt = _decomposed(np.where(blind, 0.0, jacobian / safe))
-    known = s > UNDETERMINED * s.max(initial=0.0)
+    determined = s > UNDETERMINED * s.max(initial=0.0)
 
-    inverse = (vt[known] / s[known, None]) / safe
+    inverse = (vt[determined] / s[determined, None]) / safe
     covariance = inverse.T @ inverse
-    open_ = (np.abs(vt[~known]) > _PART).any(axis=0) | blind
+    open_ = (np.abs(vt[~determined]) > _PART).any(axis=0) | blind
     covariance[np.diag_indices_from(covariance)] = np.where(open_, np.inf, np.diag(covariance))
-    combinations = [_combination(names, row, float(value)) for row, value in zip(vt[~known], s[~known], strict=True)]
-    return Regression(tuple(names), covariance, s, scale, tuple(combinations), u[:, known], inverse)
+    combinations = [
+        _combination(names, row, float(value)) for row, value in zip(vt[~determined], s[~determined], strict=True)
+    ]
+    return Regression(tuple(names), covariance, s, scale, tuple(combinations), u[:, determined], inverse)
 
 
 def _decomposed(scaled: Floats) -> tuple[Floats, Floats, Floats]:
-    """U, S, Vᵀ with as many singular values as columns, by a QR first where there are many more rows."""
+    """U, S, Vᵀ with one singular value per column; with many more rows than columns a QR decomposition comes first."""
     m, n = scaled.shape
     if m < n:
         scaled = np.vstack([scaled, np.zeros((n - m, n))])
@@ -145,7 +147,7 @@ def _decomposed(scaled: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _by_axes(s: Floats, vt: Floats) -> Floats:
-    """Vᵀ whose null space has single parameters where it contains them, so that each is named by itself."""
+    """Vᵀ with single parameters as null vectors if the null space contains them, so that they are reported separately."""
     null = s <= UNDETERMINED * s.max(initial=0.0)
     if null.sum() < 2:
         return vt

@@ -1,1 +1,1 @@
-"""From the moments of isotopologues to a structure: r_s, r_0, r_m and semi-experimental r_e."""
+"""Structures from the moments of isotopologues: r_s, r_0, r_m and semi-experimental r_e."""

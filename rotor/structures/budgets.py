@@ -1,8 +1,8 @@
-"""Error budget of bond lengths (`rotor.requests.budget`), of the last method of a request, the largest of each source.
+"""Error budget of bond lengths (`rotor.requests.budget`) for the last method of a request: the largest error from each source.
 
-With equal weights the covariance of a fit is s² (JᵀJ)⁻¹, s the root mean square of its residuals over the degrees of freedom: a length of
-standard error σ moves by at most σ/s |δr| where the residuals change by δr (Cauchy and Schwarz), and by as much for a step δ of length
-√(δᵀ JᵀJ δ). Rounding changes each moment by `ROUNDING` of itself; the search leaves at most twice its next step.
+With equal weights the covariance of a fit is s² (JᵀJ)⁻¹, where s² is the sum of squared residuals over the degrees of freedom. A change
+δr of the residuals moves a length of standard error σ by at most σ/s |δr| (Cauchy-Schwarz inequality); so does a step δ of length
+√(δᵀ JᵀJ δ) = |δr|. Rounding changes each moment by `ROUNDING` of its size; the search ends within twice its next step of the minimum.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rotor.structures.least_squares import FittedStructure
 from rotor.structures.substitution import Value
 from rotor.table import counted
 
-REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+REMAINING = 2.0  # times the next step: each step at least halves the distance to the minimum
 NO_LENGTH = ErrorTerm(None, "no bond length follows from these moments")
 VIBRATION = {
     "rs": "what vibration adds to the moments, of which Costain's error is a part",
@@ -36,11 +36,11 @@ def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure
     method : str
         rs, r0, rm1, rm2 or re.
     values : sequence of Value
-        Those of the method; angles do not count.
+        Bond lengths of the method; angles are ignored.
     fitted : FittedStructure or None
-        The fit behind them; None for rs.
+        The fit of these values; None for rs.
     weights : str
-        Of the fit, "equal" or "errors".
+        Weights of the fit, "equal" or "errors".
 
     Returns
     -------
@@ -62,7 +62,7 @@ def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure
 
 
 def _numerical(sigma: float, fitted: FittedStructure | None, weights: str) -> dict[str, ErrorTerm]:
-    """Rounding and what the search leaves."""
+    """Error terms of rounding and of the remaining step of the search."""
     if fitted is None:
         unknown = ErrorTerm(None, "Kraitchman's equations lose digits for atoms near an axis")
         return {"rounding": unknown, "truncation": ErrorTerm(0.0, "closed form")}
@@ -84,7 +84,7 @@ def _numerical(sigma: float, fitted: FittedStructure | None, weights: str) -> di
 
 
 def _scale(fitted: FittedStructure, weights: str) -> float:
-    """By what the errors of a fit are scaled: with equal weights by the scatter of its residuals."""
+    """The scale of the errors of a fit: the scatter of its residuals with equal weights, otherwise 1."""
     if weights != "equal":
         return 1.0
     return float(np.linalg.norm(fitted.minimum.residuals)) / math.sqrt(fitted.degrees_of_freedom)

@@ -1,12 +1,12 @@
-"""Whether the constants of isotopologues go together: planar moments that a substitution leaves alone, fits without each one.
+"""Consistency of the constants of isotopologues: planar moments that a substitution does not change, and leave-one-out fits.
 
-Atoms in a plane perpendicular to the axis g have g = 0, so that replacing one changes nothing of the planar moment
+Atoms in the plane g = 0, perpendicular to the axis g, do not contribute to the planar moment
 
     P_g = (I_a + I_b + I_c)/2 - I_g = Σ m g²
 
-(of a planar molecule P_c = -Δ/2, Δ the inertial defect) but what vibration does. In measured constants of trifluorotoluenes and of
-maleic anhydride with 13C or 18O in the plane P_c changes by less than 0.002 u Å², once by 0.013; a B of 5 GHz that is 1 MHz wrong
-makes 0.010. Larger moments change by more: P_a of maleic anhydride, 205 u Å², by 0.017 with 18O on the b axis.
+(P_c = -Δ/2 for a planar molecule with inertial defect Δ). Substituting such an atom changes P_g only through vibration. In measured
+constants of trifluorotoluenes and of maleic anhydride with 13C or 18O in the plane, P_c changes by less than 0.002 u Å², once by 0.013;
+an error of 1 MHz in B = 5 GHz gives 0.010. Larger moments change more: P_a of maleic anhydride, 205 u Å², by 0.017 with 18O on the b axis.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from rotor.structures.family import AXES, Family, Species
 from rotor.structures.kraitchman import planar_moments
 from rotor.structures.least_squares import FittedStructure
 
-IN_PLANE_ANGSTROM = 1e-5  # an atom so near the plane, of a geometry made exactly symmetric, is in it
-VIBRATION = 0.005  # u Å²: a larger change of a planar moment is not vibration alone
-VIBRATION_PART = 1e-4  # of a planar moment of any size: the same
-VIBRATION_OF_HYDROGEN = 0.03  # u Å²: the same where hydrogen is replaced (H2CO and HDCO differ by 0.004)
+IN_PLANE_ANGSTROM = 1e-5  # distance below which an atom of a symmetrised geometry lies in the plane
+VIBRATION = 0.005  # u Å²: largest change of a planar moment that vibration explains
+VIBRATION_PART = 1e-4  # this limit as a fraction of the planar moment
+VIBRATION_OF_HYDROGEN = 0.03  # u Å²: this limit for substituted hydrogen (H2CO and HDCO differ by 0.004)
 _SIGMAS = 5.0
-_CHANCE = 0.01  # probability of so much by chance, over all isotopologues, above which nothing is said
+_CHANCE = 0.01  # probability by chance, over all isotopologues, below which an isotopologue is reported
 
 
 @dataclass(frozen=True)
 class PlanarMoment:
-    """P of a species along an axis of the parent, its change from the parent's and the error of that, u Å²."""
+    """Planar moment of a species along an axis of the parent, its change from the parent, and the error of the change; u Å²."""
 
     species: str
     axis: str
@@ -46,7 +46,7 @@ class PlanarMoment:
 
 
 def moments_across_planes(family: Family) -> list[PlanarMoment]:
-    """P_g of every species whose replaced atoms all have g = 0, and of which A, B and C are known; none of linear molecules."""
+    """P_g of all species with known A, B, C whose replaced atoms all have g = 0; none for linear molecules."""
     parent = family.parent
     if family.linear or not np.isfinite(parent.moments).all():
         return []
@@ -77,14 +77,14 @@ def _replaced(parent: Species, species: Species) -> list[int]:
 
 
 def _planar(species: Species, g: int) -> tuple[float, float]:
-    """P along an own axis of a species, and its standard error."""
+    """Planar moment along an axis of the species, and its standard error."""
     signs = np.where(np.arange(3) == g, -0.5, 0.5)
     return float(planar_moments(species.moments)[g]), float(np.linalg.norm(signs * species.moment_errors))
 
 
 @dataclass(frozen=True)
 class Without:
-    """A fit without one species: rms of the moments that are left, u Å², and the probability that so much is gained by chance."""
+    """A fit without one species: rms of the remaining moments, u Å², and the probability of such a gain by chance."""
 
     species: str
     rms_u_angstrom2: float
@@ -92,10 +92,10 @@ class Without:
 
 
 def without_each(family: Family, fitted: FittedStructure, refit: Callable[[Family], FittedStructure]) -> list[Without]:
-    """The fit without each isotopologue but the parent, sorted by the gain; those that the others need are left out.
+    """Leave-one-out fits for all isotopologues except the parent, largest gain first; fits with too few moments are skipped.
 
-    With k moments fewer, F = ((χ₀² - χ₁²)/k)/(χ₁²/f₁) follows Fisher's distribution with k and f₁ where the isotopologue is like
-    the others; the chance is that times the number of isotopologues (Bonferroni).
+    Without k moments, F = ((χ₀² - χ₁²)/k)/(χ₁²/f₁) follows Fisher's distribution with k and f₁ degrees of freedom if the isotopologue
+    is consistent with the others; `chance` is this probability times the number of isotopologues (Bonferroni).
     """
     from scipy.special import fdtrc
 
@@ -117,7 +117,7 @@ def without_each(family: Family, fitted: FittedStructure, refit: Callable[[Famil
 
 
 def doubts(family: Family) -> list[str]:
-    """What to say of planar moments that change by more than vibration does."""
+    """Notes on planar moments that change more than by vibration."""
     return [
         f"{moment.species}: P_{moment.axis} = {moment.value:.5f} u Å², {moment.change:+.5f} from the parent, where its atoms lie in "
         f"the plane and vibration changes it by less than {moment.limit:.1g}: are its constants right?"
@@ -127,7 +127,7 @@ def doubts(family: Family) -> list[str]:
 
 
 def gains(method: str, gained: list[Without], rms_u_angstrom2: float) -> list[str]:
-    """What to say of an isotopologue without which the others fit far better."""
+    """A note on an isotopologue without which the others fit much better."""
     if not gained or gained[0].chance > _CHANCE:
         return []
     first = gained[0]

@@ -1,9 +1,9 @@
-"""Bonds and angles by name, and moves of the atoms that keep the symmetry of a molecule.
+"""Named bonds and angles, and symmetry-preserving displacements of the atoms.
 
-A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that every
-operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group in every fit. Named coordinates
-q(x) are set by Newton's method, S δu = S (B S)⁺ (q_asked - q(x)), B the matrix of Wilson; what the names leave open moves as little as it
-can (the pseudo-inverse).
+A structure is refined along totally symmetric displacements, x = x₀ + S u, so that it retains its point group. S is an orthonormal basis
+of the Cartesian displacements that are invariant under all operations, without translations and rotations. Named coordinates q(x) are set
+to targets by Newton's method, S δu = S (B S)⁺ (q_target - q(x)) with Wilson's matrix B; the pseudo-inverse gives the smallest displacement
+if the named coordinates do not determine the structure.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from rotor.molecules.symmetry.point_group import symmetry_of
 Atoms = tuple[int, ...]  # counted from 1
 
 UNITS = {2: "Å", 3: "°", 4: "°"}
-BOND_WITHIN = 1.25  # of the sum of covalent radii: two atoms nearer than that are bonded
+BOND_WITHIN = 1.25  # times the sum of covalent radii: atoms closer than this are bonded
 _STRAIGHT = 1e-6  # radian from 180° within which an angle has no derivative
 
 
 @dataclass(frozen=True)
 class Named:
-    """An internal coordinate: a name, the atoms from 1 (2: distance, 3: angle, 4: dihedral angle), and those like it.
+    """An internal coordinate: name, atoms counted from 1 (2: distance, 3: angle, 4: dihedral angle), and its equivalents.
 
-    alike : the tuples of atoms that symmetry makes equal to it, itself first
+    alike : the atoms of all coordinates equal by symmetry, itself first
     """
 
     name: str
@@ -45,7 +45,7 @@ class Named:
 
     @property
     def factor(self) -> float:
-        """From Å or radian to the unit that is printed."""
+        """Conversion factor from Å or radian to the printed unit."""
         return 1.0 if len(self.atoms) == 2 else 180.0 / np.pi
 
     def value(self, positions: Floats) -> float:
@@ -53,7 +53,7 @@ class Named:
         return float(np.real(_function(self.atoms)(positions))) * self.factor
 
     def gradient(self, positions: Floats) -> Floats:
-        """∂/∂x (3n,) of the coordinate, the mean over those like it, in Å or radian per Å."""
+        """∂/∂x (3n,) of the coordinate, averaged over its equivalents, in Å or radian per Å."""
         return np.asarray(wilson_b([_function(atoms) for atoms in self.alike], positions).mean(axis=0))
 
 
@@ -65,7 +65,7 @@ def _function(atoms: Atoms) -> Coordinate:
 
 
 def permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
-    """The permutations of atoms under all operations of the nuclei, masses apart: isotopes count as alike."""
+    """The permutations of atoms under all operations of the nuclear framework; isotopes are not distinguished."""
     symmetry = symmetry_of(_without_isotopes(molecule))
     return [operation.permutation for operation in (*symmetry.rotations, *symmetry.improper)]
 
@@ -75,10 +75,10 @@ def _without_isotopes(molecule: Molecule) -> Molecule:
 
 
 def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
-    """A coordinate of a molecule with those that symmetry makes equal to it.
+    """A coordinate of a molecule, with its equivalents by symmetry.
 
-    Raises ValueError for other than 2, 3 or 4 different atoms, numbers of missing atoms, and a straight angle, which has no
-    derivative: leave it out, symmetry or the geometry fixes it.
+    Raises ValueError unless there are 2, 3 or 4 different existing atoms, and for a straight angle, which has no derivative and is
+    fixed by symmetry or the geometry.
     """
     chosen, count = tuple(int(atom) for atom in atoms), len(molecule.symbols)
     if len(chosen) not in UNITS or len(set(chosen)) < len(chosen):
@@ -91,7 +91,7 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
     if len(chosen) == 3 and abs(coordinate.value(molecule.positions_angstrom) - 180.0) < np.degrees(_STRAIGHT):
         raise ValueError(f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, it stays straight")
     images = dict.fromkeys(_one_way(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule))
-    if len(chosen) == 4:  # a reflection turns the sign of a dihedral angle: such images are no equals
+    if len(chosen) == 4:  # a reflection reverses the sign of a dihedral angle: such images are not equivalent
         value = coordinate.value(molecule.positions_angstrom)
         images = {
             image: None
@@ -102,12 +102,12 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
 
 
 def _one_way(atoms: Atoms) -> Atoms:
-    """A coordinate read forwards and backwards is one."""
+    """The atoms in a unique order: reading them backwards gives the same coordinate."""
     return min(atoms, atoms[::-1])
 
 
 def symmetric_geometry(molecule: Molecule) -> Molecule:
-    """The molecule with its nuclei exactly where its symmetry has them; isotopes, centre and frame stay.
+    """The molecule with nuclei moved to exactly symmetric positions; isotopes, centre and frame do not change.
 
     >>> tilted = Molecule(("O", "C", "S"), [[0, 1e-4, 1.16], [0, 0, 0], [0, 0, -1.56]])
     >>> float(np.abs(symmetric_geometry(tilted).positions_angstrom[:, 0]).max())
@@ -129,7 +129,7 @@ def symmetric_geometry(molecule: Molecule) -> Molecule:
 
 
 def symmetric_displacements(molecule: Molecule) -> Floats:
-    """S (3n, k): an orthonormal basis of the totally symmetric displacements that change the shape.
+    """An orthonormal basis S (3n, k) of the totally symmetric displacements that change the shape.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> symmetric_displacements(water).shape     # the two coordinates of C2v water: one bond, one angle
@@ -151,7 +151,7 @@ def symmetric_displacements(molecule: Molecule) -> Floats:
 
 
 def _acting(matrix: Floats, permutation: NDArray[np.int64]) -> Floats:
-    """The operation on displacements (3n, 3n): atom i goes to the place of atom permutation[i]."""
+    """The matrix (3n, 3n) of an operation on displacements: atom i moves to the position of atom permutation[i]."""
     n = len(permutation)
     out = np.zeros((3 * n, 3 * n))
     for i, image in enumerate(permutation.tolist()):
@@ -185,7 +185,7 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], tar
     positions : (n, 3) array
         The start, Å.
     space : (3n, k) array
-        Orthonormal displacements that may be used.
+        Orthonormal basis of the allowed displacements.
     coordinates : sequence of Named
         c distances, angles and dihedral angles.
     targets : (c,) array
@@ -194,12 +194,12 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], tar
     Returns
     -------
     (n, 3) array
-        Å; what the coordinates leave open has moved as little as it can.
+        Å; the displacement is the smallest that reaches the targets.
 
     Raises
     ------
     ValueError
-        Where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
+        For targets that cannot be reached together (contradictory coordinates, or no convergence).
     """
     x = positions.copy()
     factors = np.array([coordinate.factor for coordinate in coordinates])
@@ -218,7 +218,7 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], tar
 
 
 def bonded(molecule: Molecule) -> list[Atoms]:
-    """Pairs of atoms, from 1, nearer than 1.25 times the sum of their covalent radii (ASE's, of Cordero et al. 2008)."""
+    """Pairs of atoms (from 1) closer than 1.25 times the sum of their covalent radii (ASE's values, Cordero et al. 2008)."""
     from ase.data import atomic_numbers, covalent_radii
 
     radii = np.array([covalent_radii[atomic_numbers[symbol]] for symbol in molecule.symbols])
@@ -229,7 +229,7 @@ def bonded(molecule: Molecule) -> list[Atoms]:
 
 
 def bonds_and_angles(molecule: Molecule) -> list[Named]:
-    """Every bond and every angle between bonds that is not straight, one of each kind that symmetry makes equal."""
+    """All bonds, and all angles between bonds that are not straight; one representative of each set of equivalents."""
     pairs = bonded(molecule)
     candidates = [(f"r({_label(molecule, pair)})", pair) for pair in pairs]
     near: dict[int, list[int]] = {}

@@ -1,4 +1,4 @@
-"""A molecule with the measured moments of its isotopologues, their axes matched to those of the parent."""
+"""A molecule with the measured moments of its isotopologues; their axes are matched to those of the parent."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
 AXES = "abc"
 CONSTANTS = "ABC"
-_FAR_OF_PARENT, _FAR = 3.0, 1.5  # factors between constants measured and those of the geometry that are a mistake
-PLANAR_WITHIN_ANGSTROM = 1e-4  # of the plane: atoms so near lie in it
+_FAR_OF_PARENT, _FAR = (
+    3.0,
+    1.5,
+)  # ratios of measured constants to those of the geometry beyond which a mistake is assumed
+PLANAR_WITHIN_ANGSTROM = 1e-4  # distance below which an atom lies in the plane
 
 
 @dataclass(frozen=True)
 class Species:
-    """One isotopologue and what was measured of it.
+    """An isotopologue with its measured constants.
 
-    name : such as "16O13C32S". molecule : the geometry with its isotopes. constants_mhz, errors_mhz : those of A, B, C that
-    are known and their standard errors, MHz (0 where not known). corrections_mhz : what is added to a constant of the ground
-    state to make it one of equilibrium, B_e = B_0 + correction. axes : the parent's axes that a, b, c are nearest to. source
+    name : such as "16O13C32S". molecule : the geometry with its isotopes. constants_mhz, errors_mhz : the known ones of A, B, C and
+    their standard errors, MHz (0 if unknown). corrections_mhz : B_e - B_0 for each corrected constant. axes : the parent's axes
+    nearest to a, b, c. source : origin of the data
     """
 
     name: str
@@ -39,7 +42,7 @@ class Species:
 
     @property
     def moments(self) -> Floats:
-        """I_a, I_b, I_c (3,) in u Å², nan where the constant is not known."""
+        """I_a, I_b, I_c (3,) in u Å²; nan for an unknown constant."""
         return _moments(self.constants_mhz)
 
     @property
@@ -77,7 +80,7 @@ class Family:
 
     @property
     def parent(self) -> Species:
-        """The species that substitutions are counted from."""
+        """The species to which substitutions refer."""
         return self.species[0]
 
     @property
@@ -92,14 +95,14 @@ class Family:
 
     @property
     def planar(self) -> bool:
-        """Whether all atoms lie in one plane, not on one line."""
+        """Whether all atoms lie in a plane, but not on a line."""
         c = self.frame_positions(self.parent)[:, 2]
         return not self.linear and bool(np.abs(c).max() < PLANAR_WITHIN_ANGSTROM)
 
     def frame_positions(self, species: Species) -> Floats:
         """Positions (n, 3) of the start geometry in the principal axes of a species."""
         frame = Top.from_molecule(species.molecule).frame
-        assert frame is not None  # a top of a molecule has one
+        assert frame is not None  # a top made from a molecule always has a frame
         return np.asarray((species.molecule.positions_angstrom - frame.centre) @ frame.axes.T)
 
 
@@ -116,9 +119,9 @@ def family(
     Parameters
     ----------
     molecule : Molecule
-        The parent with a start geometry, good enough to decide axes and signs; it is made exactly symmetric first.
+        The parent with a start geometry that is good enough to determine axes and signs; it is symmetrised first.
     measured : sequence of (name, isotopes, constants_mhz, errors_mhz)
-        Isotopes as `Molecule.with_isotopes` takes them, "" for the parent; the parent comes first.
+        Isotopes in the form of `Molecule.with_isotopes`, "" for the parent, which comes first.
     corrections_mhz, sources : sequences, optional
         One for each species, see `Species`.
     name : str
@@ -130,9 +133,8 @@ def family(
     Raises
     ------
     ValueError
-        No species, a first one that is not the parent, one isotopologue twice, constants that are none of A, B, C or not
-        above 0 or far from what the geometry gives, errors or corrections without their constant, and constants that a kind of
-        top does not have.
+        No species; a first species that is not the parent; a repeated isotopologue; constants other than A, B, C, not above 0, far
+        from those of the geometry, or not defined for this kind of top; errors or corrections without their constant.
 
     Examples
     --------
@@ -177,7 +179,7 @@ def _refuse_constants(
 
 
 def _refuse_far(family_species: Sequence[Species]) -> None:
-    """ValueError for constants that the start geometry, scaled to the parent's, cannot have: another unit, a digit too many."""
+    """Raise ValueError for constants far from those of the start geometry scaled to the parent: wrong unit or digits."""
     parent = _measured_to_rigid(family_species[0])
     for species in family_species:
         ratios = _measured_to_rigid(species)
@@ -193,7 +195,7 @@ def _refuse_far(family_species: Sequence[Species]) -> None:
 
 
 def _measured_to_rigid(species: Species) -> dict[str, float]:
-    """Measured constants over those of the start geometry, where both have them."""
+    """Ratios of measured constants to those of the start geometry."""
     rigid = Top.from_molecule(species.molecule).constants.values
     return {name: value / rigid[name] for name, value in species.constants_mhz.items() if rigid.get(name)}
 

@@ -1,14 +1,14 @@
 """Structures fitted to the moments of all isotopologues: r_0, r_m⁽¹⁾, r_m⁽²⁾, and r_e from corrected constants.
 
 The moments I_g (g = a, b, c of each species) of one geometry with the masses of each isotopologue are fitted to the measured
-ones. What vibration adds is neglected in r_0, taken out of the constants in a semi-experimental r_e, and fitted in r_m:
+ones. The vibrational contribution is neglected in r_0, subtracted from the constants in a semi-experimental r_e, and fitted in r_m:
 
     r_m⁽¹⁾   I_g⁰ = I_g + c_g √I_g
     r_m⁽²⁾   I_g⁰ = I_g + c_g √I_g + d_g (m₁ m₂ ... m_n / M)^(1/(2n-2))
 
-J. K. G. Watson, A. Roytburg and W. Ulrich, J. Mol. Spectrosc. 196, 102 (1999), with c and d along the parent's axes, matched to
-those of the isotopologue by overlap; the rotation of axes between isotopologues in those terms (their r_m⁽¹ʳ⁾) and the lengths
-of bonds to hydrogen (r_m⁽¹ᴸ⁾) are not fitted. With positions r_i in the principal axes the gradients are exact,
+J. K. G. Watson, A. Roytburg and W. Ulrich, J. Mol. Spectrosc. 196, 102 (1999). c and d refer to the parent's axes, which are matched
+to those of the isotopologue by overlap. Axis rotation between isotopologues in these terms (r_m⁽¹ʳ⁾) and the Laurie correction of
+bonds to hydrogen (r_m⁽¹ᴸ⁾) are not fitted. With positions r_i in the principal axes the gradients are exact,
 
     ∂I_a/∂r_i = 2 m_i (r_i - a_i â).
 """
@@ -35,13 +35,13 @@ STUDENT = {
     1: 1.84,
     2: 1.32,
     3: 1.20,
-}  # |t| of 68.27 % by degrees of freedom: what a standard error from so few is worth
-_FAR = 0.5  # Å that no atom may move in one step
+}  # Student's |t| at 68.27 %, by degrees of freedom
+_FAR = 0.5  # Å: largest displacement of an atom from the start
 
 
 @dataclass(frozen=True)
 class Moment:
-    """One moment of one species: which, as measured with its error, as calculated, u Å²."""
+    """A moment of a species: species and axis, observed value with error, calculated value; u Å²."""
 
     species: str
     axis: str
@@ -57,13 +57,13 @@ class Moment:
 
 @dataclass(frozen=True)
 class FittedStructure:
-    """A structure from all moments.
+    """A structure fitted to all moments.
 
     method : "r0", "rm1", "rm2" or "re". molecule : the geometry in the principal axes of the parent. values : bonds and angles
-    with errors, those fitted and those that follow. vibrational : c and d of r_m with their errors, by name (u½ Å and u½ Å²).
-    moments : observed and calculated. rms_u_angstrom2 : of the differences. degrees_of_freedom : moments minus what is fitted.
-    condition : of the column-scaled Jacobian. undetermined : combinations that the moments leave open. minimum : how the search
-    ended. errors are scaled by the rms of the fit where the weights are equal, since what vibration does is the error there.
+    with errors, fitted and derived. vibrational : c and d of r_m with their errors, by name (u½ Å and u½ Å²).
+    moments : observed and calculated. rms_u_angstrom2 : of the differences. degrees_of_freedom : moments minus parameters.
+    condition : of the column-scaled Jacobian. undetermined : combinations that the moments do not determine. minimum : how the search
+    ended. With equal weights, errors are scaled by the rms of the fit, because the residuals are due to vibration.
     """
 
     method: str
@@ -88,22 +88,22 @@ def fit_structure(
     weights: str = "equal",
     leave_out: Sequence[str] = (),
 ) -> FittedStructure:
-    """A structure fitted to the moments of a family.
+    """Fit a structure to the moments of a family.
 
     Parameters
     ----------
     family : Family
     method : "r0", "rm1", "rm2" or "re"
-        See above; "re" uses those constants that have a correction.
+        See above; "re" uses only constants with a correction.
     coordinates : sequence of Named
-        What is fitted; every totally symmetric displacement of the atoms where none is given.
+        Coordinates to fit. Default: all totally symmetric displacements.
     held : sequence of Named
-        Coordinates that keep the values of the start geometry.
+        Coordinates fixed at the values of the start geometry.
     weights : "equal" or "errors"
-        The same weight for every moment, or 1/σ² of the measured ones. What vibration adds is far above the errors of
-        measured constants and as large for each moment, so that "equal" is the rule for everything but good r_e.
+        Equal weights, or 1/σ² of the measured moments. The vibrational contributions far exceed the measurement errors and are
+        of similar size for all moments, so "equal" suits all methods except a good r_e.
     leave_out : sequence of "a", "b" or "c"
-        Axes whose moments are not used; of a planar molecule one is left out by custom, since its three depend on each other.
+        Axes whose moments are not used; for a planar molecule one is usually left out, since its three moments are dependent.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def fit_structure(
     Raises
     ------
     ValueError
-        An unknown method or weight, no moments, more to fit than moments, weights by errors that are not there.
+        An unknown method or weight, no moments, more parameters than moments, weights by errors for constants without errors.
 
     Notes
     -----
@@ -148,7 +148,7 @@ def _refuse_settings(method: str, weights: str, coordinates: Sequence[Named], he
 
 @dataclass(frozen=True)
 class _Problem:
-    """What the search evaluates: parameters are changes of the coordinates (or of u), then c, then d."""
+    """The model of the search. Parameters: changes of the coordinates (or of u), then c, then d."""
 
     family: Family
     method: str
@@ -198,7 +198,7 @@ class _Problem:
 
     @property
     def shape_count(self) -> int:
-        """How many parameters the geometry has."""
+        """Number of geometric parameters."""
         return len(self.coordinates) or self.space.shape[1]
 
     @property
@@ -206,7 +206,7 @@ class _Problem:
         return self.shape_count + len(self.terms)
 
     def positions(self, p: Floats) -> Floats:
-        """The geometry (n, 3) of the parameters; ValueError where atoms move too far or the coordinates cannot be had."""
+        """The geometry (n, 3) for the parameters; ValueError if atoms move too far or the coordinates cannot be reached."""
         change = p[: self.shape_count]
         if not self.coordinates:
             x = self.start + (self.space @ change).reshape(self.start.shape)
@@ -245,7 +245,7 @@ class _Problem:
     def _with_vibration(
         self, species: Species, axis: str, moment: float, terms: dict[str, float], row: Floats
     ) -> float:
-        """The moment with c and d, the derivatives of this row changed accordingly."""
+        """The moment with the terms of c and d; updates the row of derivatives in place."""
         total, slope = moment, 1.0
         if f"c_{axis}" in terms:
             c, root = terms[f"c_{axis}"], float(np.sqrt(moment))
@@ -266,7 +266,7 @@ class _Problem:
 def _observations(
     family: Family, method: str, leave_out: Sequence[str]
 ) -> tuple[list[tuple[int, int]], Floats, Floats]:
-    """(species, axis) of every moment that is used, the moments and their errors."""
+    """(species, axis) of the moments in the fit, the moments, and their errors."""
     strays = [axis for axis in leave_out if axis not in AXES]
     if strays:
         raise ValueError(f"leave_out: axes {', '.join(strays)}: a, b and c there are")
@@ -295,7 +295,7 @@ def _observations(
 
 
 def _repeated(family: Family, species: Species, g: int) -> bool:
-    """Whether a moment says what another one of the species has said: C of a linear or prolate top that has B."""
+    """Whether a moment is redundant for its species: I_c of a linear or prolate top with I_b."""
     kind = Top.from_molecule(species.molecule).kind
     if kind == "linear":
         return AXES[g] != "b"
@@ -304,7 +304,7 @@ def _repeated(family: Family, species: Species, g: int) -> bool:
 
 
 def _equal_axis(family: Family, axis: str) -> str:
-    """The axis whose c and d serve for it too, where two moments of the parent are equal."""
+    """The axis whose c and d apply to this axis: the first of two with equal moments of the parent."""
     same = {"linear": "bbb", "prolate": "abb", "oblate": "bbc"}.get(family.top.kind, AXES)
     return same[AXES.index(axis)]
 
@@ -312,12 +312,12 @@ def _equal_axis(family: Family, axis: str) -> str:
 def _principal(species: Species, x: Floats) -> tuple[Floats, Floats, Floats]:
     """Positions (n, 3) in the principal axes, the axes as rows, and masses."""
     top = Top.from_molecule(Molecule(species.molecule.symbols, x, species.molecule.mass_numbers))
-    assert top.frame is not None  # a top of a molecule has one
+    assert top.frame is not None  # a top made from a molecule always has a frame
     return (x - top.frame.centre) @ top.frame.axes.T, top.frame.axes, species.molecule.masses_u
 
 
 def _moment(family: Family, species: Species, frame: tuple[Floats, Floats, Floats], g: int) -> tuple[float, Floats]:
-    """I_g and its gradient (n, 3) in the frame of the input; of equal moments the mean."""
+    """I_g and its gradient (n, 3) in the frame of the input; the mean for equal moments."""
     places, axes, masses = frame
     kind = Top.from_molecule(species.molecule).kind
     across = {"linear": (1, 2), "prolate": (1, 2), "oblate": (0, 1)}.get(kind, ())
@@ -380,7 +380,7 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
 
 
 def _values(problem: _Problem, x: Floats, covariance: Floats) -> tuple[Value, ...]:
-    """Bonds and angles of the geometry x with their errors."""
+    """Bonds and angles of the geometry `x` with errors."""
     directions, shape = problem.directions(x), slice(0, problem.shape_count)
     values = []
     for coordinate in _worth_giving(problem, x):
@@ -392,7 +392,7 @@ def _values(problem: _Problem, x: Floats, covariance: Floats) -> tuple[Value, ..
 
 
 def _worth_giving(problem: _Problem, x: Floats) -> list[Named]:
-    """The coordinates fitted, and the bonds and angles of the geometry that are not among them."""
+    """The fitted coordinates, followed by other bonds and angles of the geometry."""
     molecule = Molecule(problem.family.molecule.symbols, x, problem.family.molecule.mass_numbers)
     chosen = [*problem.coordinates, *problem.held]
     seen = {atoms for coordinate in chosen for atoms in coordinate.alike}
@@ -400,7 +400,7 @@ def _worth_giving(problem: _Problem, x: Floats) -> list[Named]:
 
 
 def _spread(gradient: Floats, covariance: Floats) -> float:
-    """√(g C gᵀ), infinite where an undetermined parameter takes part."""
+    """√(g C gᵀ); infinite if an undetermined parameter contributes."""
     used = np.abs(gradient) > 1e-9
     if not np.isfinite(covariance.diagonal()[used]).all():
         return float("inf")

@@ -1,9 +1,9 @@
-"""r_s: the substitution structure of a family, atom by atom, and the bonds and angles between the atoms it has.
+"""r_s: the substitution structure of a family, atom by atom, with bonds and angles between substituted atoms.
 
-Every isotopologue with one atom replaced gives that atom's coordinates (`kraitchman`); atoms that symmetry makes equal are
-copied from it, and coordinates that the symmetry of an atom's site makes 0 are 0 without an error. Signs come from the start
-geometry, and of symmetric and spherical parents the direction across the axis or from the centre. Bonds and angles carry the errors
-of the coordinates, Costain's and those of the constants, taken as independent between atoms that are not copies of each other.
+Each isotopologue with a single substituted atom gives the coordinates of that atom (`kraitchman`); equivalent atoms are copies of it.
+Coordinates that vanish by site symmetry are exactly 0. Signs come from the start geometry, and so do directions across the axis of a
+symmetric parent or from the centre of a spherical one. The errors of bonds and angles follow from those of the coordinates (Costain's
+and those of the constants), taken as independent unless the atoms are equivalent.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from rotor.structures.coordinates import Named, bonds_and_angles
 from rotor.structures.family import PLANAR_WITHIN_ANGSTROM, Family, Species
 from rotor.structures.kraitchman import PAIRS, SHAPES, Substituted, kraitchman
 
-ROUND_OFF = 1e-9  # of a unit vector: a component along an axis
-ON_AXIS_ANGSTROM = 1e-3  # of the figure axis of a symmetric top: an atom so near is on it
+ROUND_OFF = 1e-9  # component of a unit vector along an axis below which it is 0
+ON_AXIS_ANGSTROM = 1e-3  # distance from the figure axis of a symmetric top below which an atom is on it
 
 
 @dataclass(frozen=True)
 class SubstitutedAtom:
-    """An atom, from 1, the isotopologue it is from, what Kraitchman's equations say, and the directions of their coordinates.
+    """An atom (from 1) with its isotopologue, the result of Kraitchman's equations, and the directions of these coordinates.
 
-    directions : (3, 3) rows, one for each coordinate of `kraitchman`, with the signs of the start geometry, in the axes of the parent.
-        Unit vectors, but 0 where the shape or the symmetry of the atom's site makes the coordinate 0.
+    directions : (3, 3), a row for each coordinate of `kraitchman` in the axes of the parent, with the signs of the start geometry.
+        Unit vectors, or 0 for coordinates that are 0 by shape or site symmetry.
     """
 
     atom: int
@@ -45,27 +45,27 @@ class SubstitutedAtom:
 
     @property
     def squares_angstrom2(self) -> Floats:
-        """a², b², c² (3,), below zero where imaginary."""
+        """a², b², c² (3,); negative if imaginary."""
         return np.asarray(self.kraitchman.squares_angstrom2 @ self.directions**2)
 
     @property
     def costain_angstrom(self) -> Floats:
-        """What vibration may do to a, b, c (3,)."""
+        """Costain's errors of a, b, c (3,)."""
         return self._along_axes(self.kraitchman.costain_angstrom)
 
     @property
     def measured_angstrom(self) -> Floats:
-        """Errors of a, b, c (3,) that those of the moments make."""
+        """Errors of a, b, c (3,) from those of the moments."""
         return self._along_axes(self.kraitchman.measured_angstrom)
 
     @property
     def errors_angstrom(self) -> Floats:
-        """Both together (3,)."""
+        """Total errors of a, b, c (3,)."""
         return self._along_axes(self.kraitchman.errors_angstrom)
 
     @property
     def zero_by_symmetry(self) -> tuple[bool, bool, bool]:
-        """Which of a, b, c vanish because no direction has a part along the axis."""
+        """Which of a, b, c vanish: no direction has a component along the axis."""
         a, b, c = (~np.any(self.directions, axis=0)).tolist()
         return a, b, c
 
@@ -86,9 +86,9 @@ class Value:
 
 @dataclass(frozen=True)
 class SubstitutionStructure:
-    """Atoms by substitution, the values between them, and what must be known of it.
+    """Substituted atoms, bond lengths and angles between them, and notes.
 
-    positions_angstrom : (n, 3) in the principal axes of the parent, nan for atoms that were not substituted
+    positions_angstrom : (n, 3) in the principal axes of the parent, nan for atoms without substitution
     errors_angstrom : (n, 3)
     """
 
@@ -104,8 +104,8 @@ def substitution_structure(
 ) -> SubstitutionStructure:
     """The r_s structure of a family.
 
-    pair : which two moments serve for a planar molecule. coordinates : bonds and angles to give; those of the start geometry
-    if there are none. Raises ValueError where no isotopologue has one atom replaced.
+    pair : the two moments used for a planar molecule. coordinates : bonds and angles to report; default: those of the start
+    geometry. Raises ValueError if no isotopologue has a single substituted atom.
     """
     if pair not in PAIRS:
         raise ValueError(f"pair {pair!r}: one of {', '.join(PAIRS)} says which two moments of a planar molecule count")
@@ -126,12 +126,12 @@ def substitution_structure(
 
     placed = _with_equal_atoms(family, atoms, ours)
     reported = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
-    values = tuple(_value(coordinate, placed) for coordinate in reported if _known(coordinate, placed.positions))
+    values = tuple(_value(coordinate, placed) for coordinate in reported if _is_known(coordinate, placed.positions))
     return SubstitutionStructure(tuple(atoms), placed.positions, placed.errors, values, tuple(notes))
 
 
 def replaced_atom(parent: Molecule, other: Molecule) -> int | None:
-    """The one atom, from 0, whose isotope differs; None where more differ."""
+    """The only atom (from 0) whose isotope differs; None if several differ."""
     changed = np.flatnonzero(np.array(parent.mass_numbers) != np.array(other.mass_numbers))
     return int(changed[0]) if len(changed) == 1 else None
 
@@ -150,7 +150,7 @@ def _substituted(family: Family, species: Species, atom: int, ours: Floats, pair
         substituted_errors=other.moment_errors,
     )
     directions = _directions(family.top.kind, ours[atom])
-    allowed = np.linalg.norm(directions @ _site_projector(family, ours, atom), axis=1) > 0.5  # 1 or 0 but for round-off
+    allowed = np.linalg.norm(directions @ _site_projector(family, ours, atom), axis=1) > 0.5  # 1 or 0 within round-off
     allowed &= np.isin(np.arange(3), SHAPES[shape])
     directions = np.where(allowed[:, None], directions, 0.0)
     return SubstitutedAtom(atom + 1, species.name, solution, directions)
@@ -167,9 +167,9 @@ def _shape(family: Family, place: Floats) -> str:
 
 
 def _directions(kind: str, place: Floats) -> Floats:
-    """Rows (3, 3): where each coordinate of Kraitchman's equations points from the centre, at the place in the start geometry.
+    """Directions (3, 3) of the coordinates of Kraitchman's equations, as rows, for an atom at `place` in the start geometry.
 
-    a, b, c; of a symmetric top along the axis and across it, of a spherical one from the centre to the atom.
+    Asymmetric top: a, b, c; symmetric top: along and across the axis; spherical top: from the centre to the atom.
     """
     signs = np.diag(np.where(place < 0, -1.0, 1.0))
     if kind not in ("prolate", "oblate", "spherical"):
@@ -187,9 +187,9 @@ def _directions(kind: str, place: Floats) -> Floats:
 
 
 def _site_projector(family: Family, ours: Floats, atom: int) -> Floats:
-    """The projector (3, 3) on displacements that the operations which leave an atom in its place preserve.
+    """The projector (3, 3) on displacements of an atom that are invariant under its site symmetry.
 
-    Where the geometry says that an atom lies on an axis or in a plane, its coordinate across is 0 without an error.
+    For an atom on an axis or in a plane of symmetry, the coordinates across it are exactly 0.
     """
     symmetry = symmetry_of(_in_frame(family.molecule, ours))
     if family.linear:  # the half turn of a centrosymmetric molecule is the last rotation
@@ -217,7 +217,7 @@ def _doubts(atom: SubstitutedAtom) -> list[str]:
 
 
 class _Placed(NamedTuple):
-    """Positions (n, 3), nan where unknown; how each coordinate of Kraitchman's equations moves them (c, n, 3), and its error (c,)."""
+    """Positions (n, 3), nan if unknown; their derivatives by each coordinate of Kraitchman's equations (c, n, 3); its error (c,)."""
 
     positions: Floats
     moves: Floats
@@ -225,13 +225,13 @@ class _Placed(NamedTuple):
 
     @property
     def errors(self) -> Floats:
-        """Errors (n, 3) along the axes, nan where the position is unknown."""
+        """Errors (n, 3) along the axes; nan for unknown positions."""
         spread = np.sqrt(np.tensordot(self.sigmas**2, self.moves**2, axes=1))
         return np.where(np.isnan(self.positions), np.nan, spread)
 
 
 def _with_equal_atoms(family: Family, atoms: list[SubstitutedAtom], ours: Floats) -> _Placed:
-    """The substituted atoms and those that symmetry makes equal to one, which move with it."""
+    """The substituted atoms and their equivalents by symmetry, which move with them."""
     positions, moves = np.full(ours.shape, np.nan), np.zeros((3 * len(atoms), *ours.shape))
     for place, atom in enumerate(atoms):
         positions[atom.atom - 1] = atom.coordinates_angstrom
@@ -250,12 +250,12 @@ def _in_frame(molecule: Molecule, positions: Floats) -> Molecule:
     return Molecule(molecule.symbols, positions, molecule.mass_numbers)
 
 
-def _known(coordinate: Named, positions: Floats) -> bool:
+def _is_known(coordinate: Named, positions: Floats) -> bool:
     return bool(np.isfinite(positions[[atom - 1 for atom in coordinate.atoms]]).all())
 
 
 def _value(coordinate: Named, placed: _Placed) -> Value:
-    """A coordinate between known atoms; atoms that symmetry makes equal have one error, not several."""
+    """A coordinate between known atoms; equivalent atoms share one error."""
     positions = placed.positions
     alone = Named(coordinate.name, coordinate.atoms, (coordinate.atoms,))
     filled = np.where(np.isnan(positions), np.arange(positions.size).reshape(positions.shape) + 100.0, positions)
