@@ -72,6 +72,11 @@ class Evidence:
     expected: int
     rivals: tuple[str, ...] = ()
 
+    @property
+    def single_line(self) -> bool:
+        """Whether no more than one of its lines is seen: lines of species that are no candidates then pass for it by chance."""
+        return self.visible <= 1
+
 
 @dataclass(frozen=True)
 class Unidentified:
@@ -102,13 +107,13 @@ class Identification(Table):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """species, signal, visible, expected, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
+        """species, signal, visible, expected, single_line, column_per_cm2, excitation_k, velocity_km_s, fwhm_km_s."""
         parts = [evidence.component for evidence in self.species]
         numbers = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
         table: dict[str, Any] = {"species": np.array(self.names, dtype=np.str_)}
         table |= {
             name: np.array([getattr(evidence, name) for evidence in self.species])
-            for name in ("signal", "visible", "expected")
+            for name in ("signal", "visible", "expected", "single_line")
         }
         return table | {name: np.array([getattr(component, name) for component in parts]) for name in numbers}
 

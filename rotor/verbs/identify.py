@@ -12,6 +12,7 @@ from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
+from rotor.table import counted
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work
@@ -170,6 +171,10 @@ def show(answer: Identified, report: Report) -> None:
     if identification.species:
         print()
         show_table(_species_table(identification))
+        if count := sum(evidence.single_line for evidence in identification.species):
+            print(
+                f"* {counted(count, 'species', 'species')} on a single line: a line of a species that is no candidate may pass for it"
+            )
     print()
     if not identification.unidentified:
         print("no unidentified line above 5 standard deviations")
@@ -192,7 +197,7 @@ def _species_table(identification: Identification) -> Table:
         (
             evidence.component.species.name,
             f"{evidence.signal:.0f}",
-            f"{evidence.visible}/{evidence.expected}",
+            f"{evidence.visible}/{evidence.expected}{' *' if evidence.single_line else ''}",
             f"{evidence.component.column_per_cm2:.2e}",
             f"{evidence.component.excitation_k:.0f}",
             f"{evidence.component.velocity_km_s:.2f}",
@@ -202,7 +207,7 @@ def _species_table(identification: Identification) -> Table:
         for evidence in identification.species
     ]
     heads = ("species", "Δχ²", "lines seen", "N (1/cm²)", "T (K)", "v (km/s)", "Δv (km/s)", "or")
-    return Table("species by evidence", heads, rows, frozenset({"species", "or"}))
+    return Table("species by evidence", heads, rows, frozenset({"species", "lines seen", "or"}))
 
 
 VERB = Tool(

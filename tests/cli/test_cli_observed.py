@@ -102,6 +102,28 @@ def test_identify_names_the_species_that_is_there(call, folder):
     assert "species by evidence" in out
 
 
+def test_species_on_a_single_line_are_marked(call, folder):
+    """A line of a species that is no candidate, at the only line of another: named, and marked."""
+    grid, seen = np.loadtxt(folder / "s.txt", unpack=True)
+    taken = np.sort(
+        np.concatenate([read_cat_species(file).frequency_mhz for file in sorted(folder.glob("cats/c099*.cat"))])
+    )
+    middle = float(taken[(gap := int(np.argmax(np.diff(taken)))) : gap + 2].mean())
+    seen += 3.0 * np.exp(-4 * np.log(2) * ((grid - middle * (1 - 3.0 / 299792.458)) / (middle * 2.0 / 299792.458)) ** 2)
+    np.savetxt(folder / "s.txt", np.stack([grid, seen], axis=1), header="frequency_mhz, intensity_k")
+    (folder / "cats" / "c099503.cat").write_text(LINE.format(middle, -3.5, 50.0, 99503, 10, 0, 9, 0).rstrip() + "\n")
+    with (folder / "cats" / "catdir.cat").open("a") as handle:
+        handle.write(CATDIR.splitlines()[1].replace("99501 XYZ", "99503 ONE") + "\n")
+    command = ("identify", str(folder / "s.txt"), "--catalogue", str(folder / "cats"))
+    code, out, err = call(*command, "--json", "-")
+    assert (code, err) == (0, "")
+    assert {row["species"]: row["single_line"] for row in json.loads(out)["species"]} == {"XYZ": False, "ONE": True}
+    code, out, _ = call(*command)
+    marked = {line.split()[0]: " * " in line for line in out.splitlines() if line.startswith(("XYZ ", "ONE "))}
+    assert marked == {"XYZ": False, "ONE": True}
+    assert "* 1 species on a single line" in out
+
+
 def test_fit_of_a_source(call, folder):
     files = [str(folder / name) for name in ("f.csv", "f_profile.csv", "f.pdf")]
     code, out, err = call(
