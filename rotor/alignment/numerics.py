@@ -10,7 +10,7 @@ from rotor.alignment.align import BasisTooSmallError, truncation_apart
 from rotor.alignment.basis import least_jmax, trace_with
 from rotor.alignment.request import AlignRequest, answer_align, cosine_error
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.plans import of_top
+from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.knobs import largest_difference
 from rotor.requests.field import declared_fields
 from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps, ladder
@@ -97,7 +97,7 @@ def plan_of_align(request: Any) -> Plan:
     coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
     trace = answer_align(coarse).trace
     seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
-    described = of_top(request.top, max(trace.ensemble.jmax, 1), SEMI_RIGID)
+    described = plan_fields(request.top, max(trace.ensemble.jmax, 1), SEMI_RIGID)
     basis = f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"
     method = f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree"
     return Plan(

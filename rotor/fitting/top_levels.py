@@ -115,7 +115,7 @@ def _levels_of_states(
 def _levels_with_spins(
     begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
 ) -> LevelModel:
-    from rotor.quantum.estimates.labelled_spins import found_with_spins  # with all that spins need
+    from rotor.quantum.estimates.labelled_spins import assigned_with_spins  # with all that spins need
 
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]
@@ -125,7 +125,7 @@ def _levels_with_spins(
         return levels.rows_of(**{name: column[chosen] for name, column in quanta.items()})
 
     values, all_parameters = np.array(list(begin.values.values())), np.arange(len(names))
-    groups = found_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
+    groups = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
     missing = np.ones(len(labels), dtype=bool)
     for group in groups:
         missing[group.rows] = False

@@ -14,11 +14,11 @@ from rotor.quantum.estimates.accuracy import (
     hyperfine,
     largest,
     levels_error,
-    of_states,
+    reason_of_no_distortion_sweep,
     rounding_of,
 )
 from rotor.quantum.estimates.left_out import left_out_of_levels
-from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, of_top
+from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, plan_fields
 from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_of_whole
@@ -63,7 +63,7 @@ def sweeps_of_lines(
         return error(answer.lines, reference.lines)
 
     further = (*distortion(fixed, line_measure, of, answer), *hyperfine(fixed, line_measure, of, answer))
-    return Sweeps((reach, *further), of_states(request.top))
+    return Sweeps((reach, *further), reason_of_no_distortion_sweep(request.top))
 
 
 def _sweeps_of_spectrum(request: Any) -> Sweeps:
@@ -157,7 +157,7 @@ def plan_of_spectrum(request: Any) -> Plan:
         doppler(top, frequency, kelvin) if request.shape == "sticks" else None,
         pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
     ]
-    described = of_top(top, j, request.effects)
+    described = plan_fields(top, j, request.effects)
     neglected = largest_first([*described.pop("left_out"), *(part for part in widths if part is not None)])
     return Plan(
         kind="spectrum",
@@ -179,7 +179,7 @@ def plan_of_raman(request: Any) -> Plan:
         """Fields of the plan; J max is that of the answer."""
         top, jmax = request.top, answer.lines.jmax
         parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
-        described = of_top(top, populated_j(top, request.temperature_k), request.effects)
+        described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
         return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
 
     return plan_of_whole("raman", lambda: answer_raman(request), describe)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, model_term
-from rotor.quantum.estimates.limits import OF_SPINS
+from rotor.quantum.estimates.limits import SPIN_LIMITS
 from rotor.quantum.estimates.uncertainty import known_covariance, source_of_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.thermodynamics.functions import GAS_CONSTANT
@@ -98,12 +98,12 @@ def _axes_of(top: Top) -> dict[str, int]:
 def model_of_q(functions: ThermoFunctions, j: int, limits: Sequence[Limit]) -> ErrorTerm:
     """Relative size of neglected effects, level shifts over kT; not estimated if vibration is neglected.
 
-    Splittings by spins (`OF_SPINS`) matter most at the lowest temperature; other effects at the highest, with high J populated.
+    Splittings by spins (`SPIN_LIMITS`) matter most at the lowest temperature; other effects at the highest, with high J populated.
     """
     if functions.vibrations is None:
         return ErrorTerm(None, "vibration is left out", "vibrational states")
     lowest, highest = (MHZ_PER_K * float(end(functions.temperature_k)) for end in (np.min, np.max))
-    relative = [_over(limit, lowest if limit.name in OF_SPINS else 2 * highest / j) for limit in limits]
+    relative = [_over(limit, lowest if limit.name in SPIN_LIMITS else 2 * highest / j) for limit in limits]
     return model_term(relative)
 
 

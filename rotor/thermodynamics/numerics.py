@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from rotor.quantum.estimates.limits import populated_j
-from rotor.quantum.estimates.plans import of_top
+from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.knob import Sweeps
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_of_whole, timed
@@ -21,7 +21,7 @@ def plan_of_thermo(request: Any) -> Plan:
     seconds = timed(lambda: answers.append(answer_thermo(replace(request, temperatures_k=(hottest,)))))
     jmax = int(answers[-1].functions.jmax.max())
     summed = f"levels summed to J = {jmax} at {hottest:g} K" if jmax >= 0 else "classical with corrections: no levels"
-    described = of_top(request.top, populated_j(request.top, hottest), answers[-1].effects)
+    described = plan_fields(request.top, populated_j(request.top, hottest), answers[-1].effects)
     vibration = [] if request.vibrations else [LeftOut("vibration", None, "", "no states given")]
     return Plan(
         kind="thermo",

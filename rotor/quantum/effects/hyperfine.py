@@ -1,4 +1,4 @@
-"""Nuclear quadrupole coupling: eQ times the gradient of the electric field at a nucleus of spin 1 or more.
+"""Nuclear quadrupole coupling of nuclei of spin 1 or more with the gradient of the electric field.
 
     H = Σ_ij χ_ij I_i I_j / (2I(2I-1)),     χ_ij = eQ q_ij along a, b, c, symmetric and traceless
 
@@ -39,7 +39,7 @@ class NuclearQuadrupole(SpinEffect):
     }
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """The largest element of every χ, added over the nuclei: the splittings are fractions of it."""
+        """The largest element of χ, summed over the nuclei; splittings are fractions of it."""
         largest: dict[str, float] = {}
         for name, value in self.values.items():
             spin = parse_name(name).spins[0]
@@ -50,8 +50,8 @@ class NuclearQuadrupole(SpinEffect):
 def quadrupole_of_tensor(spin: Spin, chi_mhz: ArrayLike) -> NuclearQuadrupole:
     """The coupling of one nucleus from its tensor χ (3, 3) in principal axes a, b, c, MHz.
 
-    Raises ValueError for a tensor that is not symmetric or not traceless within 1e-3 of its largest element (published
-    elements are rounded; the rest of the trace is taken out).
+    Raises ValueError unless the tensor is symmetric and traceless within 1e-3 of its largest element; the trace that rounding of published
+    elements leaves is removed.
 
     >>> quadrupole_of_tensor(Spin("35Cl", 3), [[-57.0, 0, 0], [0, 26.4, 0], [0, 0, 30.6]]).values["chi_bb-cc(35Cl)"].__round__(6)
     -4.2

@@ -1,12 +1,11 @@
-"""Several vibrational or tunnelling states: their own constants, and Coriolis and Fermi terms between them.
+"""Several vibrational or tunnelling states with their constants, and Coriolis and Fermi terms between them.
 
     ⟨v|H|v'⟩ = Σ i G_a N_a + Σ F_bc {N_b, N_c} + W,     v < v',     [N_a, N_b] = -i N_c
 
-and the Hermitian conjugate for v' < v. G has a factor i because N changes its sign under time reversal; the sign is that of SPFIT
-(measured: the other sign of G against F moves levels by 0.01 cm⁻¹ at J = 15). Parameters, MHz: E[1] and any constant of the top's own
-vocabulary with a state, A[1], DeltaJK[1]; between states G_a[0,1], F_bc[0,1], W[0,1], W_pm2[0,1] (with N₊² + N₋²), each with powers,
-G_c_J[0,1] with N², F_ab_K[0,1] with Nz², as half anticommutators. Every other constant of a state must be given: none is taken from
-the top's own.
+and the Hermitian conjugate for v' < v. G has a factor i because N changes sign under time reversal; the sign convention is that of SPFIT
+(measured: the other sign of G relative to F shifts levels by 0.01 cm⁻¹ at J = 15). Parameters, MHz: E[1] and any constant of the top with a
+state, A[1], DeltaJK[1]; between states G_a[0,1], F_bc[0,1], W[0,1], W_pm2[0,1] (with N₊² + N₋²), each with powers as half anticommutators,
+G_c_J[0,1] with N², F_ab_K[0,1] with Nz². A state has only the constants that are stated for it; none is copied from v = 0.
 """
 
 from __future__ import annotations
@@ -32,10 +31,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class InteractingStates(QuantumEffect):
-    """States beyond the top's own (v = 0), by parameters with their states in square brackets.
+    """States v ≥ 1 and their interactions, by parameters with states in square brackets.
 
-    values: MHz by name. weights: spin weights of states that differ from the top's. moments: dipoles (a, b, c) in debye by pairs of
-    states (v', v), within states and between them; those between states are real in the phases of the couplings.
+    values: MHz by name. weights: spin weights of states that differ from those of v = 0. moments: dipoles (a, b, c) in debye by pairs of
+    states (v', v); those between states are real in the phases of the couplings.
     """
 
     name: ClassVar[str] = "interacting states"
@@ -65,7 +64,7 @@ class InteractingStates(QuantumEffect):
         return dict(self.values)
 
     def states(self, top: Top) -> tuple[State, ...]:
-        """Every state that has a constant of its own."""
+        """The states that have a constant."""
         terms: dict[int, dict[str, Operators]] = {}
         for name in self.values:
             if state := state_of_constant(name):
@@ -76,15 +75,15 @@ class InteractingStates(QuantumEffect):
         return tuple(State(v, terms[v], self.weights.get(v)) for v in sorted(terms))
 
     def couplings(self, top: Top) -> tuple[Coupling, ...]:
-        """Every parameter between two states."""
+        """The parameters between two states."""
         return tuple(_coupling(name, parse_name(name)) for name in self.values if not state_of_constant(name))
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
-        """The dipoles given, by pairs of states."""
+        """The dipoles by pairs of states."""
         return dict(self.moments)
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """The same effect with other values of some of its parameters."""
+        """This effect with new values of some parameters."""
         return type(self)({**self.values, **values}, self.weights, self.moments)
 
     def size_mhz(self, top: Top, j: int) -> float:
@@ -99,7 +98,7 @@ class InteractingStates(QuantumEffect):
 
 
 def state_of_constant(name: str) -> tuple[str, int] | None:
-    """The constant and the state of a name such as A[1]; None for what connects two states.
+    """The constant and the state of a name such as A[1]; None for an interaction of two states.
 
     >>> state_of_constant("DeltaJK[2]"), state_of_constant("G_c[0,1]")
     (('DeltaJK', 2), None)
@@ -117,12 +116,13 @@ _ORDERS = {"pm2": 2, "pm4": 4, "pm6": 6}
 
 
 def _coupling(name: str, parts: ParameterName) -> Coupling:
+    """The interaction of two states that a parameter multiplies."""
     if parts.states is None or parts.states[0] == parts.states[1] or parts.spins or parts.ns:
         raise ValueError(f"{name}: an interaction connects two states, in square brackets, as in G_c[0,1]")
     kind, _, letters = parts.symbol.partition("_")
-    known = {"G": ("a", "b", "c"), "F": ("bc", "ac", "ab"), "W": ("", *_ORDERS)}
-    if letters not in known.get(kind, ()):
-        spelled = ", ".join(f"{k}_{x}" if x else k for k, names in known.items() for x in names)
+    letters_of_kind = {"G": ("a", "b", "c"), "F": ("bc", "ac", "ab"), "W": ("", *_ORDERS)}
+    if letters not in letters_of_kind.get(kind, ()):
+        spelled = ", ".join(f"{k}_{x}" if x else k for k, names in letters_of_kind.items() for x in names)
         raise ValueError(f"{name}: interactions between states are {spelled}")
 
     def operator(j: int, representation: str) -> JOperator:
@@ -132,6 +132,7 @@ def _coupling(name: str, parts: ParameterName) -> Coupling:
 
 
 def _plain(kind: str, letters: str, j: int, representation: str) -> JOperator:
+    """The operator of an interaction without powers."""
     if kind == "W":
         return identity(j) if not letters else raising(j) ** _ORDERS[letters] + lowering(j) ** _ORDERS[letters]
     component = components(j, representation)

@@ -1,4 +1,4 @@
-"""The effects of a top's own spins and further states, from its named constants."""
+"""Effects that follow from the named constants of a top: spins, further states, internal rotation."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
-    """Quadrupole, spin-rotation and spin-spin coupling of a top with constants of spins; none without them.
+    """Quadrupole, spin-rotation and spin-spin coupling of a top, from its spin constants.
 
-    Raises ValueError for a name that no effect knows, for like nuclei whose exchange the spin weights count already, and for a tensor
-    that a linear molecule cannot have.
+    Raises ValueError for an unknown name, for like nuclei whose exchange the spin weights count already, and for a tensor that a linear
+    molecule cannot have.
 
     >>> from rotor.tops.spins.spin_constants import SpinConstants
     >>> from rotor.tops.top import Top
@@ -41,6 +41,7 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
 
 
 def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
+    """Effects of spin constants, each with its parameters."""
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
     from rotor.quantum.effects.spin_effect import parse_name
     from rotor.quantum.effects.spin_rotation import SpinRotation
@@ -54,18 +55,18 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     )
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
-        known = [symbol for kind in kinds for symbol in kind.symbols]
-        symbol = parse_name(name).symbol if name.startswith(tuple(known)) else ""
+        symbols = [symbol for kind in kinds for symbol in kind.symbols]
+        symbol = parse_name(name).symbol if name.startswith(tuple(symbols)) else ""
         kind = next((kind for kind in kinds if symbol in kind.symbols), None)
         if kind is None:
-            hint = did_you_mean(name.partition("(")[0], known)
-            raise ValueError(f"{name}: known constants of spins are {first_names(known)}{hint}")
+            hint = did_you_mean(name.partition("(")[0], symbols)
+            raise ValueError(f"{name}: known constants of spins are {first_names(symbols)}{hint}")
         values.setdefault(kind, {})[name] = value
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 
 
 def _refuse_unknown_states(top: Top) -> None:
-    """ValueError for a constant of a spin in a state that the top has not."""
+    """Raise ValueError for a spin constant of a state that the top does not have."""
     from rotor.quantum.effects.spin_effect import parse_name
 
     assert top.spin_constants is not None
@@ -79,7 +80,7 @@ def _refuse_unknown_states(top: Top) -> None:
 
 
 def _refuse_across_a_line(top: Top) -> None:
-    """ValueError where the tensors of a linear molecule, whose axis is a, are not the same along b and c."""
+    """Raise ValueError if a tensor of a linear molecule, whose axis is a, differs along b and c."""
     from rotor.quantum.effects.spin_effect import parse_name
 
     assert top.spin_constants is not None
@@ -101,16 +102,16 @@ def _refuse_across_a_line(top: Top) -> None:
 
 
 def _weights_of_states(top: Top) -> list[SpinWeights]:
-    """The spin weights of a top and of its states, without those that are alike for all levels."""
+    """The spin weights of a top and of its states, without those that are equal for all levels."""
     all_weights = [top.spin_weights, *(top.states.weights.values() if top.states else ())]
     return [weights for weights in all_weights if weights.rule != "none"]
 
 
 def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
-    """ValueError where the spin weights beside a total spin of two nuclei count these two.
+    """Raise ValueError if spin weights count two nuclei that have a total spin.
 
-    With a geometry that is known. Without one, weights that are those of the two nuclei alone are taken to be theirs, unless they are
-    stated to be those of the others.
+    A geometry decides this. Without one, weights that equal those of the two nuclei are assumed to count them, unless they are stated to be
+    those of the other nuclei.
     """
     from rotor.tops.spins.spin_statistics import weights_of
 
@@ -128,7 +129,7 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
 
 
 def _refuse_like_nuclei(top: Top) -> None:
-    """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
+    """Raise ValueError if spin weights count the exchange of like nuclei that are coupled one by one."""
     assert top.spin_constants is not None
     all_weights = _weights_of_states(top)
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
@@ -145,7 +146,7 @@ def _refuse_like_nuclei(top: Top) -> None:
 
 
 def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
-    """The states beyond a top's own, with what couples them; none for a top of one state."""
+    """The states v ≥ 1 of a top with their interactions; empty for a single state."""
     if top.states is None:
         return ()
     from rotor.quantum.effects.interactions import InteractingStates
@@ -155,7 +156,7 @@ def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
 
 
 def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
-    """Internal rotation of a top that has constants of it; none for others."""
+    """Internal rotation of a top with constants for it; empty for others."""
     if top.internal_rotation is None:
         return ()
     from rotor.quantum.effects.internal_rotation import InternalRotation
@@ -166,9 +167,9 @@ def internal_rotation_effects(top: Top) -> tuple[QuantumEffect, ...]:
 def with_states(
     top: Top, states: StateConstants, effects: Sequence[QuantumEffect]
 ) -> tuple[Top, tuple[QuantumEffect, ...]]:
-    """The effects of a calculation with the states of a top, and the top with the spin weights that its own state has among them.
+    """The top with the spin weights of its state v = 0, and the effects of a calculation with all its states.
 
-    Where the effects are the semi-rigid ones, the other states of the top are added; other effects stay as they are given.
+    The states v ≥ 1 are added to the semi-rigid effects; any other effects remain unchanged.
     """
     effects = tuple(effects)
     if effects == SEMI_RIGID:
@@ -180,27 +181,29 @@ def with_states(
 def effects_of(
     top: Top, hyperfine: bool, method: str = "exact", tolerance_mhz: float = TOLERANCE_MHZ
 ) -> tuple[QuantumEffect, ...]:
-    """The semi-rigid Hamiltonian of a top in all its states, and with `hyperfine` its spins.
+    """The effects of a top: semi-rigid Hamiltonian, all states, internal rotation, and optionally spins.
 
     Parameters
     ----------
     top : Top
+        Constants of the rotation, of states, internal rotation and spins.
     hyperfine : bool
+        Whether spins are included.
     method : str
-        "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep the tolerance, see
+        "exact", "N-diagonal", "first-order", or "auto", the cheapest treatment whose estimated error is within the tolerance; see
         `rotor.quantum.hyperfine_method`.
     tolerance_mhz : float
-        By how much lines may differ from exact ones with "auto".
+        Largest error of lines with "auto".
 
     Returns
     -------
     tuple of QuantumEffect
-        For `solve_levels`, `line_list` and others.
+        Effects for `solve_levels`, `line_list` and others.
 
     Raises
     ------
     ValueError
-        Where spins are asked for and the top has no constants of any.
+        If spins are requested and the top has no spin constants.
     """
     if not hyperfine:
         return (*SEMI_RIGID, *state_effects(top), *internal_rotation_effects(top))
@@ -220,7 +223,7 @@ def effects_of(
 
 
 def _method(top: Top, effects: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:
-    """The choice of a method where it is not the usual one."""
+    """The treatment of spins as an effect; empty for the exact one."""
     spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
     requested = HyperfineMethod(method, tolerance_mhz, tuple(spins.values()))
     return () if method == EXACT else (requested,)

@@ -1,9 +1,9 @@
-"""What the effects of spins have in common: parameters by name, each with the spins and the powers it belongs to.
+"""Base class of the effects of spins: parameters with names that state spins, powers and vibrational states.
 
     symbol [_powers] (spin [, spin]) [state]          chi_aa(14N), C_ab_J(H1), T_bb-cc(S, 14N), chi_aa(14N)[1]
 
-powers: J for N², K for Nz², S for N·S of the first spin, as half anticommutators, one letter a factor. Without a state in square
-brackets a parameter belongs to every state. The values are in MHz.
+powers: J for N², K for Nz², S for N·S of the first spin, one letter for each factor, as half anticommutators. Without a state in square
+brackets a parameter acts in all states. The values are in MHz.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NAME = re.compile(
 
 
 class ParameterName(NamedTuple):
-    """A name taken apart: symbol, powers of N², Nz² and N·S, spins, and the states v', v that it connects (None: all)."""
+    """Parts of a name: symbol, powers of N², Nz² and N·S, spins, and the states v', v that it connects (None: all)."""
 
     symbol: str
     n2: int = 0
@@ -40,7 +40,7 @@ class ParameterName(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The name as it is written."""
+        """The complete name."""
         powers = "J" * self.n2 + "K" * self.nz2 + "S" * self.ns
         states = "" if self.states is None else f"[{','.join(str(v) for v in dict.fromkeys(self.states))}]"
         spins = f"({','.join(self.spins)})" if self.spins else ""
@@ -71,7 +71,7 @@ def parse_name(name: str) -> ParameterName:
 
 
 class Symbol(NamedTuple):
-    """What a symbol stands for: the operator of N, a factor, how many spins its name has, whether one acts twice (a quadrupole)."""
+    """Meaning of a symbol: operator of N, factor, number of spins in the name, and whether one spin acts twice (a quadrupole)."""
 
     rotor: Rotor
     factor: float
@@ -81,10 +81,7 @@ class Symbol(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SpinEffect(QuantumEffect):
-    """A sum of named parameters, each an operator of N times one of spins.
-
-    values: MHz by name. coupled: the spins that the names use, in the order in which they are coupled.
-    """
+    """A sum of parameters times operators of N and of spins. values: MHz by name. coupled: the spins, in the order of coupling."""
 
     values: Mapping[str, float]
     coupled: tuple[Spin, ...]
@@ -93,25 +90,26 @@ class SpinEffect(QuantumEffect):
     def __post_init__(self) -> None:
         names = {parse_name(name).text: float(value) for name, value in self.values.items()}
         object.__setattr__(self, "values", MappingProxyType(names))
-        self.terms  # noqa: B018  every name is checked when the effect is made
+        self.terms  # noqa: B018  checks all names when the effect is made
 
     def __reduce__(self) -> tuple[type[Self], tuple[dict[str, float], tuple[Spin, ...]]]:
         return type(self), (dict(self.values), self.coupled)
 
     @cached_property
     def terms(self) -> tuple[SpinTerm, ...]:
-        """Every parameter as an operator."""
+        """The operators of all parameters."""
         return tuple(self._term(name) for name in self.values)
 
     def _term(self, name: str) -> SpinTerm:
+        """The operator of a parameter."""
         parts = parse_name(name)
         if parts.symbol not in self.symbols:
             raise ValueError(f"{name}: {self.name} knows {', '.join(self.symbols)}")
         symbol = self.symbols[parts.symbol]
-        known = [spin.name for spin in self.coupled]
-        if len(parts.spins) != symbol.spins or not set(parts.spins) <= set(known):
+        spin_names = [spin.name for spin in self.coupled]
+        if len(parts.spins) != symbol.spins or not set(parts.spins) <= set(spin_names):
             raise ValueError(
-                f"{name}: {parts.symbol} belongs to {symbol.spins} of the spins {', '.join(known) or '(none)'}, in round brackets"
+                f"{name}: {parts.symbol} belongs to {symbol.spins} of the spins {', '.join(spin_names) or '(none)'}, in round brackets"
             )
         spins = parts.spins * 2 if symbol.squared else parts.spins
         factor = symbol.factor * self.scale(name, parts)
@@ -119,11 +117,11 @@ class SpinEffect(QuantumEffect):
         return SpinTerm(name, spins, symbol.rotor, factor, parts.n2, parts.nz2, parts.ns, bra, ket)
 
     def scale(self, name: str, parts: ParameterName) -> float:
-        """A further factor that depends on the spins."""
+        """A further factor of a term, which depends on its spins."""
         return 1.0
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """The same effect with other values of some of its parameters."""
+        """This effect with new values of some parameters."""
         return replace(self, values={**self.values, **values})
 
     def parameters(self, top: Top) -> dict[str, float]:
@@ -135,12 +133,12 @@ class SpinEffect(QuantumEffect):
         return self.coupled
 
     def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
-        """Every parameter as an operator."""
+        """The operators of all parameters."""
         return self.terms
 
 
 def matrix_of(letters: str) -> Matrix:
-    """The matrix c_ij along a, b, c that a component stands for: aa, ab (both orders), ab-ba, bb-cc, and iso for the unit matrix.
+    """The matrix c_ij along a, b, c of a component: aa, ab (both orders), ab-ba, bb-cc, and iso for the unit matrix.
 
     >>> matrix_of("ab"), matrix_of("ab-ba")[:2]
     (((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
@@ -158,7 +156,7 @@ def matrix_of(letters: str) -> Matrix:
 
 
 def traceless_of(letters: str) -> Matrix:
-    """The traceless symmetric matrix of which a component is 1: aa with -½ twice, bb-cc with ±½, ab.
+    """The traceless symmetric matrix for a component of 1: aa with -½ for bb and cc, bb-cc with ±½, ab.
 
     >>> traceless_of("bb-cc")
     ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, -0.5))

@@ -1,14 +1,13 @@
-"""Spin-rotation coupling, of nuclei (C) and of unpaired electrons (ε).
+"""Spin-rotation coupling of nuclei (C) and of unpaired electrons (ε).
 
     H = Σ_ij C_ij ½{S_i, N_j},     S_i = Σ_p φ_pi S_p the component of the spin along a, b or c of the molecule
 
 (J. M. Brown and T. J. Sears, J. Mol. Spectrosc. 75, 111 (1979) for electrons; W. Gordy and R. L. Cook, Microwave Molecular
-Spectra, 3rd ed., eq. 9.139 for nuclei, with the sign +I·C·J). Parameters: C_aa, C_bb, C_cc, C_ab (the two orders
-alike), C_ab-ba for what they differ by, C_iso for a scalar C N·S, and the same with eps; gamma is eps_iso. Note the sign: catalogues
-that write -I·C·J give -C.
+Spectra, 3rd ed., eq. 9.139 for nuclei, with the sign +I·C·J). Parameters: C_aa, C_bb, C_cc, C_ab (mean of both orders), C_ab-ba (half of
+their difference), C_iso for a scalar C N·S, and the same with eps; gamma is eps_iso. Note the sign: catalogues that define -I·C·J list -C.
 
 C_ab multiplies ½{S_a, N_b} + ½{S_b, N_a}, C_ab-ba ½{S_a, N_b} - ½{S_b, N_a} = i/2 [N², S_c] (a, b, c in cyclic order), so that the
-element of the tensor with the spin along a is C_ab + C_ab-ba. The difference connects N with N ± 1 alone: its first order is zero.
+element of the tensor with the spin along a is C_ab + C_ab-ba. The difference connects N only with N ± 1: its first order is zero.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ COMPONENTS = ("iso", "aa", "bb", "cc", "bb-cc", "bb-aa", "ab", "ac", "bc", "ab-b
 
 
 def _symbol(letters: str) -> Symbol:
+    """Meaning of a component such as ab."""
     return Symbol(CosinesWithN(matrix_of(letters)), 1.0, 1)
 
 
@@ -44,7 +44,7 @@ class SpinRotation(SpinEffect):
     } | {"gamma": _symbol("iso")}
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """The largest constant times N and S, powers of N with it."""
+        """The largest constant times S and powers of N."""
         sizes = [0.0]
         for term in self.terms:
             spin = max(s.twice for s in self.coupled if s.name in term.spins) / 2

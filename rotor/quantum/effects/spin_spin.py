@@ -1,4 +1,4 @@
-"""Coupling of spins with each other: of two spins, scalar and dipolar, and of the electrons of a triplet or higher state.
+"""Spin-spin coupling: scalar and dipolar coupling of two spins, and of the electrons of a triplet or higher state.
 
     H = J I1·I2 + Σ_ij T_ij I1_i I2_j,     H = Σ_ij D_ij S_i S_j,     T and D symmetric and traceless along a, b, c
 
@@ -34,7 +34,7 @@ class SpinSpin(SpinEffect):
     )
 
     def scale(self, name: str, parts: ParameterName) -> float:
-        """2S(2S-1) for one spin with itself: the operator it is multiplied with is divided by that."""
+        """2S(2S-1) for a spin with itself, by which the quadrupole operator is divided; else 1."""
         if not self.symbols[parts.symbol].squared:
             return 1.0
         twice = next(spin.twice for spin in self.coupled if spin.name == parts.spins[0])

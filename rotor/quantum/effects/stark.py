@@ -1,12 +1,12 @@
-"""A static electric field, and the non-resonant light of a laser along Z beside it.
+"""Stark effect of a static electric field, optionally with non-resonant laser light polarized along Z.
 
     H = H0 - μ·n E - (2π I/c) (α'_ZZ),          μE/h = 503.4117 MHz for 1 D and 1 kV/cm
 
-The dipole points from minus to plus, so that a positive field lowers the state whose dipole points along it. Where the field is along Z
-too, n = Z, M is good and ±M coincide. A field at an angle with the light mixes M: the basis is then that of all M together.
+The dipole points from minus to plus, so that a positive field lowers the state whose dipole points along it. If the field is along Z too
+(n = Z), M is a good quantum number and ±M coincide. A field at an angle with the light mixes M; the basis then contains all M.
 To second order a linear top has W = (μ²E²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], and -μ²E²/6hB for J = 0; a symmetric one has
--μE KM/[J(J+1)] to first order (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 10). Nothing of that is used
-here: the matrices are solved.
+-μE KM/[J(J+1)] to first order (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 10). These formulas serve as checks;
+the module solves the matrices.
 """
 
 from __future__ import annotations
@@ -68,29 +68,29 @@ def stark_map(
     Parameters
     ----------
     top : Top
-        With `dipole_abc_debye`, and `polarizability_abc_angstrom3` where light acts.
+        Top with `dipole_abc_debye`, and with `polarizability_abc_angstrom3` for light.
     fields_kv_per_cm : (n,)
-        Each once, in rising order.
+        Field strengths; the map has each once, in rising order.
     j_highest : int
-        States that belong to free levels up to this J.
+        Highest J of the free levels in the map.
     m_values : sequence of numbers, optional
         |M|; by default 0 ... `j_highest`. With spins it is |M_F|, a multiple of ½.
     intensity_w_per_cm2 : float
-        Of a laser far from resonance, polarized along Z, at every field.
+        Intensity of a laser far from resonance, polarized along Z.
     direction : (3,)
-        Of the static field, any length; at an angle with Z it mixes M, and the column m is -1.
+        Direction of the static field, of any length; at an angle with Z it mixes M, and the column m is -1.
     effects : sequence of QuantumEffect
-        The Hamiltonian of a top with spins (`rotor.quantum.effects`), the semi-rigid ones with them; states are |F M_F⟩ then.
+        Effects of a top with spins, the semi-rigid ones included; states are then |F M_F⟩.
     jmax : int, optional
-        Of the basis; by default chosen.
+        Highest J of the basis; by default what the tolerance needs.
     tolerance_mhz : float
-        Of energies, by raising J max.
+        Largest truncation error of an energy.
     diabatic_gap_mhz : float, optional
-        Near crossings with a smaller gap are passed diabatically in the column `diabatic_label`.
+        Avoided crossings with a smaller gap are passed diabatically in the column `diabatic_label`.
     most_at_edge : float
-        Of the population of a state, in the two highest J of the basis.
+        Largest population of a state in the two highest J of the basis.
     executor : Executor, optional
-        Blocks are spread over it.
+        Solves blocks in parallel.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def stark_map(
     Raises
     ------
     ValueError
-        No dipole (and no light), fields beyond 1e5 kV/cm, a negative intensity, an M above J, a given J max that is too small.
+        For no dipole (and no light), fields beyond 1e5 kV/cm, a negative intensity, an M above J, or a J max that is too small.
 
     Notes
     -----
@@ -132,28 +132,28 @@ def map_request(
     diabatic_gap_mhz: float | None = None,
     effects: Sequence[QuantumEffect] = (),
 ) -> MapRequest:
-    """What `stark_map` solves, every argument checked.
+    """The request that `stark_map` solves, with checked arguments.
 
     Parameters
     ----------
     top : Top
-        With a dipole, or a polarizability where there is light.
+        Top with a dipole, or with a polarizability for light.
     fields_kv_per_cm : (f,) array
         Static fields.
     j_highest : int
-        States that come from levels up to this J are followed.
+        Highest J of the free levels in the map.
     m_values : sequence of int or None
         The |M| of the states; None for all.
     intensity_w_per_cm2 : float
-        Of a laser beam polarised along Z; 0 for none.
+        Intensity of a laser beam polarized along Z; 0 for none.
     direction : (3,) sequence, optional
-        Of the static field in space; Z by default.
+        Direction of the static field; Z by default.
     tolerance_mhz : float, optional
-        By how much energies may move when J max is raised.
+        Largest truncation error of an energy.
     diabatic_gap_mhz : float, optional
-        Crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
+        Avoided crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
     effects : sequence of QuantumEffect, optional
-        The Hamiltonian of a top with spins; `m_values` are |M_F| then.
+        Effects of a top with spins; `m_values` are then |M_F|.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def map_request(
     Raises
     ------
     ValueError
-        As `stark_map` does, and for `m_values` beside a field at an angle with Z.
+        As `stark_map`, and for `m_values` with a field at an angle with Z.
     """
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
     unit = checked_direction(direction)
@@ -173,7 +173,7 @@ def map_request(
         raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
     names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
     if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
-        del names["cos2theta"]  # tensors of rank 2 are not carried along there
+        del names["cos2theta"]  # no elements of rank 2 with spins and internal rotation
     contractions = tuple(contraction for contraction in (dipole, light) if contraction is not None)
     return MapRequest(
         space=KnownSpaces(partial(field_space, top, operators=contractions, effects=tuple(effects))),
@@ -200,21 +200,21 @@ def projections(
     top : Top
         Kind and nuclei.
     effects : sequence of QuantumEffect
-        The Hamiltonian, spins among it.
+        Effects of the Hamiltonian, spins included.
     m_values : sequence of float or None
         |M_F|; None for all.
     j_highest : int
-        The highest N that is followed.
+        Highest N of the free levels in the map.
 
     Returns
     -------
     tuple of float
-        Rising; whole numbers as int.
+        Values in rising order; integers as int.
 
     Raises
     ------
     ValueError
-        For values that no F of these spins has.
+        For values that do not occur with these spins.
     """
     if not any(effect.spins(top) for effect in effects):
         return checked_m(m_values, j_highest)
@@ -244,14 +244,14 @@ def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
 
 
 def checked_j(j_highest: int) -> int:
-    """A J from 0 to 100, or ValueError."""
+    """J from 0 to 100; ValueError for others."""
     if not 0 <= j_highest <= 100:
         raise ValueError(f"j_highest: states up to J = {j_highest}: expected a whole number from 0 to 100")
     return int(j_highest)
 
 
 def checked_m(m_values: Sequence[float] | None, j_highest: int) -> tuple[int, ...]:
-    """|M| from 0 to J, each once, all of them for None; ValueError for others."""
+    """|M| from 0 to J, each once, all for None; ValueError for others."""
     values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
     if not values or not all(0 <= m <= j_highest for m in values) or any(m % 1 for m in m_values or ()):
         raise ValueError(
@@ -266,9 +266,9 @@ def acting(
     direction: tuple[float, float, float] = Z,
     effects: Sequence[QuantumEffect] = (),
 ) -> tuple[Contraction, Contraction | None]:
-    """The dipole as contraction with the direction of the field, light as one with Z; ValueError where nothing acts.
+    """Contractions of the dipole with the direction of the field, and of the polarizability with Z; ValueError if nothing acts.
 
-    Of several states each has its dipole, and those between states act too.
+    Each of several states has its dipole; dipoles between states act too.
     """
     name = top.name or "this top"
     if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
@@ -295,7 +295,7 @@ def acting(
 
 
 def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> Contraction:
-    """∂(dipole along Z)/∂μ of one component of the top's dipole, which all states have that have none of their own."""
+    """∂(dipole along Z)/∂μ for one component of the top's dipole, which applies to all states without a stated dipole."""
     x, y, z = np.eye(3)[axis].tolist()
     with_unit = dipoles_by_state(top, (x, y, z), effects)
     none = dipoles_by_state(top, (0.0, 0.0, 0.0), effects)
@@ -304,17 +304,19 @@ def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> 
 
 
 def figure_axis(top: Top) -> int:
-    """The axis whose angle with Z is θ: that of a linear or symmetric top, else the one nearest to the dipole."""
+    """The axis whose angle with Z is θ: the axis of a linear or symmetric top, else the principal axis nearest to the dipole."""
     if top.kind != "asymmetric":
         return 2 if top.kind == "oblate" else 0
     return int(np.argmax(np.abs(top.dipole_abc_debye or (1.0, 0.0, 0.0))))
 
 
 def _orientation(top: Top, direction: tuple[float, float, float]) -> Contraction:
+    """cosθ of the figure axis and the field."""
     return Contraction(np.eye(3)[figure_axis(top)], direction)
 
 
 def _alignment(top: Top) -> Contraction:
+    """cos²θ of the figure axis and Z."""
     axis = np.eye(3)[figure_axis(top)]
     return Contraction(np.outer(axis, axis), np.outer(Z, Z))
 
@@ -322,6 +324,7 @@ def _alignment(top: Top) -> Contraction:
 def _problem(
     dipole: Contraction, light: Contraction | None, intensity: float, names: dict[str, Contraction], block: FieldBlock
 ) -> BlockProblem:
+    """Matrices of a block: energies and light, dipole in the field, observables."""
     fixed: NDArray[Any] = np.diag(block.energies_mhz)
     if light is not None:
         fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)

@@ -1,8 +1,8 @@
-"""The semi-rigid Hamiltonian: rigid and centrifugal terms, A and S reductions, every representation.
+"""The semi-rigid Hamiltonian: rigid and centrifugal terms, A and S reductions, all representations.
 
-Every term of an effective Hamiltonian in one vibrational state is c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0:
-c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}, whose matrix elements are in `rotor.quantum.wang.wang_matrix`.
-Which name stands for which term: `rotor.tops.operators`.
+Each term of an effective Hamiltonian in one vibrational state is c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0:
+c · J^2p Jz^2q), so that a Hamiltonian is a table {(p, q, n): c in MHz}. `rotor.quantum.wang.wang_matrix` has the matrix elements,
+`rotor.tops.operators` the terms of all names.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def operators_by_name(constants: Constants) -> dict[str, Operators]:
-    """∂H/∂c of every constant c that the set has, by name: H is the sum of them times the constants.
+    """∂H/∂c of the constants c by name; H is their sum times the constants.
 
     >>> from rotor.tops.constants import Constants
     >>> operators_by_name(Constants(A=9.0, B=3.0, C=2.0))["C"]
@@ -29,7 +29,7 @@ def operators_by_name(constants: Constants) -> dict[str, Operators]:
 
 
 def operators_of_name(constants: Constants, name: str) -> Operators:
-    """∂H/∂c of one name of the vocabulary that a set of constants has, whether or not it is in the set.
+    """∂H/∂c of a constant by its name, whether or not it has a value in the set.
 
     >>> from rotor.tops.constants import Constants
     >>> operators_of_name(Constants(A=9.0, B=3.0, C=2.0, reduction="A"), "DeltaJ")
@@ -40,6 +40,7 @@ def operators_of_name(constants: Constants, name: str) -> Operators:
 
 
 def _powers(name: str) -> Powers:
+    """Powers (p, q, n) of a name that spells its operator."""
     powers = powers_of_spelled(name)
     if powers is None:
         raise ValueError(f"{name} has no operator here")
@@ -47,10 +48,10 @@ def _powers(name: str) -> Powers:
 
 
 def _rigid_terms(constants: Constants) -> dict[str, Operators]:
-    """½(Bx+By) J² + [Bz - ½(Bx+By)] Jz² + ¼(Bx-By)(J₊² + J₋²) taken apart, axes by the representation.
+    """Operators of A, B, C in ½(Bx+By) J² + [Bz - ½(Bx+By)] Jz² + ¼(Bx-By)(J₊² + J₋²), axes by the representation.
 
-    A linear or spherical top has the first term alone; z is a in a prolate and c in an oblate symmetric top. Where
-    equal constants are given twice, B is the one that counts.
+    A linear or spherical top has only the first term; z is a in a prolate and c in an oblate symmetric top. Of two equal constants only B
+    counts.
     """
     if constants.kind in ("linear", "spherical"):
         return {"A": {}, "C": {}, "B": {(1, 0, 0): 1.0}}
@@ -66,6 +67,7 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
 
 
 def _added(constants: Constants, names: Iterable[str]) -> Operators:
+    """Sum of the operators of these constants."""
     return added((operators_of_name(constants, name), constants.values[name]) for name in names)
 
 
@@ -75,7 +77,7 @@ def rigid_operators(constants: Constants) -> Operators:
 
 
 def centrifugal_operators(constants: Constants) -> Operators:
-    """The distortion terms of the constants' own reduction and representation, and those without a name."""
+    """The distortion terms in the reduction and representation of the constants, spelled operators included."""
     return _added(constants, [name for name in constants.values if name not in "ABC"])
 
 
@@ -85,7 +87,7 @@ class Rigid(QuantumEffect):
     name = "rigid rotor"
 
     def parameters(self, top: Top) -> dict[str, float]:
-        """A, B, C in MHz, those that the set has."""
+        """A, B, C in MHz, as far as the set has them."""
         return {name: value for name, value in top.constants.values.items() if name in "ABC"}
 
     def operators(self, top: Top) -> dict[str, Operators]:
@@ -93,12 +95,12 @@ class Rigid(QuantumEffect):
         return {name: terms for name, terms in operators_by_name(top.constants).items() if name in "ABC"}
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """A J(J+1) bounds the rigid energy."""
+        """The bound A J(J+1) of the rigid energy."""
         return max(self.parameters(top).values()) * j * (j + 1)
 
 
 class Centrifugal(QuantumEffect):
-    """Centrifugal distortion of every order that the constants carry."""
+    """Centrifugal distortion of all orders of the constants."""
 
     name = "centrifugal distortion"
 
@@ -107,11 +109,11 @@ class Centrifugal(QuantumEffect):
         return {name: value for name, value in top.constants.values.items() if name not in "ABC"}
 
     def operators(self, top: Top) -> dict[str, Operators]:
-        """∂H/∂c of every distortion constant."""
+        """∂H/∂c of the distortion constants."""
         return {name: terms for name, terms in operators_by_name(top.constants).items() if name not in "ABC"}
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """Every term at K = J, all added in size."""
+        """The sum of the absolute values of all terms at K = J."""
         x = j * (j + 1.0)
         terms = centrifugal_operators(top.constants).items()
         return float(sum(abs(c) * x**p * float(j) ** (2 * q) * (2 * x**n if n else 1.0) for (p, q, n), c in terms))

@@ -1,15 +1,14 @@
-"""A magnetic field along Z on the moment that rotation makes: the Zeeman effect of molecules without electron spin.
+"""Zeeman effect of molecules without electron spin: a magnetic field along Z and the moment of the rotation.
 
     H = H0 - μ_N B ½ Σ_ij g_ij (Φ_Zi J_j + J_j Φ_Zi),           μ_N/h = 7.6226 MHz/T
 
 with the rotational g tensor along a, b, c (W. H. Flygare, Chem. Rev. 74, 653 (1974), eq. 8), Φ_Zi the direction cosines and J_j in the
-molecule. A linear top has J across its axis alone, so that H = -g μ_N B J_Z and E = E0 - g μ_N B M exactly; a symmetric top has
-g⊥ J_Z + (g∥ - g⊥) Φ_Zz J_z. M is good, and M and -M differ. To second order the magnetisability χ acts,
+molecule. J of a linear top is perpendicular to its axis, so that H = -g μ_N B J_Z and E = E0 - g μ_N B M exactly; a symmetric top has
+g⊥ J_Z + (g∥ - g⊥) Φ_Zz J_z. M is a good quantum number, and M and -M differ. To second order the magnetisability χ acts,
 
     -½ B² χ_ZZ,          1e-6 erg/(G² mol) = 0.0250607 MHz/T²,
 
-which is some 0.1 MHz/T² for an anisotropy of ten of these units. With effects that have spins, -μ_N B Σ g_I I_Z is added, the shielding
-of the nuclei neglected.
+about 0.1 MHz/T² for an anisotropy of ten of these units. With spins, -μ_N B Σ g_I I_Z is added; the shielding of the nuclei is neglected.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
 HIGHEST_TESLA = 1000.0
 DEFAULT_TOLERANCE_MHZ = 1e-6
-MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
+MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # value of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
 Z = (0.0, 0.0, 1.0)
 
 
@@ -65,25 +64,25 @@ def zeeman_map(
     Parameters
     ----------
     top : Top
-        Linear, symmetric or asymmetric.
+        A linear, symmetric or asymmetric top.
     fields_tesla : (n,)
-        Each once, in rising order.
+        Field strengths; the map has each once, in rising order.
     g : float, (3,) or (3, 3)
-        Rotational g tensor along a, b, c; one number or three for a linear top, whose g_aa does nothing.
+        Rotational g tensor along a, b, c; one number or three for a linear top, whose g_aa has no effect.
     magnetisability : (3,) or (3, 3), optional
         χ along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative).
     effects : sequence of QuantumEffect
-        The Hamiltonian of a linear or asymmetric top with spins, the semi-rigid ones with them; states are |F M_F⟩ then.
+        Effects of a linear or asymmetric top with spins, the semi-rigid ones included; states are then |F M_F⟩.
     nuclear_g : mapping, optional
-        g = μ/(μ_N I) of nuclei by the names of their spins; those that are left out do not feel the field.
+        g = μ/(μ_N I) of nuclei by the names of their spins; other nuclei do not interact with the field.
     j_highest : int
-        States that belong to free levels up to this J.
+        Highest J of the free levels in the map.
     jmax : int, optional
-        Of the basis; by default chosen.
+        Highest J of the basis; by default what the tolerance needs.
     tolerance_mhz : float
-        Of energies.
+        Largest truncation error of an energy.
     executor : Executor, optional
-        Blocks are spread over it.
+        Solves blocks in parallel.
 
     Returns
     -------
@@ -99,9 +98,9 @@ def zeeman_map(
     Examples
     --------
     >>> from rotor.tops.top import Top
-    >>> found = zeeman_map(Top.from_constants("B=6000 MHz"), [0.0, 1.0], -0.03, j_highest=1)
-    >>> rows = found.curve("1", 1)
-    >>> (found.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
+    >>> states = zeeman_map(Top.from_constants("B=6000 MHz"), [0.0, 1.0], -0.03, j_highest=1)
+    >>> rows = states.curve("1", 1)
+    >>> (states.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
     tensor, nuclei = checked_g(top, g), dict(nuclear_g or {})
@@ -127,14 +126,14 @@ def zeeman_map(
 
 
 def checked_g(top: Top, g: ArrayLike) -> Floats:
-    """The g tensor (3, 3) along a, b, c; ValueError where it is not finite or does not fit the kind of top."""
+    """The g tensor (3, 3) along a, b, c; ValueError unless it is finite and fits the kind of top."""
     if top.kind == "spherical":
         raise ValueError("a spherical top has an isotropic g: E = E0 - g μ_N B M; no map is needed")
     return _axial_tensor(top, g, "g")
 
 
 def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
-    """A tensor (3, 3) from one number, three or all of it; ValueError where it does not have the symmetry of the top."""
+    """A tensor (3, 3) from one number, three or nine; ValueError unless it has the symmetry of the top."""
     array = np.asarray(values, dtype=np.float64)
     tensor = np.diag(np.broadcast_to(array, 3)) if array.ndim < 2 and array.size in (1, 3) else array
     if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
@@ -149,5 +148,6 @@ def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
 
 
 def _problem(magnet: Magnet, square: Contraction | None, block: FieldBlock) -> BlockProblem:
+    """Matrices of a block: energies, magnetic moment, magnetisability."""
     curvature = None if square is None else -0.5 * MHZ_PER_T2 * block.dense(square)
     return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * block.dense(magnet), {}, curvature)

@@ -1,1 +1,1 @@
-"""How far levels can be relied on: convergence, limits, derivatives and errors."""
+"""Reliability of levels: convergence, neglected effects, derivatives and errors."""

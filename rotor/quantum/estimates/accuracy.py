@@ -1,7 +1,7 @@
-"""Accuracy of levels and lines: spins and the method of several, chosen by size; orders of distortion and methods, swept.
+"""Accuracy of levels and lines: choice of spins and of their treatment, sweeps of orders of distortion and of treatments.
 
-Energies of levels with one J are eigenvalues of whole blocks: no J max makes them better, and what a list loses is whole lines. The error
-stated is rounding, the size of known spins that are left out, and the estimate of the method of others.
+Energies of one J are eigenvalues of complete blocks, so that a higher J max only adds levels. The stated error contains rounding, the size
+of known spin couplings that are neglected, and the estimated error of an approximate treatment of spins.
 """
 
 from __future__ import annotations
@@ -24,15 +24,14 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 METHODS = ("first-order", "N-diagonal", "exact")
-EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
+EXACT, FOR_METHOD = "exact", 0.9  # default treatment of spins; share of an accuracy for the error of another treatment
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
 
 
 def choose_spins(scene: Any, request: Any, allowed: float) -> Choice:
-    """Spins whose constants are known are taken where they are larger than what was asked for, several by the cheapest method.
+    """Include spins with known constants if their size exceeds the requested accuracy; several spins by the cheapest treatment.
 
-    All orders of distortion that the constants have are taken: of J ≤ 40 of water, 13 ms, the orders above J⁴ are 3 ms, and those
-    above are not small beside 1 kHz.
+    All orders of distortion remain: for water up to J = 40 (13 ms) orders above J⁴ cost 3 ms, and they are not small against 1 kHz.
     """
     top, present = request.top, request.effects
     has_spins = any(effect.spins(top) for effect in present)
@@ -53,9 +52,9 @@ def choose_spins(scene: Any, request: Any, allowed: float) -> Choice:
 
 
 def _cheapest_method(request: Any, size: float, allowed: float) -> Choice:
-    """Spins by the cheapest method that is estimated to be within what was asked for; the estimate is in the error stated.
+    """Spins by the cheapest treatment whose estimated error is within the requested accuracy; the stated error contains the estimate.
 
-    One nucleus is exact at no more cost (docs/accuracy.md).
+    A single nucleus is exact at the same cost (docs/accuracy.md).
     """
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.effects.watson import Centrifugal
@@ -69,27 +68,27 @@ def _cheapest_method(request: Any, size: float, allowed: float) -> Choice:
 
 
 def _spin_size(top: Any) -> float:
-    """The largest size of known couplings of spins at J = 1."""
+    """The largest size of known spin couplings at J = 1."""
     from rotor.quantum.effects.of_top import spin_effects
 
     return max((effect.size_mhz(top, 1) for effect in spin_effects(top)), default=0.0)
 
 
 def rounding_mhz(levels: Any) -> float:
-    """Of the eigenvalues of some levels: that of the largest."""
+    """Rounding error of levels: that of the largest eigenvalue."""
     return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
 
 
 def levels_error(answer: Any, top: Any, levels: Any) -> float:
-    """The numerical error that an answer states, and the size of known spins that are left out."""
+    """The numerical error that an answer states, plus the size of known spin couplings that are neglected."""
     has_spins = top.spin_constants is None or any(effect.spins(top) for effect in levels.effects)
     return numerical_error(answer) + (0.0 if has_spins else _spin_size(top))
 
 
 def energies_like(reference: Levels, levels: Levels) -> Floats:
-    """Energies of other levels in the rows of a reference, by the quantum numbers that both have; NaN for a level that is not there.
+    """Energies of `levels` in the rows of a reference, matched by the quantum numbers that both have; NaN for a missing level.
 
-    The rotational angular momentum counts as one of them, whatever its name is.
+    J and N, the rotational angular momentum, are matched with each other.
     """
     shared = [name for name in reference.quanta_names if name in levels.quanta_names and name not in ("n", "j")]
     pairs = [(reference.rotational, levels.rotational)]
@@ -98,39 +97,40 @@ def energies_like(reference: Levels, levels: Levels) -> Floats:
     for both in pairs:
         _, code = np.unique(np.concatenate(both), return_inverse=True)
         _, key = np.unique(key * (int(code.max(initial=0)) + 1) + code, return_inverse=True)
-    sought, of_levels = key[: len(reference)], key[len(reference) :]
-    order = np.argsort(of_levels, kind="stable")
-    rows = order[np.minimum(np.searchsorted(of_levels[order], sought), len(of_levels) - 1)]
-    return np.where(of_levels[rows] == sought, levels.energy_mhz[rows], np.nan)
+    sought, level_keys = key[: len(reference)], key[len(reference) :]
+    order = np.argsort(level_keys, kind="stable")
+    rows = order[np.minimum(np.searchsorted(level_keys[order], sought), len(level_keys) - 1)]
+    return np.where(level_keys[rows] == sought, levels.energy_mhz[rows], np.nan)
 
 
 def level_error(levels: Levels, reference: Levels) -> float:
-    """The largest difference of an energy in MHz; infinite where no level is in both."""
+    """The largest difference of an energy in MHz; infinite if no level is in both."""
     return largest(energies_like(reference, levels) - reference.energy_mhz)
 
 
 def largest(differences: Floats) -> float:
-    known = np.abs(differences[np.isfinite(differences)])
-    return float(known.max()) if len(known) else math.inf
+    """The largest absolute value that is not NaN; infinite without any."""
+    sizes = np.abs(differences[np.isfinite(differences)])
+    return float(sizes.max()) if len(sizes) else math.inf
 
 
 def order_of(name: str, top: Top) -> int:
-    """The power of J in the operator of a constant: 2 of A, 4 of DeltaJ."""
+    """Power of J in the operator of a constant: 2 for A, 4 for DeltaJ."""
     from rotor.quantum.effects.watson import operators_by_name
 
     return max(2 * sum(powers) for powers in operators_by_name(top.constants)[name])
 
 
 def to_order(top: Top, order: int) -> Top:
-    """A top with the constants whose operators have no higher power of J."""
+    """A top without the constants whose operators have a higher power of J."""
     above = {name: None for name in top.constants.values if name not in "ABC" and order_of(name, top) > order}
     return top.with_constants(top.constants.replace(**above))
 
 
 def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
-    """Orders of centrifugal distortion, up to those that the constants have; nothing where there are none.
+    """Sweep of the orders of centrifugal distortion up to the highest of the constants; empty without distortion.
 
-    error: of an answer beside the reference in MHz. of: what it is the error of. answer: of a request.
+    error: error (MHz) of an answer relative to the reference. of: the quantity with this error. answer: computes the answer of a request.
     """
     top, names = request.top, [name for name in request.top.constants.values if name not in "ABC"]
     if (
@@ -149,9 +149,9 @@ def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer
 
 
 def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
-    """Methods of hyperfine structure, and no spins at all; nothing where the calculation has none.
+    """Sweep of the treatments of hyperfine structure, including none; empty if the calculation has no spins.
 
-    error: of an answer beside the reference in MHz. of: what it is the error of. answer: of a request.
+    error: error (MHz) of an answer relative to the reference. of: the quantity with this error. answer: computes the answer of a request.
     """
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.hyperfine_method import HyperfineMethod
@@ -178,19 +178,19 @@ def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer:
 
 
 def rounding_of(top: Any, j: int) -> float:
-    """Rounding of the rotational energies of one J in MHz."""
+    """Rounding error (MHz) of the rotational energies of one J."""
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     return rounding_mhz(answer_levels(LevelsRequest(top, jmin=j, jmax=j)).table.levels)
 
 
-def of_states(top: Top) -> tuple[str, ...]:
-    """Why distortion is not swept of a top with several states."""
+def reason_of_no_distortion_sweep(top: Top) -> tuple[str, ...]:
+    """Reason why distortion of a top with several states is not swept."""
     return ("effects.distortion: not swept: the top has several states",) if top.states is not None else ()
 
 
 def sweeps_of_levels(request: Any) -> Sweeps:
-    """Orders of distortion and methods of hyperfine structure."""
+    """Sweeps of orders of distortion and of treatments of hyperfine structure."""
     from rotor.quantum.request import answer_levels
 
     def error(answer: Any, reference: Any) -> float:
@@ -199,7 +199,7 @@ def sweeps_of_levels(request: Any) -> Sweeps:
     of = "energy of a level"
     sweeps = (*distortion(request, error, of, answer_levels), *hyperfine(request, error, of, answer_levels))
     exact = f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well"
-    return Sweeps(sweeps, (exact, *of_states(request.top)))
+    return Sweeps(sweeps, (exact, *reason_of_no_distortion_sweep(request.top)))
 
 
 LEVELS = Numerics(

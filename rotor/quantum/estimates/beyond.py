@@ -1,8 +1,8 @@
-"""What the constants of a top say of what a calculation with them leaves out: the next order of distortion, known couplings of spins.
+"""Neglected effects whose size follows from the constants of a top: the next order of distortion, and known spin couplings.
 
-The next order is c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`), a geometric series, with c = 0.3 of a
-linear top from the quartic to the sextic order, 3 of other tops there, 1 of every higher order. A harmonic diatomic molecule has 2, and
-anharmonicity takes most of it away (Dunham's H = 2D(12B² - αω)/3ω²); these values were chosen on the library, where they hold within a
+The next order is extrapolated as a geometric series, c s_n²/s_(n-1), from the sizes s of the last two orders at one J (`order_sizes_mhz`).
+From the quartic to the sextic order c = 0.3 for linear tops and 3 for others; c = 1 for all higher orders. A harmonic diatomic molecule has
+c = 2, most of which anharmonicity cancels (Dunham's H = 2D(12B² - αω)/3ω²). The values were chosen on the library, where they hold within a
 factor of 3 for 25 of 30 orders (tests/scenes/test_scene_plans.py names the others).
 """
 
@@ -18,16 +18,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
-COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
-OF_CHI = 0.5  # of χ: J = 1 of I = 1 is shifted by χ/2 at most, higher J by χ/4
+COMPUTE = "its constants are known, add the effects of spins"  # the command line replaces this by its option
+OF_CHI = 0.5  # largest shift relative to χ: χ/2 for J = 1 with I = 1, χ/4 for higher J
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Something that a calculation leaves out. size_mhz: for a line at the J in question; None: not estimated.
-
-    at_most: whether the size is the largest that it can have, not an estimate.
-    """
+    """A neglected effect. size_mhz: for a line at the highest J; None if not estimated. at_most: whether the size is an upper bound."""
 
     name: str
     size_mhz: float | None
@@ -36,19 +33,19 @@ class Limit:
 
     @property
     def sentence(self) -> str:
-        """Name, size and what it does, as a report prints them."""
-        known = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
-        size = f"at most {known}" if self.at_most else known
+        """Name, size and consequence, as reports print them."""
+        estimate = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
+        size = f"at most {estimate}" if self.at_most else estimate
         return f"{self.name}: {size}; {self.text}"
 
 
 def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | None:
-    """The order of distortion beyond the highest that the calculation has; None of rigid constants.
+    """The order of distortion beyond the highest of the calculation; None for rigid constants.
 
     >>> from rotor.quantum.effects.watson import SEMI_RIGID
     >>> from rotor.tops.top import Top
-    >>> one = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
-    >>> f"{one.size_mhz:.2e}"  # 0.3 D²/B (J(J+1))³
+    >>> sextic = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
+    >>> f"{sextic.size_mhz:.2e}"  # 0.3 D²/B (J(J+1))³
     '3.70e-03'
     """
     from rotor.quantum.estimates.convergence import order_sizes_mhz
@@ -63,7 +60,7 @@ def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | No
 
 
 def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """Couplings of spins whose constants are known and which the calculation has not."""
+    """Spin couplings with known constants that the calculation neglects."""
     if top.spin_constants is None:
         return []
     from rotor.quantum.effects.of_top import spin_effects

@@ -1,8 +1,8 @@
-"""Error budgets of levels and of what follows from them (`rotor.requests.budget`).
+"""Error budgets of levels and of quantities derived from them (`rotor.requests.budget`).
 
-Rounding: eigenvalues of a symmetric matrix are those of a matrix within a few units in the last place of its norm (LAPACK Users' Guide,
-section 4.7), so that no energy is off by more than `ROUNDING` times the largest one. Truncation: every J of a free top is a complete block;
-spins by an approximate method have that method's bound. Model: the sum of the sizes of the effects that are left out.
+Rounding: computed eigenvalues are exact for a matrix that differs by a few units in the last place of the norm (LAPACK Users' Guide,
+section 4.7), so that no energy has an error above `ROUNDING` times the largest energy. Truncation: each J of a free top is a complete
+block; an approximate treatment of spins has its own bound. Model: the sum of the sizes of neglected effects.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ NO_UNCERTAINTIES = "no uncertainties of the constants are known"
 
 
 def rounding_term(energies_mhz: Floats) -> ErrorTerm:
-    """Rounding of energies by the largest of them."""
+    """Rounding error of energies, from the largest of them."""
     return ErrorTerm(ROUNDING * float(np.abs(energies_mhz).max(initial=0.0)), "eigenvalues in double precision")
 
 
 def truncation_term(levels: Levels) -> ErrorTerm:
-    """What the basis of levels leaves out: nothing but what an approximate method of spins neglects."""
+    """Truncation error of levels: zero, or the bound of an approximate treatment of spins."""
     used = used_method(levels)
     if used is None or not used.estimate_mhz:
         return ErrorTerm(0.0, "every J is a complete block")
@@ -41,7 +41,7 @@ def truncation_term(levels: Levels) -> ErrorTerm:
 
 
 def model_term(limits: Sequence[Limit]) -> ErrorTerm:
-    """The sum of the effects that are left out, named after the largest; those without a size are named.
+    """The sum of the sizes of neglected effects, named after the largest; effects without a size are listed.
 
     >>> model_term([Limit("centrifugal distortion", 2.0, ""), Limit("electron spin", None, "")]).text("MHz")
     '2 MHz (centrifugal distortion; electron spin not estimated)'
@@ -59,9 +59,9 @@ def model_term(limits: Sequence[Limit]) -> ErrorTerm:
 
 
 def data_term(errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
-    """The largest standard deviation that uncertain constants give.
+    """The largest standard deviation due to uncertain constants.
 
-    errors_mhz: of the energies or lines; None where they are not known. source: where they come from, or why there are none.
+    errors_mhz: of the energies or lines; None if unknown. source: origin of the errors, or why there are none.
     """
     if errors_mhz is None or not len(errors_mhz):
         return ErrorTerm(None, (source or NO_UNCERTAINTIES).removeprefix("none: "))
@@ -69,15 +69,12 @@ def data_term(errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
 
 
 def parameter_names(top: Top, levels: Levels) -> tuple[str, ...]:
-    """The constants that levels depend on, each once."""
+    """The constants on which levels depend, each once."""
     return tuple(dict.fromkeys(name for effect in levels.effects for name in effect.parameters(top)))
 
 
 def levels_budget(top: Top, levels: Levels, rows: Ints, limits: Sequence[Limit]) -> ErrorBudget:
-    """The errors of the energies of some rows of levels.
-
-    limits: what the calculation leaves out, at the highest J.
-    """
+    """Error budget of the energies of these rows of levels; limits: neglected effects, at the highest J."""
     parameters = parameter_names(top, levels)
     covariance = known_covariance(top, parameters)
     errors = None if covariance is None else level_errors(top, levels, covariance)[rows]

@@ -1,17 +1,16 @@
-"""Labelled levels with spins in large blocks: each among the few functions near it, all others to second order.
+"""Labelled levels with spins in large blocks: functions near each level are solved, all others enter to second order.
 
-The functions of an F are the states r of the rotation, solved for every N, times the coupling patterns p,
+The functions of an F are the rotational states r, solved for each N, times the coupling patterns p,
 
     ⟨r' p'|H|r p⟩ = E_r δ + V,    V = Σ_channels c(p', p) ⟨r'|X|r⟩.
 
-For levels near an energy E₀ the functions P within W of it are solved and those beyond, Q with the diagonal D, are eliminated. The
-equations of Q, (E - D) q = V_QP a, give q = C a - (E - E₀) (E₀ - D)⁻² V_QP a with C = (E₀ - D)⁻¹ V_QP, and with that those of P
+For levels near an energy E₀ the functions P within W of it are solved; those beyond, Q with the diagonal D, are eliminated. The equations
+of Q, (E - D) q = V_QP a, give q = C a - (E - E₀) (E₀ - D)⁻² V_QP a with C = (E₀ - D)⁻¹ V_QP. Those of P become
 
     (H_PP - E₀ + V_PQ C) a = (E - E₀)(1 + M) a,    M = CᵀC;
 
-the vector of the level is a and C a. Left out is V between two functions of Q, which moves a level by v³/W² at most for columns of V
-of the length v; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is too large for that the whole block is solved
-(`effect_units`).
+and the vector of the level is (a, C a). V between two functions of Q is neglected. It shifts a level by at most v³/W², with v the norm of a
+column of V; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is too large for that, the whole block is solved (`effect_units`).
 """
 
 from __future__ import annotations
@@ -33,15 +32,15 @@ from rotor.quantum.spins.rotor import Channel, RotorBlock
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-TOLERANCE_MHZ = 1e-6  # of a level
-_LARGE = 400  # functions of a block from which on this is worth while
-_WIDE = 0.15  # of the spread of energies: a window beyond it holds too many functions
-_LEAST_RATIO = 10.0  # of the window to the length of a column of V
-_SPREAD = 0.01  # of the window: levels so near each other share E₀; the rest is χ²(E - E₀)²/W³
+TOLERANCE_MHZ = 1e-6  # error of a level
+_LARGE = 400  # smaller blocks are solved whole, which is then faster
+_WIDE = 0.15  # largest window relative to the spread of energies; a wider one contains too many functions
+_LEAST_RATIO = 10.0  # smallest window relative to the norm of a column of V
+_SPREAD = 0.01  # levels this close, relative to the window, share E₀; the neglected term is χ²(E - E₀)²/W³
 
 
 class _Target(NamedTuple):
-    """Labels of a block: places among all, the part, the pattern within it, and v, Ka, Kc of the state of the rotation."""
+    """A label in a block: its place among all labels, the part, the pattern in it, and v, Ka, Kc of the rotational state."""
 
     row: int
     part: int
@@ -51,15 +50,15 @@ class _Target(NamedTuple):
 
 @dataclass(frozen=True)
 class _Block:
-    """One block of an F: its parts, the coefficients of coupling c(p', p), and the labels that lie in it."""
+    """One block of an F: its parts, coupling coefficients c(p', p), and the labels in it."""
 
     parts: tuple[SpinPart, ...]
-    known: dict[Channel, Floats]
+    coefficients: dict[Channel, Floats]
     targets: tuple[_Target, ...]
 
 
 class _Solved(NamedTuple):
-    """The rotation at some constants: energies and vectors by block, and X between its states by pair and channel."""
+    """The rotation at given constants: energies and vectors by block, and X between its states by pair of blocks and channel."""
 
     energies: dict[int, Floats]
     vectors: dict[int, Floats]
@@ -68,7 +67,7 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class ContractedLevels:
-    """Labelled levels for other values of the parameters; see `levels`. rotations, couplings : see `spins.linear_blocks.Units`."""
+    """Labelled levels as functions of the parameters; rotations, couplings: see `spins.linear_blocks.Units`."""
 
     count: int
     rotors: dict[int, RotorBlock]
@@ -94,6 +93,7 @@ class ContractedLevels:
         return energies, slopes
 
     def _solved(self, values_mhz: Floats) -> _Solved:
+        """The rotation solved at values (parameters,) in MHz."""
         energies, vectors = {}, {}
         for number in self.rotors:
             energies[number], vectors[number] = _eigen(self.rotations[number].matrix(values_mhz))
@@ -116,26 +116,26 @@ class ContractedLevels:
         for a, up in enumerate(block.parts):
             for b, low in enumerate(block.parts[: a + 1]):
                 for channel, unit in self.couplings.get((up.number, low.number), {}).items():
-                    moved = np.tensordot(block.known[channel][up.patterns, low.patterns], turned[b], axes=1)
+                    moved = np.tensordot(block.coefficients[channel][up.patterns, low.patterns], turned[b], axes=1)
                     pairs = np.einsum("pet,pet->te", turned[a][:, unit.rows], moved[:, unit.columns])
                     out[:, unit.parameters] += (1.0 if a == b else 2.0) * (pairs @ unit.factors)
         return out
 
 
 def _eigen(matrix: Floats) -> tuple[Floats, Floats]:
-    """Energies and vectors; a number is taken off the diagonal for the sake of digits."""
+    """Energies and vectors; a constant is subtracted from the diagonal to reduce round-off."""
     zero = float(matrix[0, 0])
     energies, vectors = np.linalg.eigh(matrix - zero * np.eye(len(matrix)))
     return energies + zero, vectors
 
 
 def _states_by_name(rotor: RotorBlock, vectors: Floats) -> dict[tuple[int, ...], int]:
-    """The state of the rotation that v, Ka, Kc name."""
+    """Rotational states by v, Ka, Kc."""
     return {tuple(name): state for state, name in enumerate(named_states(rotor, vectors).tolist())}
 
 
 def _functions_of(block: _Block, names: dict[int, dict[tuple[int, ...], int]]) -> Ints:
-    """Where the functions that name the labels stand."""
+    """Places of the functions that the labels name."""
     functions = []
     for target in block.targets:
         part = block.parts[target.part]
@@ -145,7 +145,7 @@ def _functions_of(block: _Block, names: dict[int, dict[tuple[int, ...], int]]) -
 
 
 def _levels_of(block: _Block, functions: Ints, solved: _Solved, window_mhz: float) -> tuple[Floats, Floats]:
-    """Energies (targets,) and vectors (functions, targets) of the levels that are mostly those functions."""
+    """Energies (targets,) and vectors (functions, targets) of the levels dominated by these functions."""
     rotation, diagonal = _diagonal(block, solved)
     energies, vectors = np.empty(len(functions)), np.empty((len(diagonal), len(functions)))
     groups = list(_groups(diagonal[functions], _SPREAD * window_mhz))
@@ -156,28 +156,28 @@ def _levels_of(block: _Block, functions: Ints, solved: _Solved, window_mhz: floa
     for group, centre, inside in zip(groups, centres, near, strict=True):
         inside_columns = columns[:, np.searchsorted(chosen, inside)]
         eliminated, states = _eliminated(rotation, diagonal, inside_columns, inside, centre)
-        of_state = assigned(states[inside] ** 2, np.ones(len(inside), dtype=np.int64))
-        state_of = np.argsort(of_state)
+        function_of_state = assigned(states[inside] ** 2, np.ones(len(inside), dtype=np.int64))
+        state_of = np.argsort(function_of_state)
         states_here = state_of[np.searchsorted(inside, functions[group])]
         energies[group], vectors[:, group] = eliminated[states_here], states[:, states_here]
     return energies, vectors
 
 
 def _diagonal(block: _Block, solved: _Solved) -> tuple[Floats, Floats]:
-    """E_r, and with the diagonal of V, of every function."""
+    """E_r, and E_r plus the diagonal of V, of each function."""
     rotation, coupled = [], []
     for part in block.parts:
         energies = np.tile(solved.energies[part.number], part.repeats)
         rotation.append(energies)
         coupled.append(energies.copy())
         for channel, operator in solved.operators.get((part.number, part.number), {}).items():
-            pattern = np.diag(block.known[channel][part.patterns, part.patterns])
+            pattern = np.diag(block.coefficients[channel][part.patterns, part.patterns])
             coupled[-1] += np.outer(pattern, np.diag(operator)).ravel()
     return np.concatenate(rotation), np.concatenate(coupled)
 
 
 def _groups(energies: Floats, spread_mhz: float) -> Iterator[Ints]:
-    """Positions of energies that lie within a spread of each other."""
+    """Groups of positions of energies that lie within `spread_mhz`."""
     order = np.argsort(energies)
     start = 0
     for stop in range(1, len(order) + 1):
@@ -198,7 +198,7 @@ def coupling_columns(block: _Block, chosen: Ints, solved: _Solved) -> Floats:
         for a, bra in enumerate(block.parts):
             up, low = (bra, ket) if a >= b else (ket, bra)
             for channel, operator in solved.operators.get((up.number, low.number), {}).items():
-                c = block.known[channel][up.patterns, low.patterns]
+                c = block.coefficients[channel][up.patterns, low.patterns]
                 c, x = (c, operator) if a >= b else (c.T, operator.T)
                 out[bra.place, where] += (c[:, None, patterns] * x[None, :, states]).reshape(-1, len(states))
     return out
@@ -207,7 +207,7 @@ def coupling_columns(block: _Block, chosen: Ints, solved: _Solved) -> Floats:
 def _eliminated(
     rotation: Floats, diagonal: Floats, columns: Floats, inside: Ints, centre: float
 ) -> tuple[Floats, Floats]:
-    """Energies (m,) and vectors (functions, m) of the functions inside, all others eliminated at the energy of the centre."""
+    """Energies (m,) and vectors (functions, m) over the functions inside, with all others eliminated at the energy `centre`."""
     solved = columns[inside] + np.diag(rotation[inside] - centre)
     others = columns.copy()
     others[inside] = 0.0
@@ -232,22 +232,24 @@ def contracted_levels(
     names: Sequence[str],
     values_mhz: Floats,
 ) -> ContractedLevels | None:
-    """The rows of levels for other values of the parameters; None where their blocks had better be solved whole.
+    """Labelled levels as functions of the parameters; None where whole blocks are solved faster or V is too large.
 
     Parameters
     ----------
     top : Top
+        Constants and kind.
     effects : tuple of QuantumEffect
+        Effects of the Hamiltonian.
     plan : Plan
-        The rotation and what acts between its blocks.
+        The rotation and the operators between its blocks.
     levels : Levels
-        Of `unmixed_levels`: functions and their names.
+        Basis functions with labels, from `unmixed_levels`.
     rows : (n,) array
         Rows of these levels, in the order of the answer.
     names : sequence of str
         Parameters of the effects, in the order of the values.
     values_mhz : (parameters,) array
-        Near those of the parameters.
+        Approximate values of the parameters.
 
     Returns
     -------
@@ -259,7 +261,7 @@ def contracted_levels(
     used = {number for block, _ in blocks for number in (part.number for part in block.parts)}
     rotors = {i: plan.blocks[i] for i in sorted(used)}
     rotations, couplings = unit_matrices(top, effects, names, plan.shared, rotors)
-    known_blocks = tuple(_Block(block.parts, _known(plan, block), targets) for block, targets in blocks)
+    known_blocks = tuple(_Block(block.parts, _coefficients(plan, block), targets) for block, targets in blocks)
     contracted = ContractedLevels(len(rows), rotors, rotations, couplings, known_blocks, 0.0)
     window = _window(contracted, values_mhz)
     spread = min(float(np.ptp(block.energies_mhz)) for block, _ in blocks)
@@ -269,15 +271,15 @@ def contracted_levels(
 
 
 def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
-    """The blocks in which the rows lie, with what names these."""
+    """The blocks that contain the rows, with the labels in each."""
     starts = np.array([block.start for block in levels.blocks])
-    of_row = np.searchsorted(starts, rows, side="right") - 1
+    block_of_row = np.searchsorted(starts, rows, side="right") - 1
     with_targets = []
-    for number in np.unique(of_row).tolist():
+    for number in np.unique(block_of_row).tolist():
         block = levels.blocks[number]
         stops = np.array([part.place.stop for part in block.parts])
         targets = []
-        for place in np.flatnonzero(of_row == number).tolist():
+        for place in np.flatnonzero(block_of_row == number).tolist():
             function = int(rows[place]) - block.start
             part = int(np.searchsorted(stops, function, side="right"))
             chosen_part = block.parts[part]
@@ -287,13 +289,14 @@ def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock
     return with_targets
 
 
-def _known(plan: Plan, block: SpinBlock) -> dict[Channel, Floats]:
-    known: dict[Channel, Floats] = plan.shared.cache["coupling", block.twice_f]
-    return known
+def _coefficients(plan: Plan, block: SpinBlock) -> dict[Channel, Floats]:
+    """Coupling coefficients of a block by channel, from the cache of the plan."""
+    coefficients: dict[Channel, Floats] = plan.shared.cache["coupling", block.twice_f]
+    return coefficients
 
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
-    """W from the longest column of V of a labelled function."""
+    """W from the largest norm of a column of V of a labelled function."""
     solved = levels._solved(values_mhz)
     longest = 0.0
     for block in levels.blocks:

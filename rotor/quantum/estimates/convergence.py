@@ -1,7 +1,7 @@
-"""Where an effective Hamiltonian stops being one: distortion that does not converge, levels out of order.
+"""Limits of an effective Hamiltonian: divergence of the distortion series, and levels out of order.
 
-The series J², J⁴, J⁶, ... of an effective Hamiltonian is asymptotic. As long as each order is a small part of the one
-before, what is left out is small too; where the ratio nears one, energies mean nothing, however many digits they have.
+The series J², J⁴, J⁶, ... of an effective Hamiltonian is asymptotic. As long as each order is a small part of the order before, neglected
+orders are small too; where the ratio approaches one, energies are meaningless.
 The size of an order at one J is the largest sum of a row of its matrix, which bounds its eigenvalues (S. Gershgorin,
 Izv. Akad. Nauk SSSR 7 (1931) 749).
 """
@@ -26,14 +26,14 @@ from rotor.tops.operators import Operators
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-HALF = 0.5 - 1e-6  # two functions that share a level evenly are not mixed by more than half
-RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
+HALF = 0.5 - 1e-6  # below ½, so that a level shared evenly by two functions does not count as mixed by more than half
+RATIO_LIMIT = 0.3  # ratio of successive orders above which the series does not count as convergent
 
 
 def order_sizes_mhz(
     top: Top, j: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> dict[int, float]:
-    """How large every order of the Hamiltonian is for one J and |K| up to `kmax`.
+    """The size of each order of the Hamiltonian for one J and |K| up to `kmax`.
 
     The size of an order is the largest sum of absolute values of a row of its matrix, which bounds its eigenvalues
     (Gershgorin).
@@ -56,7 +56,7 @@ def order_sizes_mhz(
 
     Notes
     -----
-    D_t of a spherical top is counted as an order of four as a whole, although its expansion has terms of J² too.
+    D_t of a spherical top counts as order four, although its expansion contains terms of J² too.
 
     Examples
     --------
@@ -67,13 +67,14 @@ def order_sizes_mhz(
     by_order: dict[int, Operators] = {}
     for powers, value in hamiltonian(top, effects).items():
         by_order.setdefault(2 * sum(powers), {})[powers] = value
-    if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, is all of order four
+    if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, counts as order four
         by_order = _without_mixture(by_order)
     highest = 0 if top.kind == "linear" else j if kmax is None else min(kmax, j)
     return {order: _row_bound(by_order[order], j, highest) for order in sorted(by_order)}
 
 
 def _without_mixture(by_order: dict[int, Operators]) -> dict[int, Operators]:
+    """Operators by order without the terms of J² in the expansion of D_t."""
     lower = {powers: value for powers, value in by_order.get(2, {}).items() if powers == (1, 0, 0)}
     return by_order | {2: lower}
 
@@ -91,7 +92,7 @@ def _row_bound(operators: Operators, j: int, kmax: int) -> float:
 def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> float:
     """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
 
-    Above 0.3 the series is not to be trusted.
+    Above 0.3 the series is unreliable.
 
     Parameters
     ----------
@@ -137,24 +138,24 @@ def converges_to(top: Top, jmax: int, effects: Sequence[QuantumEffect] = SEMI_RI
 def _ratios(
     top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> list[tuple[float, int]]:
-    """(ratio to the order before, order) of every order above the first; the energy of a state is none."""
+    """(ratio to the order before, order) of each order above the first; the energy of a state is not an order."""
     sizes = [(order, size) for order, size in order_sizes_mhz(top, j, kmax, effects).items() if order]
     pairs = pairwise(sizes)
     return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
 
 
 def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
-    """The limits of these levels, in sentences; empty where there are none.
+    """Warnings about these levels, as sentences.
 
-    That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
-    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states; that states or
-    species share levels so evenly that their names say little. Levels solved without vectors are judged by the first alone.
+    They state that the distortion series diverges at the highest J and K, and from which J on; that energies in a block are not in the
+    order of the rigid top, so that Ka and Kc only count states; that levels are so strongly mixed that their labels mean little. For levels
+    without vectors only the first is checked.
     """
     return tuple(text for text in (_divergence(top, levels), _disorder(top, levels), _mixture(levels)) if text)
 
 
 def _mixture(levels: Levels) -> str:
-    """How many levels have less than half of what they are called after."""
+    """Warning about levels with less than half of the function that labels them; empty if there are none."""
     if levels.mixing is None:
         return ""
     mixed = levels.mixing < HALF
@@ -169,6 +170,7 @@ def _mixture(levels: Levels) -> str:
 
 
 def _divergence(top: Top, levels: Levels) -> str:
+    """Warning about a distortion series that does not converge; empty if it does."""
     j = int(levels.rotational.max(initial=0))
     k = int(np.abs(levels.quanta["k"]).max(initial=0)) if "k" in levels.quanta else None
     if not j or series_ratio(top, j, k, levels.effects) <= RATIO_LIMIT:
@@ -182,7 +184,7 @@ def _divergence(top: Top, levels: Levels) -> str:
 
 
 def _first(top: Top, jmax: int, kmax: int | None, effects: Sequence[QuantumEffect]) -> int:
-    """The lowest J with a ratio above the limit, by halving: ratios rise with J."""
+    """The lowest J with a ratio above the limit, by bisection, as ratios rise with J."""
     low, high = 0, jmax
     while high - low > 1:
         middle = (low + high) // 2
@@ -191,6 +193,7 @@ def _first(top: Top, jmax: int, kmax: int | None, effects: Sequence[QuantumEffec
 
 
 def _disorder(top: Top, levels: Levels) -> str:
+    """Warning about blocks in which energies are not in the order of the rigid top; empty if there are none."""
     disordered = disordered_blocks(top, levels)
     if not disordered:
         return ""
@@ -202,14 +205,13 @@ def _disorder(top: Top, levels: Levels) -> str:
 
 
 def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
-    """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
+    """(J, species) of Wang blocks where the order of energies is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
 
-    There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
-    ⟨Jz²⟩ itself is not the measure, since it falls by a little near the separatrix of a
-    rigid top, where labels are in perfect order.
+    There Ka and Kc only count states: distortion exceeds the rigid energies (quartic-only water from J = 15 on). ⟨Jz²⟩ would be a wrong
+    criterion, since it decreases a little near the separatrix of a rigid top, whose labels are in order.
     """
     out: list[tuple[int, str]] = []
-    of_j: dict[int, JMatrix] = {}
+    matrices: dict[int, JMatrix] = {}
     if hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
         return out
     operators = rigid_operators(top.constants)
@@ -217,8 +219,8 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
         if not isinstance(block, SolvedBlock) or block.basis.size == 1:
             continue
         j = block.basis.j
-        of_j[j] = of_j[j] if j in of_j else JMatrix(operators, j)
-        rigid = _expectations(block_bands(of_j[j], block.basis), block.vectors)
+        matrices[j] = matrices[j] if j in matrices else JMatrix(operators, j)
+        rigid = _expectations(block_bands(matrices[j], block.basis), block.vectors)
         if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
             out.append((j, block.basis.species))
     return out

@@ -1,4 +1,4 @@
-"""How levels depend on the constants: derivatives by Hellmann and Feynman.
+"""Derivatives of levels by constants (theorem of Hellmann and Feynman).
 
     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩
 
@@ -8,7 +8,7 @@ W_K = a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩,
 
     ⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ = X^p Σ_K W_K [(K+2n)^2q + K^2q]       (n > 0),      X^p Σ_K a_K² K^2q   (n = 0).
 
-The states of all blocks go through this at once, one row a state.
+The states of all blocks are computed together, one row for each.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Rows = NDArray[np.integer]
 
-_AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
+_AT_ONCE = 1 << 22  # coefficients in memory at a time: 32 MB
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
@@ -46,18 +46,18 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     Parameters
     ----------
     top : Top
-        The constants that the levels were solved with.
+        Constants with which the levels were solved.
     levels : Levels
-        Solved with eigenvectors where the top is asymmetric.
+        Levels, with eigenvectors for an asymmetric top.
     names : sequence of str, optional
-        Parameters, in the order of the columns; all of the levels' effects, in their order, by default.
+        Parameters, in the order of the columns; by default all parameters of the effects.
     rows : (rows,) array of int, optional
-        Indices of the levels; all by default.
+        Indices of the levels; by default all.
 
     Returns
     -------
     (rows, names) array
-        MHz per MHz.
+        Derivatives, MHz per MHz.
 
     Raises
     ------
@@ -86,16 +86,16 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
 
         return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
     if "irrep" in levels.quanta:
-        return _of_spherical(top, levels, names, rows)
+        return _derivatives_of_spherical(top, levels, names, rows)
     if any(isinstance(block, CoupledBlock) for block in levels.blocks):
-        return _of_coupled(top, levels, names, rows)
+        return _derivatives_of_coupled(top, levels, names, rows)
     if "v" in levels.quanta:
-        return _of_states(top, levels, names, rows)
-    return _of_terms(levels, [by_name[name] for name in names], rows)
+        return _derivatives_of_uncoupled(top, levels, names, rows)
+    return _sums_of_terms(levels, [by_name[name] for name in names], rows)
 
 
-def _of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
-    """Σ factor ⟨term⟩ of each of several sums of terms, (rows, sums)."""
+def _sums_of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
+    """Expectation values (rows, sums) of sums of terms."""
     terms = sorted({powers for operator in operators for powers in operator})
     if not terms:
         return np.zeros((len(rows), len(operators)))
@@ -104,21 +104,21 @@ def _of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Flo
     return np.asarray(expectations @ factors)
 
 
-def _of_states(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """Of states that nothing connects, in closed form: each parameter acts in the state that it belongs to."""
+def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """Derivatives of levels of uncoupled states, in closed form: each parameter acts in its state only."""
     terms = {0: parameter_operators(top, levels.effects)}
     terms |= {state.v: state.terms for effect in levels.effects for state in effect.states(top)}
     out, v = np.zeros((len(rows), len(names))), levels.quanta["v"][rows]
     for number, by_name in terms.items():
         here = v == number
-        out[here] = _of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])
+        out[here] = _sums_of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])
     return out
 
 
 def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str, Operators]:
-    """∂H/∂c by powers (p, q, n) of every parameter of the effects, by name; empty for one that has other operators.
+    """∂H/∂c by powers (p, q, n) for each parameter; empty for parameters of other operators.
 
-    The operators of a name that two effects share are added.
+    If two effects have a parameter of the same name, its operators are added.
     """
     by_name: dict[str, Operators] = {}
     for effect in effects:
@@ -130,15 +130,13 @@ def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str,
     return by_name
 
 
-def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """⟨i|∂H/∂c|i⟩ of coupled blocks, as their linear blocks have it."""
+def _derivatives_of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """Derivatives of levels in coupled blocks, from their linear blocks."""
     starts = np.array([block.start for block in levels.blocks])
     blocks = [levels.blocks[i] for i in distinct(np.searchsorted(starts, rows, side="right") - 1).tolist()]
     linear = linear_blocks_of(top, levels, names, blocks)
-    out, space = (
-        np.zeros((len(levels) + 1, len(names) + 1)),
-        Workspace(),
-    )  # the last row and column are those of padding
+    out = np.zeros((len(levels) + 1, len(names) + 1))  # the last row and column take the padding
+    space = Workspace()
     for numbers in stack_numbers(linear):
         stack = LinearStack.of([linear[i] for i in numbers.tolist()])
         vectors = np.zeros((len(numbers), stack.size, stack.size))
@@ -152,10 +150,10 @@ def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> F
     return out[rows, :-1]
 
 
-def _of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """X^p of the scalar constants and the eigenvalue of the tensor for D_t, of a spherical top's split levels.
+def _derivatives_of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """Derivatives of split levels of a spherical top: X^p by scalar constants, the eigenvalue ω of the tensor by D_t.
 
-    A parameter whose operators are d times the tensor, and scalars, has ω - ω_scalar for each d.
+    A parameter that multiplies d times the tensor plus scalars contributes d ω plus the scalars.
     """
     by_name = parameter_operators(top, levels.effects)
     total = hamiltonian(top, levels.effects)
@@ -171,7 +169,7 @@ def _of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) ->
 
 
 def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
-    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ of the levels `rows`, (rows, terms)."""
+    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of levels."""
     j = levels.rotational[rows].astype(float)
     x = j * (j + 1)
     if "kc" in levels.quanta:
@@ -183,18 +181,18 @@ def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Fl
 
 
 def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows) -> Floats:
-    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩, (rows, terms), so many rows at a time that memory stays bounded."""
+    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms), in pieces of bounded memory."""
     if not levels.blocks:
         raise ValueError("these levels were solved without vectors; solve them with vectors=True")
     out = np.empty((len(rows), len(terms)))
     for odd in (0, 1):
         for chosen in _pieces(levels, rows, odd):
-            out[chosen] = _of_one_parity(levels, terms, rows[chosen], odd)
+            out[chosen] = _expectations_of_parity(levels, terms, rows[chosen], odd)
     return out
 
 
 def _pieces(levels: Levels, rows: Rows, odd: int) -> Iterator[NDArray[np.intp]]:
-    """Places in `rows` of the states with K even or odd, in pieces of bounded size."""
+    """Places in `rows` of the states with even or odd K, in pieces of bounded size."""
     parities = np.repeat([b.basis.first_k % 2 for b in levels.blocks], [b.basis.size for b in levels.blocks])
     places = np.flatnonzero(parities[rows] == odd)
     step = max(1, _AT_ONCE // (levels.jmax // 2 + 1))
@@ -202,8 +200,9 @@ def _pieces(levels: Levels, rows: Rows, odd: int) -> Iterator[NDArray[np.intp]]:
         yield places[start : start + step]
 
 
-def _of_one_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
-    margin = 2 * max((n for _, n in terms), default=0)  # K from -margin + odd on: pairs across K = 0 are at hand
+def _expectations_of_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
+    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states with K of one parity."""
+    margin = 2 * max((n for _, n in terms), default=0)  # K starts at -margin + odd, to include pairs across K = 0
     states = _signed_coefficients(levels, rows, odd, margin)
     k: Floats = odd - margin + 2 * np.arange(states.shape[1], dtype=np.float64)
     j = levels.rotational[rows].astype(float)
@@ -219,9 +218,9 @@ def _of_one_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows,
 
 
 def _pair_weights(states: Floats, j: Floats, k: Floats, n: int) -> Floats:
-    """a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩, (rows, K), each pair standing for its mirror images and both ladder operators too.
+    """a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩ (rows, K), with factors that count mirror images and both ladder operators.
 
-    K and -K-2n are one pair, so that K > -n counts double; K = -n is its own image.
+    K and -K-2n form one pair, so that K > -n counts twice; K = -n is its own image.
     """
     low = k[: len(k) - n]
     weights = states[:, : len(low)] * states[:, n:]

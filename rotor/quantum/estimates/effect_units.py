@@ -1,7 +1,7 @@
-"""The unit matrices of an effect's parameters over the blocks in which labelled levels lie, with spins and states or without.
+"""Linear blocks of labelled levels, with or without spins and several states.
 
-The levels are solved once as the core solves them; the blocks that have a label are then made anew over the functions of the
-basis, linear in their parameters (`linear_stacks`).
+The levels are solved once. Blocks that contain a label are then expanded over basis functions as linear combinations of their parameters
+(`linear_stacks`).
 """
 
 from __future__ import annotations
@@ -47,25 +47,25 @@ def unit_levels(
     functions: Functions | None = None,
     naming: Naming | None = None,
 ) -> LabelledBlocks:
-    """The blocks in which the rows of levels lie, for other values of the parameters.
+    """The blocks of labelled levels as functions of the parameters.
 
     Parameters
     ----------
     top : Top
+        Constants and kind.
     levels : Levels
-        Solved with vectors, at values near those of the parameters.
+        Levels with vectors, at approximate values of the parameters.
     rows : (n,) array
-        Rows of levels, in the order in which `LabelledBlocks.levels` gives them.
+        Rows of levels, in the order in which `LabelledBlocks.levels` returns them.
     names : sequence of str
-        Parameters of the effects of the levels, in the order of the values.
+        Parameters of the effects, in the order of the values.
     values_mhz : (parameters,) array
-        At which the levels were solved.
+        Values at which the levels were solved.
     functions : callable, optional
-        Of blocks of several states: the functions (n, n) in rows by which the states are called, over those of the basis, and their
-        names v, Ka, Kc and with spins the doubled pattern (n, 3 + pattern), where these are not the functions of the basis; levels
-        without spins have these names.
+        For blocks of several states that are labelled by other than basis functions: returns these functions (n, n) in rows over the
+        basis, and their labels v, Ka, Kc and, with spins, the doubled pattern (n, 3 + pattern). Levels without spins have these labels.
     naming : callable, optional
-        Of blocks without spins: how the states get their names, which the levels have; by overlaps where it is None.
+        For blocks without spins: how states are labelled; by default by overlaps. The levels have these labels.
 
     Returns
     -------
@@ -74,47 +74,48 @@ def unit_levels(
     Raises
     ------
     ValueError
-        For levels without blocks.
+        If the levels have no blocks.
     """
     if not levels.blocks:
         raise ValueError("levels of a closed form have no blocks; solve them in blocks")
     starts = np.array([block.start for block in levels.blocks])
-    of_row = np.searchsorted(starts, rows, side="right") - 1
-    numbers = distinct(of_row).tolist()
+    block_of_row = np.searchsorted(starts, rows, side="right") - 1
+    numbers = distinct(block_of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
     makers = _Makers(top, levels, names, blocks, functions, naming)
     units = [makers.unit(number, block) for number, block in enumerate(blocks)]
-    inside = [np.flatnonzero(of_row == number) for number in numbers]
+    inside = [np.flatnonzero(block_of_row == number) for number in numbers]
 
     def find(place: int, names: Ints) -> tuple[Ints, Ints]:
-        """Labels of the block by their names, which are those that the levels have."""
+        """Rows of the labels in a block, and the states that have these labels."""
         block, rows_of_block = blocks[place], inside[place]
         state_of = {tuple(name): state for state, name in enumerate(names.tolist())}
         if functions and isinstance(block, SpinBlock):
-            asked = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
+            requested = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
         else:
-            asked = (
+            requested = (
                 _quanta(levels)[rows[rows_of_block]]
                 if functions or naming
                 else _names(block)[rows[rows_of_block] - block.start]
             )
-        return rows_of_block, np.array([state_of[tuple(name)] for name in asked.tolist()])
+        return rows_of_block, np.array([state_of[tuple(name)] for name in requested.tolist()])
 
     return tracked_blocks(units, len(rows), find, values_mhz)
 
 
 def _quanta(levels: Levels) -> Ints:
+    """v, Ka, Kc of all levels."""
     v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     return np.stack([v, levels.quanta["ka"], levels.quanta["kc"]], axis=1)
 
 
 def _names(block: Any) -> Ints:
-    """What the states of a solved block are called; the rank alone where one Wang block is solved by itself."""
+    """Labels of the states of a solved block; only the rank for a single Wang block."""
     return np.arange(len(block.energies_mhz))[:, None] if isinstance(block, SolvedBlock) else block.labels
 
 
 def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
-    """What the states of a block are called by functions over those of the basis."""
+    """Labels of the states of a block from their overlaps with functions over the basis."""
     rows = [block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.parts]
     over_basis = np.concatenate(
         [
@@ -126,7 +127,7 @@ def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
 
 
 class _Makers:
-    """Linear blocks of solved blocks of any kind, with how their states get their names."""
+    """Linear blocks of solved blocks of any kind, with the rule that labels their states."""
 
     def __init__(
         self,
@@ -144,7 +145,7 @@ class _Makers:
             self._linear = linear_blocks_of(top, levels, names, blocks)
 
     def unit(self, number: int, block: Any) -> NamedBlock:
-        """One block, and how its states get their names."""
+        """A linear block with the rule that labels its states."""
         linear = self._linear[number]
         if self._functions:
             return _turned(linear, *self._functions(block))
@@ -158,7 +159,7 @@ class _Makers:
 
 
 def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
-    """The block over other functions, each of a state by itself: the sub-blocks are their v, the parity of Ka and the pattern."""
+    """The block over other functions, one for each state; sub-blocks have one v, parity of Ka and pattern."""
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return np.asarray(names[assigned(vectors**2, np.ones(len(names), dtype=np.int64))])
@@ -169,7 +170,7 @@ def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
 
 
 def _names_with_spins(block: SpinBlock) -> NamedFunctions:
-    """Names by Wang blocks of one state and patterns, or by what exchange makes of these."""
+    """Labels by Wang blocks and patterns, or by the functions that exchange allows."""
     if block.allowed:
         return NamedFunctions(block.allowed.sub_block, _namer_of_allowed(block.allowed), Follows.MOSTLY)
     sub_blocks = _sub_blocks(block.parts, block.parts[-1].place.stop)
@@ -177,10 +178,13 @@ def _names_with_spins(block: SpinBlock) -> NamedFunctions:
 
 
 def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+    """Labels by rank in energy."""
     return np.arange(len(energies))[:, None]
 
 
 def _namer_of_allowed(allowed: Allowed) -> Namer:
+    """Labels by functions that exchange allows."""
+
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return np.asarray(labels_by_shares(allowed.names[None], allowed.sizes[None], vectors[None])[0][0])
 
@@ -188,7 +192,7 @@ def _namer_of_allowed(allowed: Allowed) -> Namer:
 
 
 def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
-    """The number of the Wang block and pattern of every function, as `labels_of` counts them."""
+    """Number of the sub-block (Wang block and pattern) of each function, as `labels_of` counts them."""
     out, number = np.empty(size, dtype=np.int64), 0
     for part in parts:
         states = len(part.rotor.energies_mhz)
@@ -201,6 +205,7 @@ def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
 
 
 def _namer(solved: tuple[SpinPart, ...], all_names: Ints) -> Namer:
+    """Labels by Wang blocks and patterns."""
     parts = tuple(
         part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in solved
     )

@@ -1,19 +1,19 @@
-"""How far internal rotation of one threefold group sets lines of its A and E species apart.
+"""Estimated A - E splittings of lines by internal rotation of one threefold group.
 
 A group of C3v symmetry turns by α against the rest. With the moment I_α of the group about its axis, the cosines λ_g of this axis in
-the principal frame and the moments I_g of the whole molecule, the kinetic energy ½ ωᵀIω + I_α α' λ·ω + ½ I_α α'² makes
+the principal frame and the moments I_g of the whole molecule, the kinetic energy ½ ωᵀIω + I_α α' λ·ω + ½ I_α α'² leads to
 
     H = A P_a² + B P_b² + C P_c² + F (p - ρ·P)² + V3/2 (1 - cos 3α),
     r = 1 - Σ_g λ_g² I_α/I_g,    F = ħ²/(2 r I_α),    ρ_g = λ_g I_α/I_g
 
-(C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as cited by the reviews that were read; derived here). The axes are turned
-so that z is along ρ. Then the part of the torsion depends on the K of P_z alone,
+(C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as cited by the reviews that were read; derived here). In axes with z along ρ
+the torsional part depends only on K of P_z,
 
     h(K, σ) = F (p - |ρ| K)² + V3/2 (1 - cos 3α)    on    exp i(3k + σ)α,    σ = 0 of A, 1 of E,
 
-its lowest states |K, σ⟩ are found for each K, and ⟨K'|H_rot|K⟩ is multiplied by the overlap ⟨K', σ|K, σ⟩. Left out are excited
-torsional states, which change A - E differences of methyl formate by less than 1e-4 of themselves, the dependence of A, B, C on α,
-and other groups of the molecule. How this compares with measured lines is in docs/limitations.md.
+The lowest state |K, σ⟩ is computed for each K, and ⟨K'|H_rot|K⟩ is multiplied by the overlap ⟨K', σ|K, σ⟩. Neglected are excited torsional
+states, which change A - E splittings of methyl formate by less than 1e-4 of their size, the dependence of A, B, C on α, and other groups.
+docs/limitations.md compares with measured lines.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ class InternalRotor:
 
 
 def rotor_of_moments(top_moment: float, cosines: Floats, moments: Floats, barrier_mhz: float) -> InternalRotor:
-    """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group.
+    """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group, with its barrier.
 
     Parameters
     ----------
     top_moment : float
-        I_α, its moment about its axis, u Å².
+        I_α, moment of the group about its axis, u Å².
     cosines : (3,) array
-        λ_g of its axis to the principal axes.
+        λ_g, cosines of this axis to the principal axes.
     moments : (3,) array
         I_g of the whole molecule, u Å².
     barrier_mhz : float
@@ -89,13 +89,13 @@ def torsional_states(rotor: InternalRotor, k: Floats, species: int) -> tuple[Flo
 
 
 def _same_signs(vectors: Floats) -> Floats:
-    """Rows with signs that make the overlaps of neighbours positive."""
+    """Vectors with signs that make the overlaps of neighbouring rows positive."""
     turned = np.where(np.sum(vectors[1:] * vectors[:-1], axis=1) < 0, -1.0, 1.0)
     return np.asarray(vectors * np.cumprod(np.concatenate([[1.0], turned]))[:, None])
 
 
 def _rho_frame(rho: tuple[float, float, float]) -> Floats:
-    """Rows x, y, z of axes with z along ρ, from a, b, c; z along a where there is none."""
+    """Axes x, y, z (rows) over a, b, c, with z along ρ, or along a if ρ = 0."""
     length = float(np.linalg.norm(rho))
     z = np.array(rho) / length if length else np.array([1.0, 0.0, 0.0])
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
@@ -105,9 +105,9 @@ def _rho_frame(rho: tuple[float, float, float]) -> Floats:
 
 
 def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int, species: int) -> Floats:
-    """Energies (2J+1,) in MHz of one species of the torsional ground state, above the foot of the potential.
+    """Energies (2J+1,) in MHz of one species of the torsional ground state, above the minimum of the potential.
 
-    In the order of ⟨P_z²⟩, which is that of Ka: first K = 0, then pairs, of each the lower one first.
+    They are ordered by ⟨P_z²⟩ and thus by Ka: first K = 0, then pairs with the lower level first.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
 
     Notes
     -----
-    Excited torsional states are left out, and ⟨K', σ|K, σ⟩ multiplies ⟨K'|H_rot|K⟩; see the head of this module.
+    Excited torsional states are neglected, and ⟨K', σ|K, σ⟩ multiplies ⟨K'|H_rot|K⟩; see the head of this module.
 
     Examples
     --------
@@ -148,24 +148,24 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
 
 @dataclass(frozen=True)
 class LineShifts:
-    """E less A in MHz of lines J+1 ← J. same (2J+1,): Ka as it was, Kc + 1; other (2J+1,): Ka + 1."""
+    """E - A splittings in MHz of lines J+1 ← J. same (2J+1,): ΔKa = 0, ΔKc = 1. other (2J+1,): ΔKa = 1."""
 
     same: Floats
     other: Floats
 
     @property
     def typical_same_mhz(self) -> float:
-        """Half of the lines with the same Ka are farther apart."""
+        """Median splitting of lines with ΔKa = 0."""
         return float(np.median(np.abs(self.same)))
 
     @property
     def typical_other_mhz(self) -> float:
-        """Half of the lines with another Ka are farther apart."""
+        """Median splitting of lines with ΔKa = 1."""
         return float(np.median(np.abs(self.other)))
 
 
 def line_shifts(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int) -> LineShifts:
-    """How far lines of the E species are from those of the A species.
+    """E - A splittings of the lines J+1 ← J.
 
     >>> high = InternalRotor(150_000.0, 1e8, (0.1, 0.0, 0.0))
     >>> bool(np.abs(line_shifts((30_000.0, 9_000.0, 8_000.0), high, 3).same).max() < 1e-3)

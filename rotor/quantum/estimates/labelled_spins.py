@@ -1,4 +1,4 @@
-"""Labelled levels with spins for parameters that change: only those F are looked at in which a label lies, some at a time.
+"""Labelled levels with spins as functions of the parameters; only F with a label are computed, a few at a time.
 
 Small blocks are solved whole (`effect_units`); in large ones each label is solved among the functions near it (`contracted`).
 """
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from rotor.quantum.estimates.contracted import ContractedLevels
     from rotor.tops.top import Top
 
-_MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
-_LARGE = 400  # functions of an F from which on blocks may be contracted
+_MOST_ELEMENTS = 1e7  # most elements of vectors of the F that are solved together
+_LARGE = 400  # blocks of an F with more functions may be contracted
 
 
-class FoundLevels(NamedTuple):
-    """Labels by their places among all, and the blocks in which they lie."""
+class AssignedLevels(NamedTuple):
+    """Labels, by their places among all, and the blocks that contain their levels."""
 
     rows: Ints
     blocks: LabelledBlocks | ContractedLevels
 
 
-def found_with_spins(
+def assigned_with_spins(
     top: Top,
     effects: tuple[QuantumEffect, ...],
     names: Sequence[str],
@@ -41,51 +41,54 @@ def found_with_spins(
     twice_f: Ints,
     rows_of: Callable[[Levels, Ints], Ints],
     functions: Callable[[Levels], Functions] | None = None,
-) -> list[FoundLevels]:
-    """The labels of some F in the blocks in which they lie, for any values of the parameters.
+) -> list[AssignedLevels]:
+    """Assign labels with spins to levels, and return the blocks of these as functions of the parameters.
 
     Parameters
     ----------
     top : Top
+        Constants and kind.
     effects : tuple of QuantumEffect
-        What the Hamiltonian consists of, spins among it; the values of its parameters are `values_mhz`.
+        Effects of the Hamiltonian, spins included, with parameters `values_mhz`.
     names : sequence of str
         Parameters of the effects, in the order of the values.
     values_mhz : (parameters,) array
-        At which levels get their names.
+        Values at which levels are labelled.
     twice_f : (n,) array
-        Twice the F of each label, 0 or more.
+        Twice F of each label, 0 or more.
     rows_of : callable
-        Levels and places of labels to the row of each of these, -1 where there is none.
+        Takes levels and places of labels, and returns the row of each label, -1 if it has none.
     functions : callable, optional
-        Of levels that are called by other functions than those of the basis, see `unit_levels`.
+        Functions other than basis functions that label the levels, see `unit_levels`.
 
     Returns
     -------
-    list of FoundLevels
-        Labels that are no levels are in none.
+    list of AssignedLevels
+        Blocks with their labels; labels without a level are missing.
     """
-    scheme, every = scheme_of(top, effects), distinct(twice_f)
+    scheme, all_f = scheme_of(top, effects), distinct(twice_f)
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))
-    products = scheme.equivalent < 3 and functions is None  # functions of three equivalent nuclei are none
-    if products and size * int(every.max() + 1) > _LARGE:
+    products = scheme.equivalent < 3 and functions is None  # functions of three equivalent nuclei are not products
+    if products and size * int(all_f.max() + 1) > _LARGE:
         from rotor.quantum.estimates.contracted import contracted_levels
 
-        levels, plan = unmixed_levels(top, effects, every.tolist())
+        levels, plan = unmixed_levels(top, effects, all_f.tolist())
         rows = rows_of(levels, np.arange(len(twice_f)))
         here = np.flatnonzero(rows >= 0)
         if not len(here):
             return []
         contracted = contracted_levels(top, effects, plan, levels, rows[here], names, values_mhz)
         if contracted is not None:
-            return [FoundLevels(here, contracted)]
-    out = list[FoundLevels]()
-    for some in np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1):
-        asked, angular = np.flatnonzero(np.isin(twice_f, some)), some.tolist()
+            return [AssignedLevels(here, contracted)]
+    out = list[AssignedLevels]()
+    for chunk in np.split(all_f, np.flatnonzero(np.diff(np.cumsum((size * (all_f + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1):
+        places, angular = np.flatnonzero(np.isin(twice_f, chunk)), chunk.tolist()
         levels = unmixed_levels(top, effects, angular)[0] if products else levels_of_f(top, effects, angular)
-        rows = rows_of(levels, asked)
-        found = rows >= 0
-        if found.any():
-            own = functions(levels) if functions else None
-            out.append(FoundLevels(asked[found], unit_levels(top, levels, rows[found], names, values_mhz, own)))
+        rows = rows_of(levels, places)
+        has_level = rows >= 0
+        if has_level.any():
+            namer = functions(levels) if functions else None
+            out.append(
+                AssignedLevels(places[has_level], unit_levels(top, levels, rows[has_level], names, values_mhz, namer))
+            )
     return out

@@ -1,11 +1,11 @@
-"""How large is what levels and lines leave out: distortion of the next order, couplings of spins, geometry in place of constants, internal
-rotation, inversion, electron spin (`rotor.quantum.estimates.limits` and `beyond`), and the Stark shift of a stray field:
+"""Sizes of effects that levels and lines neglect: the next order of distortion, spin couplings, errors of a geometry, internal rotation,
+inversion, electron spin (`rotor.quantum.estimates.limits` and `beyond`), and the Stark shift of a stray field:
 
 | top | shift in 1 V/cm |
 |---|---|
 | linear, J = 0 | (μE)²/6hB, second order |
 | symmetric, J = K = 1 | μE KM/J(J+1), first order |
-| asymmetric, J = M = 1 | of two levels that a component couples |
+| asymmetric, J = M = 1 | shift of two levels that a component couples |
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 STRAY_KV_PER_CM = 1e-3  # 1 V/cm
 HYPERFINE_KEY = (
-    "its constants are known, effects.hyperfine = true adds them"  # of scenes; no other text names their keys
+    "its constants are known, effects.hyperfine = true adds them"  # for scenes, whose keys no other text names
 )
 
 
 def left_out_of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[LeftOut, ...]:
-    """What levels and lines of one J leave out, largest first, in MHz; what is not estimated comes last."""
+    """Neglected effects of levels and lines of one J in MHz, largest first; effects without an estimate come last."""
     from rotor.quantum.estimates.beyond import COMPUTE
     from rotor.quantum.estimates.limits import every_limit
 
@@ -42,7 +42,7 @@ def left_out_of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tu
 
 
 def stray_field(top: Top) -> LeftOut | None:
-    """The Stark shift in 1 V/cm of a level of J = 1 at most that shows it first; asymmetry doublets of higher J shift more.
+    """The largest Stark shift of a level with J ≤ 1 in 1 V/cm; asymmetry doublets of higher J shift more.
 
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
@@ -62,9 +62,9 @@ def stray_field(top: Top) -> LeftOut | None:
 
 
 def _asymmetric_stray_field(top: Top) -> LeftOut:
-    """The largest shift of 1(0,1), 1(1,1), 1(1,0) with M = 1: two levels δ apart that ½ μE couples, √(δ²/4 + (½μE)²) - δ/2.
+    """The largest shift of 1(0,1), 1(1,1), 1(1,0) with M = 1: √(δ²/4 + (½μE)²) - δ/2 for two levels δ apart that ½ μE couples.
 
-    μ_a couples 1(1,1) and 1(1,0), B - C apart, μ_b 1(0,1) and 1(1,0), A - C apart, μ_c 1(0,1) and 1(1,1), A - B apart.
+    μ_a couples 1(1,1) and 1(1,0), δ = B - C; μ_b 1(0,1) and 1(1,0), δ = A - C; μ_c 1(0,1) and 1(1,1), δ = A - B.
     """
     a, b, c = top.rotational_constants_mhz
     couplings = [0.5 * abs(mu) * units.MHZ_PER_DEBYE_KV_PER_CM * STRAY_KV_PER_CM for mu in top.dipole_abc_debye or ()]

@@ -1,18 +1,18 @@
-"""What a model of rotation leaves out: each effect that a molecule shows signs of, with its size where one can be estimated.
+"""Effects that a model of rotation neglects although the molecule shows signs of them, with estimated sizes.
 
 | sign | effect | size |
 |---|---|---|
 | a nucleus of spin 1 or more | nuclear quadrupole coupling | known, or the gradient in covalent bonds (`splittings`) |
-| constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² |
+| constants from a geometry only | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² |
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
-| a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of NH3; 1.6 GHz, that of ND3, where they are heavy |
+| a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, as in NH3; 1.6 GHz, as in ND3, for heavy hydrogens |
 | an odd number of electrons, an odd electronic state | electron spin | its largest known constant, else not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289). ν = 1150 cm⁻¹ (B/cm⁻¹)^0.3 was chosen on the
-library: 40 of 41 D_J or ΔJ are met within a factor of 3 (tests/quantum/test_limits.py; not that of glycolaldehyde). A group that
-turns without a barrier has the levels F m², m = 0 of A and m = ±1 of E species, F apart.
+library: it reproduces 40 of 41 D_J or ΔJ within a factor of 3 (tests/quantum/test_limits.py; the exception is glycolaldehyde). A free group
+has the levels F m², with m = 0 for A and m = ±1 for E species, F apart.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 VIBRATION_CM, VIBRATION_POWER = 1150.0, 0.3  # ν = 1150 (B/cm⁻¹)^0.3 cm⁻¹, for distortion that was not computed
-HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
-LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
+HIGHEST_J = 20  # A - E splittings change little with J; those of higher J are estimated at this J
+LOW_BARRIER = 10.0  # s = 4 V3/9F; below it torsional levels of E species depend on K as strongly as rotational ones
 ELECTRON_SPIN = "electron spin"
 QUADRUPOLE = "nuclear quadrupole"
 _MULTIPLETS = (
     "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
 )
 ZERO_POINT = "vibration-rotation difference"
-OF_SPINS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
+SPIN_LIMITS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
     24_000.0,
     1_600.0,
@@ -53,7 +53,7 @@ AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
 
 
 def populated_j(top: Top, temperature_k: float) -> int:
-    """The J with most molecules at a temperature: √(kT/2B) - ½ of a linear top, √(kT/B) - ½ of others, B their mean B, C.
+    """The most populated J at a temperature: √(kT/2B) - ½ for a linear top, √(kT/B) - ½ for others with B the mean of B and C.
 
     >>> from rotor.tops.top import Top
     >>> populated_j(Top.from_constants("B=57635.968 MHz"), 300.0)
@@ -65,12 +65,12 @@ def populated_j(top: Top, temperature_k: float) -> int:
 
 
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
-    """The sizes of the effects of a calculation and of those that it leaves out, largest first, at one J."""
+    """Sizes at one J of the effects of a calculation and of those that it neglects, largest first."""
     return sorted([*effect_sizes(top, j, effects), *absent_sizes(top, effects)], key=lambda effect: -effect.size_mhz)
 
 
 def absent_sizes(top: Top, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
-    """The size of quadrupole coupling where the molecule has it and the calculation has not, as `NuclearQuadrupole.size_mhz` adds it."""
+    """The size of quadrupole coupling if the calculation neglects it, summed as in `NuclearQuadrupole.size_mhz`."""
     nuclei = {nucleus.nucleus: abs(nucleus.chi_mhz) for nucleus in splitting_nuclei(top)}
     if not nuclei or QUADRUPOLE in {effect.name for effect in effects}:
         return []
@@ -78,62 +78,64 @@ def absent_sizes(top: Top, effects: Sequence[QuantumEffect]) -> list[EffectSize]
 
 
 def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """What a calculation with these effects leaves out, largest first.
+    """Effects that a calculation neglects, largest first.
 
-    Of what is not estimated, electron spin comes first, since it may be larger than all else, and the coupling of nuclear spins last.
+    Without estimates, electron spin comes first, since it may exceed all others, and the coupling of nuclear spins last.
 
     >>> from rotor.tops.top import Top
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
     ['centrifugal distortion']
     """
-    known = known_couplings(top, j, effects)
-    couplings = [limit for limit in known if limit.name != QUADRUPOLE]  # which _of_nuclei has
+    known_limits = known_couplings(top, j, effects)
+    couplings = [limit for limit in known_limits if limit.name != QUADRUPOLE]  # estimated by _nuclear_limits
     present = {effect.name for effect in effects} | {limit.name for limit in couplings}
-    limits = [*couplings, *_of_constants(top, j), *_of_nuclei(top, j, effects, present)]
+    limits = [*couplings, *_limits_of_constants(top, j), *_nuclear_limits(top, j, effects, present)]
     if top.molecule is not None:
-        limits += _of_geometry(top, top.molecule, j, present)
+        limits += _limits_of_geometry(top, top.molecule, j, present)
     return largest_first(limits)
 
 
 def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """`model_limits` with what the constants themselves say, however small it is (`rotor.quantum.estimates.beyond`).
+    """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
 
-    Known couplings of spins take the place of estimated ones.
+    Known spin couplings replace estimated ones.
     """
     couplings, further = known_couplings(top, j, effects), next_order(top, j, effects)
-    known = {limit.name for limit in couplings}
-    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known)]
+    known_names = {limit.name for limit in couplings}
+    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known_names)]
     return largest_first(limits if further is None else [*limits, further])
 
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:
-    """Limits by their size; those not estimated last, but electron spin first."""
+    """Limits by decreasing size; those without an estimate last, except for electron spin, which is first."""
     return sorted(limits, key=_rank)
 
 
 def _rank(limit: Limit) -> float:
-    """Smaller for what comes first."""
+    """Sorting key of a limit."""
     if limit.size_mhz is None:
         return -math.inf if limit.name == ELECTRON_SPIN else 0.0
     return -limit.size_mhz
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
-    """Sizes of effects and what is left out at one J, by the keys of docs/verbs.
+    """Sizes of effects and neglected effects at one J, by the keys of docs/verbs.
 
     Parameters
     ----------
     top : Top
+        Constants, geometry and spins.
     j : int
-        At which sizes are estimated.
+        The J for which sizes are estimated.
     effects : sequence of QuantumEffect
-        Those of the calculation.
+        Effects of the calculation.
     further : sequence of Limit
-        What else it leaves out.
+        Further neglected effects.
 
     Returns
     -------
     dict
+        Values for JSON.
     """
     return {
         "sizes_at_j": j,
@@ -143,19 +145,19 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Seq
     }
 
 
-def _of_constants(top: Top, j: int) -> list[Limit]:
-    """The error of a geometry, and the distortion that rigid constants leave out."""
+def _limits_of_constants(top: Top, j: int) -> list[Limit]:
+    """The error of a geometry, and the distortion that rigid constants neglect."""
     limits, b = [], _largest(top)
     rigid = not any(name not in "ABC" for name in top.constants.values)
-    of_geometry = top.molecule is not None and top.source == top.molecule.source
-    if of_geometry and top.molecule is not None and top.molecule.uncertainty:
+    from_geometry = top.molecule is not None and top.source == top.molecule.source
+    if from_geometry and top.molecule is not None and top.molecule.uncertainty:
         relative = top.molecule.uncertainty
         text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
         limits.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
-    if top.scaling_error and not of_geometry:
+    if top.scaling_error and not from_geometry:
         text = f"A, B, C are scaled from those of another isotopologue, good to about {100 * top.scaling_error:.2g} %"
         limits.append(Limit("error of the scaling", top.scaling_error * 2 * b * (j + 1), text))
-    if of_geometry and top.molecule is not None:
+    if from_geometry and top.molecule is not None:
         limits += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":
         vibration_cm = VIBRATION_CM * (b / units.MHZ_PER_CM) ** VIBRATION_POWER
@@ -169,7 +171,7 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
 
 
 def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
-    """What zero-point vibration does to lines of about one frequency; nothing where no atoms are bonded."""
+    """The effect of zero-point vibration on lines of about one frequency; empty without bonded atoms."""
     from rotor.molecules.bonds import bonded_atoms
     from rotor.quantum.estimates.zero_point import relative_difference
 
@@ -182,18 +184,18 @@ def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
 
 
 def _rounded(value: float, digits: int) -> str:
-    """To so many digits, without an exponent where that is short."""
+    """A number rounded to significant digits, as short text."""
     return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _largest(top: Top) -> float:
-    """B of a linear top, (B + C)/2 of others: what spaces the lines of neighbouring J."""
+    """B of a linear top, (B + C)/2 of others: half the spacing of lines of neighbouring J."""
     _, b, c = top.rotational_constants_mhz
     return (b + c) / 2
 
 
-def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collection[str]) -> list[Limit]:
-    """Couplings of nuclear spins that no effect of the calculation has; known: names of those that have a size already."""
+def _nuclear_limits(top: Top, j: int, effects: Sequence[QuantumEffect], sized: Collection[str]) -> list[Limit]:
+    """Nuclear spin couplings that the calculation neglects; sized: names of couplings whose size is listed already."""
     limits = []
     if absent_sizes(top, effects):
         nuclei = splitting_nuclei(top)
@@ -204,26 +206,26 @@ def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collec
     magnetic = sorted(
         {nucleus.label for nucleus in top.molecule.nuclei if nucleus.spin > 0} - _with_magnetic_constants(top)
     )
-    elsewhere = top.spin_constants is None and {"spin-rotation", "spin-spin"} & set(known)
+    elsewhere = top.spin_constants is None and {"spin-rotation", "spin-spin"} & set(sized)
     if magnetic and not elsewhere:
         limits.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
     return limits
 
 
 def _with_magnetic_constants(top: Top) -> set[str]:
-    """Isotopes of which a constant other than χ is known, such as C_aa(14N) or b_F(S,1H_2)."""
+    """Isotopes with a known constant other than χ, such as C_aa(14N) or b_F(S,1H_2)."""
     values = top.spin_constants.values if top.spin_constants else {}
     inside = [name.partition("(")[2].rstrip(")").split(",") for name in values if not name.startswith("chi")]
     return {spin.partition("_")[0] for spins in inside for spin in spins}
 
 
 def _split_text(nuclei: Sequence[Splitting]) -> str:
-    """Which nuclei split lines, by how much where it is known, and what to do."""
-    known = [
+    """Text on the nuclei that split lines: known splittings, and the remedy."""
+    known_splittings = [
         f"{nucleus.nucleus} splits J = 1 by {nucleus.splitting_mhz:.3g} MHz" for nucleus in nuclei if nucleus.known
     ]
     others = sorted({nucleus.nucleus for nucleus in nuclei if not nucleus.known})
-    texts = [f"{', '.join(known)}: {COMPUTE}"] if known else []
+    texts = [f"{', '.join(known_splittings)}: {COMPUTE}"] if known_splittings else []
     if others:
         texts.append(
             f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by so much in covalent bonds; its spin "
@@ -232,8 +234,8 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
     return "; ".join(texts)
 
 
-def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
-    """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
+def _limits_of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
+    """Large-amplitude motions and unpaired electrons that the geometry shows."""
     from rotor.molecules.bonds import bonded_atoms
     from rotor.quantum.estimates.methyl_groups import methyl_groups
 
@@ -250,7 +252,7 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
 
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
-    """That of the group with the lowest barrier, counted in its F; a bound where no barrier of a similar molecule is known."""
+    """Internal rotation of the group with the lowest V3/F; an upper bound if no barrier of a similar molecule is known."""
     from rotor.quantum.estimates.internal_rotation import line_shifts
 
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
@@ -265,26 +267,27 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 
 
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
-    """Size and what it is of: the barrier, of which molecule, where it is unsafe or so low that no E line fits a rigid top.
+    """Size of the A - E splitting, and text on the barrier, its source and its uncertainty.
 
     Parameters
     ----------
     top : Top
-        Its dipole says whether lines with the same or with another K are the strong ones.
+        The dipole decides whether lines with ΔK = 0 or with ΔK = 1 are the strong ones.
     what : str
-        How many groups turn.
+        Number of groups, as text.
     group : MethylGroup
+        The group, with its barrier.
     shifts : LineShifts
-        Of that group.
+        Splittings by this group.
     j : int
-        Of which lower level.
+        J of the lower levels.
     """
     barrier, rotor = group.barrier, group.rotor
     sizes = [("within one K", shifts.typical_same_mhz), ("between two K", shifts.typical_other_mhz)]
     along = int(np.argmax(np.abs(rotor.rho)))
     if top.dipole_abc_debye is not None and any(top.dipole_abc_debye) and not top.dipole_abc_debye[along]:
         sizes.reverse()
-    assert barrier is not None  # without one the size is a bound, in words of its own
+    assert barrier is not None  # without a barrier the caller states a bound
     source = f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"
     unsafe = "" if barrier.safe else ", unsafe: it varies much among such molecules"
     low = ", so low that no line of the E species fits a rigid top" if rotor.reduced_barrier < LOW_BARRIER else ""
@@ -296,7 +299,7 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
 
 
 def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> list[Ints]:
-    """The neighbours of nitrogens that have three, two of them hydrogens, and are not flat."""
+    """The neighbours of each pyramidal nitrogen with three neighbours, at least two of them hydrogens."""
     from rotor.quantum.estimates.methyl_groups import is_flat
 
     pyramidal, x = [], molecule.positions_angstrom
@@ -308,6 +311,6 @@ def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> list[Ints
 
 
 def _inversion_mhz(molecule: Molecule, near: Ints) -> float:
-    """The splitting of NH3, or that of ND3 where every hydrogen at the nitrogen is a heavy one."""
+    """The inversion splitting of NH3, or that of ND3 if all neighbours of the nitrogen are heavier than protium."""
     heavy = all(molecule.mass_numbers[i] > 1 for i in near.tolist())
     return HEAVY_AMMONIA_MHZ if heavy else AMMONIA_MHZ

@@ -1,9 +1,9 @@
-"""Methyl groups that turn against the rest of a molecule, by its geometry alone, and the barrier of a similar molecule.
+"""Methyl groups of a geometry, and their barriers from similar molecules.
 
-The barrier V3 is taken by the atom that bears the group and what is bonded to it. Each is that of one molecule, and of others of
-the same kind within a factor of about 2 (marked ~: more); the A - E difference of lines goes about as exp(-1.3 √(V3/F)), so that a
-barrier that is half too high makes it some four to ten times too small. A group beside an atom that the table has not is reported
-with F, the size without a barrier, as a bound.
+The barrier V3 follows from the atom that bears the group and its neighbours. Each value is that of one molecule; other molecules of the
+same kind agree within a factor of about 2 (marked ~: less well). The A - E splitting of lines scales about as exp(-1.3 √(V3/F)): a barrier
+that is 50 % too high makes it four to ten times too small. For groups missing from the table, the free-rotor value F is reported as an
+upper bound.
 
 | group | V3, cm⁻¹ | of | where it was read |
 |---|---|---|---|
@@ -37,13 +37,13 @@ from rotor.molecules.molecule import Molecule
 from rotor.quantum.estimates.internal_rotation import InternalRotor, rotor_of_moments
 from rotor.units import MHZ_PER_CM
 
-OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
-FLAT_DEGREES = 355.0  # sum of three angles from which a nitrogen is taken for flat, here and for inversion
+OFF_AXIS = 0.05  # sine of the angle above which an atom counts as off the axis of a methyl group
+FLAT_DEGREES = 355.0  # sum of three angles above which a nitrogen counts as flat, here and for inversion
 
 
 @dataclass(frozen=True)
 class Barrier:
-    """V3 of a kind of group, in cm⁻¹, and the molecule it is of. safe: whether others of the kind have nearly the same."""
+    """V3 (cm⁻¹) of a kind of group, and the molecule of this value. safe: whether V3 varies little among such molecules."""
 
     v3_cm: float
     molecule: str
@@ -52,7 +52,7 @@ class Barrier:
 
 @dataclass(frozen=True)
 class MethylGroup:
-    """A group that turns against the rest: its F and ρ with the barrier (0 where it is not known), that barrier, and its hydrogens."""
+    """A methyl group: F and ρ with V3 (0 if unknown), the barrier with its source, and the numbers of its hydrogens."""
 
     rotor: InternalRotor
     barrier: Barrier | None
@@ -60,7 +60,7 @@ class MethylGroup:
 
 
 def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup]:
-    """CH3 and CD3 whose turning is not that of the whole: other atoms lie off their axis. Three unlike hydrogens are left out."""
+    """CH3 and CD3 with other atoms off their axis, so that they turn against the rest; groups of unlike hydrogens are left out."""
     x, mass = molecule.positions_angstrom, molecule.masses_u
     groups: list[tuple[int, list[int], Floats]] = []
     for carbon, near in enumerate(bonds):
@@ -76,23 +76,23 @@ def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup
 def _with_moments(
     molecule: Molecule, bonds: Sequence[Ints], groups: Sequence[tuple[int, list[int], Floats]]
 ) -> list[MethylGroup]:
-    """F, ρ and the barrier of groups, each by its carbon, its hydrogens and its axis."""
+    """F, ρ and barrier of groups (carbon, hydrogens, axis)."""
     from rotor.geometry.inertia import point_masses, principal_frame
 
     x, mass = molecule.positions_angstrom, molecule.masses_u
-    frame, made = principal_frame(point_masses(mass, x)), []
+    frame, methyls = principal_frame(point_masses(mass, x)), []
     for carbon, hydrogens, axis in groups:
         off = x[hydrogens] - x[hydrogens].mean(axis=0)
         off -= np.outer(off @ axis, axis)
         top_moment = float(mass[hydrogens] @ np.sum(off**2, axis=1))
         barrier = barrier_beside(molecule, bonds, carbon)
         height = 0.0 if barrier is None else barrier.v3_cm * MHZ_PER_CM
-        made.append(
+        methyls.append(
             MethylGroup(
                 rotor_of_moments(top_moment, frame.axes @ axis, frame.moments, height), barrier, tuple(hydrogens)
             )
         )
-    return made
+    return methyls
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:
@@ -113,7 +113,7 @@ def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Ba
 
 
 def _beside_chalcogen(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int, other: int) -> Barrier | None:
-    """Alcohols, esters, ethers; thiols, thioesters and sulfides."""
+    """Barriers of alcohols, esters, ethers, thiols, thioesters and sulfides."""
     acyl = symbols[other] == "C" and _doubly_bonded_oxygen(symbols, bonds, other)
     if symbols[bearer] == "S":
         if symbols[other] != "C":
@@ -127,6 +127,7 @@ def _beside_chalcogen(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int
 
 
 def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, others: list[int]) -> Barrier | None:
+    """Barriers beside a carbon, by its other neighbours."""
     symbols = molecule.symbols
     if len(others) == 3:
         return Barrier(1108.0, "propane")
@@ -135,7 +136,7 @@ def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, other
     if len(others) != 2:
         return None
     if _doubly_bonded_oxygen(symbols, bonds, bearer):
-        return _of_acyl([symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)])
+        return _beside_acyl([symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)])
     size = _ring(bonds, bearer, others)
     if size in (5, 6):
         return Barrier(0.0, "toluene", False) if size == 6 else Barrier(248.0, "2,5-dimethylthiophene", False)
@@ -145,20 +146,20 @@ def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, other
     return Barrier(429.0, "methyl ketene") if cumulated else Barrier(688.0, "propene")
 
 
-def _of_acyl(others: list[str]) -> Barrier | None:
-    """By the atom beside the oxygen and the methyl group."""
+def _beside_acyl(others: list[str]) -> Barrier | None:
+    """Barriers beside C=O, by the third neighbour of the carbon."""
     kinds = {"H": Barrier(407.6, "acetaldehyde"), "O": Barrier(170.0, "acetic acid"),
              "C": Barrier(302.0, "2-acetyl-5-methylthiophene", False)}  # fmt: skip
     return kinds.get(others[0]) if len(others) == 1 else None
 
 
 def _doubly_bonded_oxygen(symbols: Sequence[str], bonds: Sequence[Ints], carbon: int) -> bool:
-    """Whether a carbon with three neighbours has an oxygen that is bonded to it alone."""
+    """Whether a carbon with three neighbours has an oxygen with no other bond."""
     return len(bonds[carbon]) == 3 and any(symbols[i] == "O" and len(bonds[i]) == 1 for i in bonds[carbon].tolist())
 
 
 def _ring(bonds: Sequence[Ints], atom: int, neighbours: list[int]) -> int:
-    """Atoms in the smallest ring of at most six through an atom and two of its neighbours; 0: none."""
+    """Size of the smallest ring (at most six atoms) through an atom and two of its neighbours; 0 if there is none."""
     start, goal = neighbours
     seen, front = {atom, start}, {start}
     for size in range(3, 7):
@@ -177,7 +178,7 @@ def is_flat(x: Floats, atom: int, near: Ints) -> bool:
 
 
 def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
-    """Whether some atom that is not of the group lies off the axis through its first atom; a thousand atoms at a time."""
+    """Whether an atom outside the group lies off the axis through its first atom; tested in batches of bounded memory."""
     for start in range(0, len(x), 1000):
         rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
         if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():

@@ -1,4 +1,4 @@
-"""What a plan says of levels: effects with their sizes, good quantum numbers, basis, blocks and method."""
+"""Plans of levels: effects with their sizes, good quantum numbers, basis, blocks and method."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rotor.tops.internal_rotation import InternalRotationConstants
     from rotor.tops.top import Top
 
-SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
+SHORT_J = (12, 30)  # J from which the cost is extrapolated; up to the second J it is measured
 ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
-MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # J up to which the truncation of the torsion is compared, by the number of tops
+MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # highest J at which the torsional truncation is estimated, by number of tops
 
 
-def of_top(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
-    """Effects, good quantum numbers and what is left out, as fields of a plan."""
+def plan_fields(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
+    """Effects, good quantum numbers and neglected effects, as fields of a plan."""
     left_out = left_out_of_levels(top, j, effects)
     return {"effects": effect_texts(top, j, effects), "good": good_numbers(top, effects), "left_out": left_out}
 
@@ -56,17 +56,19 @@ def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[t
 
 
 def _names(spins: Sequence[Any]) -> str:
+    """Names of spins, each once."""
     return ", ".join(dict.fromkeys(spin.name for spin in spins))
 
 
 def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
+    """Name and size of each effect."""
     from rotor.quantum.effect import effect_sizes
 
     return tuple(f"{effect.name}, {effect.size_mhz:.2g} MHz at J = {j}" for effect in effect_sizes(top, j, effects))
 
 
 def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
-    """Quantum numbers that stay good under the effects, as the levels have them."""
+    """Quantum numbers that label the levels with these effects."""
     from rotor.quantum.solve import solve_levels
 
     return solve_levels(top, 1, effects=effects, vectors=False).quanta_names
@@ -97,7 +99,7 @@ def plan_of_levels(request: Any) -> Plan:
     plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
 
     def work(j: int) -> float:
-        """Blocks of an asymmetric top are diagonalised."""
+        """Cost by J: blocks of an asymmetric top are diagonalised, other tops have closed forms."""
         return (j + 1.0) ** (3 if top.kind == "asymmetric" else 1)
 
     count = (jmax + 1) ** 2 - first**2 if top.kind == "asymmetric" else jmax + 1 - first
@@ -106,7 +108,7 @@ def plan_of_levels(request: Any) -> Plan:
     cost = Growth(lambda j: answer_levels(replace(plain, jmax=j)).table.columns, jmax, SHORT_J, work, work)
     return Plan(
         kind="levels",
-        **of_top(top, max(jmax, 1), request.effects),
+        **plan_fields(top, max(jmax, 1), request.effects),
         parts=tuple(level_parts(top, jmax, request.effects)),
         counts={"levels": count},
         seconds=cost.seconds,

@@ -1,18 +1,18 @@
-"""Nuclei that split lines, and by how much: from known constants, or from a typical field gradient.
+"""Quadrupole splittings of lines, from known constants or from a typical field gradient.
 
 To first order a level J = 1 with one nucleus of spin I lies at -χ_gg Y(F) with Casimir's function
 
     Y = [¾ C(C+1) - I(I+1)J(J+1)] / [2(2J-1)(2J+3) I(2I-1)],    C = F(F+1) - I(I+1) - J(J+1)
 
-(W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., eq. 9.20), χ_gg along the axis g about which J = 1 does not turn. The
-size that is given is the distance of the outermost components for the largest of the three. Where χ is not known, it is that of the
-gradient in covalent bonds of the element, `GRADIENTS`, in atomic units e/(4π ε0 a0³), between those of these molecules: D 0.25 to 0.45
+(W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., eq. 9.20), with χ_gg along the axis g about which J = 1 does not turn. The
+reported size is the distance of the outermost components for the largest of the three. If χ is not known, it is estimated from the typical
+gradient in covalent bonds of the element, `GRADIENTS`, in atomic units e/(4π ε0 a0³), chosen among those of these molecules: D 0.25 to 0.45
 (C-D of DCOOH, O-D of HCOOD and CH3OD), O 0.8 (HCO⁺), N 0.6 to 1 (HOCN, ICN, HCONH2, NH3, CH3CN, HCN), Cl 3.9 (CH3Cl, CH2BrCl), Br 7
 to 12 (2-bromopropane, CH3CH2Br, CH3Br, CH2Br2, HOBr), I 12 to 17 (CH3I, CH2ICN, CF3I, ICN, IN3); tests/quantum/test_limits.py has them and
 where they were read. Other elements count with 1. In ionic molecules such as KCl the halogens have far less.
 
 A line between J' and J has components at E(J', F') - E(J, F), E = χ (3K²/J(J+1) - 1) Y of a linear (K = 0) or symmetric top, with the parts
-(2F'+1)(2F+1) {J' F' I; F J 1}² of its intensity. Their mean is that of the line without the coupling: the centre of gravity stays, and an
+(2F'+1)(2F+1) {J' F' I; F J 1}² of its intensity. Their weighted mean is the line without coupling: the centre of gravity stays, and an
 unresolved line loses a part of its depth at the centre, `depth_lost`.
 """
 
@@ -40,7 +40,7 @@ GRADIENTS = {"H": 0.35, "N": 0.8, "O": 0.8, "Cl": 3.9, "Br": 8.0, "I": 13.0}
 
 @dataclass(frozen=True)
 class Splitting:
-    """One nucleus that splits lines. known: whether its constants are; else they are those of a typical field gradient."""
+    """Splitting by one nucleus. known: whether its constants are known; otherwise they follow from a typical field gradient."""
 
     nucleus: str
     spin: float
@@ -72,7 +72,7 @@ def spread(twice_spin: int) -> float:
 
 
 def line_components(twice_spin: int, j_upper: int, j_lower: int, k: int) -> tuple[Floats, Floats]:
-    """Shifts in units of χ, and parts of the intensity, of the components of a line of one K.
+    """Shifts (in units of χ) and relative intensities of the components of a line of one K.
 
     >>> shifts, parts = line_components(2, 1, 0, 0)
     >>> shifts.round(3).tolist(), parts.round(3).tolist()
@@ -97,23 +97,23 @@ def _first_order(twice_spin: int, j: int, k: int, twice_f: int) -> float:
 
 
 def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | None, fwhm_mhz: float) -> float:
-    """The part of its depth that an unresolved line loses at its centre: 1 - Σ w exp(-4 ln 2 (δ/Δν)²), δ and w of the components.
+    """The relative loss of depth at the centre of an unresolved line: 1 - Σ w exp(-4 ln 2 (δ/Δν)²) over components (shift δ, weight w).
 
     Parameters
     ----------
     nuclei : sequence of Splitting
-        Each by itself.
+        Nuclei, treated as independent.
     numbers : (int, int)
         J of the upper and of the lower level.
     k : int or None
-        0 of a linear top; None: the mean over all K, as of an asymmetric top.
+        K, 0 for a linear top; None averages over all K, as for an asymmetric top.
     fwhm_mhz : float
         Full width of the line at half maximum.
 
     Returns
     -------
     float
-        0 to 1.
+        A number from 0 to 1.
     """
     left = 1.0
     k_values = range(min(numbers) + 1) if k is None else (k,)
@@ -127,30 +127,31 @@ def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | N
 
 
 def splitting_nuclei(top: Top) -> list[Splitting]:
-    """Every nucleus of spin 1 or more whose coupling is known or can be estimated, the largest splitting first."""
-    splittings, known = [], set()
+    """The nuclei of spin 1 or more whose coupling is known or can be estimated, the largest splitting first."""
+    splittings, atoms_with_constants = [], set()
     if top.spin_constants is not None:
         for spin, twice in top.spin_constants.twice.items():
-            chi = {name: value for name, value in top.spin_constants.of(spin).items() if _of_tensor(name)}
+            chi = {name: value for name, value in top.spin_constants.of(spin).items() if _is_tensor_element(name)}
             if chi and twice > 1:
                 diagonal = np.diag(chi_tensor(chi))
                 splittings.append(_splitting(spin, twice, float(diagonal[np.abs(diagonal).argmax()]), True))
-                known.add(top.spin_constants.atoms.get(spin))
+                atoms_with_constants.add(top.spin_constants.atoms.get(spin))
     if top.molecule is not None:
         labels: dict[str, Splitting] = {}
         for atom, nucleus in enumerate(top.molecule.nuclei, start=1):
-            if nucleus.spin >= 1 and nucleus.quadrupole_barn and atom not in known:
+            if nucleus.spin >= 1 and nucleus.quadrupole_barn and atom not in atoms_with_constants:
                 chi_mhz = GRADIENT_MHZ_PER_BARN * GRADIENTS.get(nucleus.symbol, 1.0) * nucleus.quadrupole_barn
                 labels.setdefault(nucleus.label, _splitting(nucleus.label, round(2 * nucleus.spin), chi_mhz, False))
         splittings += labels.values()
     return sorted(splittings, key=lambda splitting: -splitting.splitting_mhz)
 
 
-def _of_tensor(name: str) -> bool:
-    """Whether a constant is an element of χ itself, not of what changes it with J or K."""
+def _is_tensor_element(name: str) -> bool:
+    """Whether a constant is an element of χ itself, not of its dependence on J or K."""
     letters = name.removeprefix("chi_")
     return name.startswith("chi_") and set(letters) <= set("abc-")
 
 
-def _splitting(nucleus: str, twice: int, chi_mhz: float, known: bool) -> Splitting:
-    return Splitting(nucleus, twice / 2, chi_mhz, abs(chi_mhz) * spread(twice), known)
+def _splitting(nucleus: str, twice: int, chi_mhz: float, is_known: bool) -> Splitting:
+    """Splitting of J = 1 by χ."""
+    return Splitting(nucleus, twice / 2, chi_mhz, abs(chi_mhz) * spread(twice), is_known)

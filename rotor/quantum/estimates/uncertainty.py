@@ -1,10 +1,9 @@
-"""What uncertain constants make of levels and lines.
+"""Errors of levels and lines due to uncertain constants.
 
     σ² = d C dᵀ,      C the covariance of the constants, d = ∂E/∂c of a level, ∂E′/∂c - ∂E″/∂c of a line
 
-to first order, which is all there is as long as levels are linear in their constants over one σ. The constants are
-taken as the only cause: what the Hamiltonian leaves out is no part of it. With C = F Fᵀ the variance is the squared
-length of the row d F, so that a list of lines needs the rows of its levels only.
+to first order, which is enough as long as levels are linear in their constants over one σ. Neglected effects of the Hamiltonian are not
+included. With C = F Fᵀ the variance is the squared length of the row d F, so that a list of lines needs only the rows of its levels.
 """
 
 from __future__ import annotations
@@ -24,16 +23,16 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-_AT_ONCE = 1 << 16  # lines whose rows are gathered at a time
+_AT_ONCE = 1 << 16  # lines computed at a time
 
 
 def level_spread(top: Top, levels: Levels, covariance: Covariance) -> Floats:
-    """∂E/∂c F of every level, (levels, n) in MHz; lengths and differences of its rows are errors."""
+    """∂E/∂c F of each level, (levels, n) in MHz; errors are lengths of its rows and of their differences."""
     return np.asarray(level_derivatives(top, levels, covariance.names) @ covariance.factor)
 
 
 def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
-    """One standard deviation of every level's energy, (levels,) in MHz, against the Hamiltonian's zero.
+    """One standard deviation of each energy, (levels,) in MHz, relative to the zero of the Hamiltonian.
 
     >>> from rotor.tops.constants import Constants
     >>> from rotor.quantum.solve import solve_levels
@@ -47,7 +46,7 @@ def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
 
 
 def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.integer]) -> Floats:
-    """One standard deviation of lines between the levels `upper` and `lower`, (lines,) in MHz, from `level_spread`."""
+    """One standard deviation of the lines `upper` ← `lower`, (lines,) in MHz, from `level_spread`."""
     out = np.empty(len(upper))
     for start in range(0, len(upper), _AT_ONCE):
         here = slice(start, start + _AT_ONCE)
@@ -57,10 +56,10 @@ def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.in
 
 
 def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None:
-    """What a top knows of the errors of these parameters: its covariance, else uncertainties that may count as uncorrelated.
+    """Covariance of these parameters: that of the top, else its uncertainties if they count as uncorrelated.
 
-    Constants of spins that the covariance does not have count by their own uncertainties, uncorrelated. None for a top whose energies
-    are in a table, since they do not follow from its constants, and where correlations of the constants are not known.
+    Spin constants that the covariance does not contain enter with their uncertainties, uncorrelated. None for a top with a table of
+    energies, which do not follow from its constants, and if correlations are not known.
     """
     if top.level_table is not None:
         return None
@@ -78,14 +77,14 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
 
 
 def source_of_errors(top: Top, parameters: Collection[str], covariance: Covariance | None) -> str | None:
-    """Which uncertainties the errors of frequencies come from, in words, None where there are none; given: in place of what the top has."""
+    """Text on the uncertainties behind errors of frequencies, None without any; `covariance` replaces that of the top."""
     if covariance is None and top.level_table is not None:
         unknown = top.level_table.own_error_mhz is None
         return "none: the energies are from a table" if unknown else "the table of energies"
     used = covariance or known_covariance(top, parameters)
     if used is None:
-        known = top.constants.uncertainties and top.covariance is None
-        return "none: the constants are from a fit whose correlations are not known" if known else None
+        has_uncertainties = top.constants.uncertainties and top.covariance is None
+        return "none: the constants are from a fit whose correlations are not known" if has_uncertainties else None
     together = covariance or (top.covariance.of(parameters) if top.covariance else None)
     alone = [name for name in used.names if together is None or name not in together.names]
     texts = [f"covariance of {', '.join(together.names)}"] if together else []

@@ -1,4 +1,4 @@
-"""How far zero-point vibration sets the constants of the ground state from those of an equilibrium geometry.
+"""Estimated difference between constants of the vibrational ground state and of an equilibrium geometry.
 
 For a diatomic molecule B_e - B_0 = α_e/2, and with α_e = 6 F B²/ω (Pekeris' relation, in which F = a r - 1 for
 a Morse potential)
@@ -6,15 +6,15 @@ a Morse potential)
     δB/B = 3 F B/ω,    that is  δr/r = (3/2) F ħ/(2πc · 2μω r²),
 
 as if the bond were longer by δr. ω follows from the bond length (AIP Advances 13 (2023) 115323, abstract; atomic units,
-ζ = 2 Z Z'/(Z + Z') the reduced nuclear charge, with this factor 2 as H2, CO and N2 demand it):
+ζ = 2 Z Z'/(Z + Z') the reduced nuclear charge, with the factor 2 that H2, CO and N2 require):
 
     k = ζ²/r³ of bonds with hydrogen,    k = 10 √ζ/r⁴ of others,
 
-and F = 1.2 and 2.2 are medians over every second of 45 diatomic molecules; over the others 1.2 and 2.2 again, none beyond a factor
-of 2 (tests/molecules/test_zero_point.py). In a polyatomic molecule every bond is taken to be longer by its own δr, all angles as they were;
-atoms are displaced by the least amounts that do this (in a ring as nearly as they can). Bending, which makes A of water larger in
-the ground state, and Coriolis terms are left out: signs and axes are not to be trusted, the quadratic mean over the axes is.
-How that compares with measured constants is in docs/limitations.md.
+F = 1.2 and 2.2 are the medians over every second of 45 diatomic molecules; the other half gives 1.2 and 2.2 again, with no molecule beyond
+a factor of 2 (tests/molecules/test_zero_point.py). In a polyatomic molecule each bond is lengthened by its δr at fixed angles, with the
+smallest displacements of atoms (in a ring, by least squares). Bending, which makes A of water larger in the ground state, and Coriolis
+terms are neglected: the quadratic mean over the axes is reliable, signs and single axes are not. docs/limitations.md compares with
+measured constants.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
 F_HYDROGEN, F_OTHER = 1.2, 2.2
-LARGE = 60  # atoms above which the mean over bonds without hydrogen is taken
-MANY_BONDS = 1000  # of a large molecule that are looked at, evenly
-_STEP = 1e-3  # of the displacement, for its derivative
+LARGE = 60  # with more atoms, the mean over bonds without hydrogen is used
+MANY_BONDS = 1000  # most bonds of a large molecule that are sampled
+_STEP = 1e-3  # fraction of the displacement for its derivative
 
 
 def relative_elongation(charges: Floats, masses_u: Floats, length_angstrom: float) -> float:
@@ -52,7 +52,7 @@ def relative_elongation(charges: Floats, masses_u: Floats, length_angstrom: floa
 
 
 def relative_difference(molecule: Molecule, bonds: Sequence[Ints]) -> float:
-    """The quadratic mean over the axes of (B_e - B_0)/B, by the atoms bonded to each atom; 0 where nothing is bonded.
+    """The quadratic mean over the axes of (B_e - B_0)/B, from the bonded neighbours of each atom; 0 without bonds.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> water = Molecule(["O", "H", "H"], [[0, 0, 0], [0.757, 0.586, 0], [-0.757, 0.586, 0]])
@@ -83,7 +83,7 @@ def _elongations(molecule: Molecule, pairs: Sequence[tuple[int, int]]) -> dict[t
 
 
 def _displacement(x: Floats, bonds: Sequence[Ints], longer: dict[tuple[int, int], float]) -> Floats:
-    """The least displacements (n, 3) in Å that make bonds longer and leave angles as they are, by least squares.
+    """The smallest displacements (n, 3) in Å that lengthen bonds at fixed angles, by least squares.
 
     For atoms i and k beside j, with u = x_i - x_j and v = x_k - x_j, d|u - v|² = 2 (ε_u u - ε_v v)·(u - v) at a fixed angle.
     """

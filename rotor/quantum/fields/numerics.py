@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor.quantum.effects.stark import map_request
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.plans import of_top
+from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.block_states import block_states
 from rotor.quantum.fields.field_map import each_block
 from rotor.quantum.fields.knobs import ENERGY, largest_difference
@@ -72,7 +72,7 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: 
     facts = at(tuple(dict.fromkeys((min(fields), max(fields))))).facts()
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
     cost = Growth(lambda n: at(tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
-    described = of_top(top, j, request.effects or SEMI_RIGID)
+    described = plan_fields(top, j, request.effects or SEMI_RIGID)
     known_names = {limit.name for limit in described["left_out"]}
     field_limits = [
         LeftOut(limit["name"], limit["size_mhz"], "MHz", limit["text"])

@@ -1,1 +1,1 @@
-"""Rotation alone: Wang functions, matrices of angular momentum, and their solution."""
+"""Rotation without spins: Wang functions, matrices of angular momentum, and their solution."""

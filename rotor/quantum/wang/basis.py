@@ -1,4 +1,4 @@
-"""Wang's symmetry-adapted basis of one J: which states, in what order, and what symmetry they have.
+"""Wang's symmetry-adapted basis of one J: states, their order and their symmetry.
 
 |J K s⟩ = (|J K⟩ + s |J -K⟩)/√2 for K > 0 and |J 0⟩ for K = 0, s = ±1. States whose K have one parity and one s form
 a Wang block: E+ (K = 0, 2, ...), E- (2, 4, ...), O+ and O- (1, 3, ...). Under the rotations by π about x, y, z of the
@@ -6,8 +6,7 @@ molecule a state of the block has the characters (Bunker and Jensen, Molecular S
 
     C2x: s (-1)^J,    C2y: s (-1)^(J+K),    C2z: (-1)^K,
 
-and since (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, whatever the representation, a block is known by
-J and the parities of Ka and Kc.
+In any representation (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, so that J and the parities of Ka and Kc identify a block.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ class WangBlock(NamedTuple):
 
 
 class Part(NamedTuple):
-    """The functions of one state v and one Wang block, at `start` ... in a block."""
+    """The functions of one state v and one Wang block, from `start` on in a block."""
 
     v: int
     basis: WangBlock
@@ -47,28 +46,30 @@ class Part(NamedTuple):
 
     @property
     def place(self) -> slice:
-        """Where the functions stand in the block."""
+        """Places of the functions in the block."""
         return slice(self.start, self.start + self.basis.size)
 
 
 def _parity(character: int) -> str:
+    """e or o."""
     return "e" if character > 0 else "o"
 
 
 def _species(j: int, first_k: int, sign: int, axes: str) -> str:
+    """Parities of Ka and Kc of a Wang block."""
     k_even, j_even = (-1) ** first_k, (-1) ** j
     character = {axes[0]: sign * j_even, axes[1]: sign * j_even * k_even, axes[2]: k_even}
     return _parity(character["a"]) + _parity(character["c"])
 
 
 def character(block: WangBlock, axis: str) -> int:
-    """1 or -1 under half a turn about a, b or c.
+    """Character, 1 or -1, under a half turn about a, b or c.
 
     >>> [character(WangBlock(1, "eo", 0, 1, 1), axis) for axis in "abc"]
     [1, -1, -1]
     """
-    of_a, of_c = (1 if parity == "e" else -1 for parity in block.species)
-    return {"a": of_a, "b": of_a * of_c, "c": of_c}[axis]
+    under_a, under_c = (1 if parity == "e" else -1 for parity in block.species)
+    return {"a": under_a, "b": under_a * under_c, "c": under_c}[axis]
 
 
 def wang_blocks(j: int, representation: str) -> list[WangBlock]:
@@ -85,7 +86,7 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
 def ka_kc(j: int, species: str, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Ka and Kc of the states of a block in order of energy.
 
-    Ka rises by two through the block; Kc is what leaves Ka + Kc = J or J + 1 with the right parity.
+    Ka rises by two through the block; Kc follows from Ka + Kc = J or J + 1 and its parity.
 
     >>> ka_kc(2, "ee", 2)
     (array([0, 2]), array([2, 0]))
@@ -98,7 +99,7 @@ def ka_kc(j: int, species: str, size: int) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
-    """The part of a block with `kmin` ≤ K ≤ `kmax`, None where nothing is left.
+    """The part of a block with `kmin` ≤ K ≤ `kmax`; None if it is empty.
 
     >>> limited(WangBlock(5, "eo", 0, 1, 3), 1, 3)
     WangBlock(j=5, species='eo', first_k=2, sign=1, size=1)
@@ -110,7 +111,7 @@ def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
 
 
 def names_of(block: WangBlock, representation: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ka and Kc of the states of a block, of which some K may be left out, in order of energy.
+    """Ka and Kc of the states of a block in order of energy; some K may be left out of the block.
 
     >>> names_of(WangBlock(5, "eo", 2, 1, 1), "Ir")
     (array([2]), array([3]))

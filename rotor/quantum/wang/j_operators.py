@@ -75,7 +75,7 @@ class JOperator:
 
 
 def _shifted(band: Complexes, p: int) -> Complexes:
-    """band at k + p, for every k; zero where that is beyond J."""
+    """The band at k + p for each k; zero where that is beyond J."""
     out = np.zeros_like(band)
     first, last = max(0, -p), min(len(band), len(band) - p)
     out[first:last] = band[first + p : last + p]
@@ -125,7 +125,7 @@ def components(j: int, representation: str) -> Mapping[str, JOperator]:
 
 
 def half_turn(j: int, representation: str, axis: str) -> JOperator:
-    """C2a, C2b or C2c, whose characters in Wang's functions are those of `basis`, over |J k⟩.
+    """C2a, C2b or C2c over |J k⟩, with the characters of `basis` in Wang functions.
 
     >>> half_turn(1, "Ir", "a").matrix.real.diagonal().tolist(), half_turn(1, "Ir", "b").matrix.real[0].tolist()
     ([-1.0, 1.0, -1.0], [0.0, 0.0, -1.0])
@@ -139,7 +139,7 @@ def half_turn(j: int, representation: str, axis: str) -> JOperator:
 
 
 def between_species(operator: JOperator, representation: str, pairs: Collection[tuple[str, str]]) -> JOperator:
-    """Σ P_s O P_t over pairs of species (s, t), P projecting on the functions with the characters of a species.
+    """Σ P_s O P_t over pairs of species (s, t), where P_s projects on functions of species s.
 
     >>> whole = components(2, "Ir")["a"]
     >>> float(abs(between_species(whole, "Ir", [("ee", "ee")]).matrix).max()), len(between_species(whole, "Ir", [("ee", "eo")]).bands)
@@ -163,7 +163,7 @@ def between_species(operator: JOperator, representation: str, pairs: Collection[
 def phase(block: WangBlock) -> complex:
     """The factor that makes a Wang function invariant under time reversal: 1, or i where s differs from (-1)^K.
 
-    In functions with this factor every Hermitian operator that time reversal leaves alone is real (the matrix of |J k⟩ obeys
+    Over functions with this factor all Hermitian operators that are even under time reversal are real (their matrix over |J k⟩ obeys
     M(-k', -k) = (-1)^(k'-k) M(k', k)*).
     """
     return 1.0 if block.sign == (-1) ** block.first_k else 1j
@@ -175,7 +175,7 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
     |K s⟩ = (|K⟩ + s|-K⟩)/√2 for K > 0, |0⟩ for K = 0.
     """
     if len(operator.bands) > _FEW_BANDS:
-        return _of_whole_matrix(up, low, operator.matrix)
+        return _between_by_full_matrix(up, low, operator.matrix)
     out = np.zeros((up.size, low.size), dtype=np.complex128)
     for q, band in operator.bands.items():
         if (low.first_k + q - up.first_k) % 2 == 0:  # K in steps of 2
@@ -184,11 +184,11 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
     return out
 
 
-_FEW_BANDS = 24  # more stand in operators times half a turn across z alone, which have all
+_FEW_BANDS = 24  # only operators times a half turn across z have more; these have all bands
 
 
-def _of_whole_matrix(up: WangBlock, low: WangBlock, matrix: Complexes) -> Complexes:
-    """The same from the full matrix over k."""
+def _between_by_full_matrix(up: WangBlock, low: WangBlock, matrix: Complexes) -> Complexes:
+    """Elements between two Wang blocks from the full matrix over k."""
     sides = []
     for block in (up, low):
         function = np.zeros((len(matrix), block.size))
@@ -202,7 +202,7 @@ def _of_whole_matrix(up: WangBlock, low: WangBlock, matrix: Complexes) -> Comple
 
 @lru_cache(maxsize=4096)
 def _places(up: WangBlock, low: WangBlock, q: int) -> tuple[tuple[Ints, Ints, Ints, Complexes], ...]:
-    """Of k and of -k: where the elements of a band stand between two blocks, where in the band, and their factors."""
+    """For k and for -k: rows and columns between two blocks, places in the band, and factors of the elements of a band."""
     j, k, places = low.j, low.k, []
     turn = np.conj(phase(up)) * phase(low)
     for side in (1, -1):

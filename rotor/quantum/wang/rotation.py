@@ -1,7 +1,4 @@
-"""Levels of the rotation without spins, by the cheapest exact method: closed forms, Wang blocks, connected Wang blocks.
-
-`rotor.quantum.solve` says which method is for what.
-"""
+"""Levels of the rotation without spins by the cheapest exact method (`rotor.quantum.solve`): closed forms, Wang or coupled blocks."""
 
 from __future__ import annotations
 
@@ -36,11 +33,11 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-_NONE: Floats = np.zeros((0, 0))  # stands for eigenvectors that were not asked for
+_NONE: Floats = np.zeros((0, 0))  # in place of eigenvectors that are not computed
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
-    """The operators of all effects added: {(p, q, n): MHz}, zeros left out."""
+    """Sum of the operators of all effects, {(p, q, n): MHz}, without zeros."""
     total = added(
         (operators, values[name])
         for effect in effects
@@ -51,7 +48,7 @@ def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Oper
 
 
 def representation_of(top: Top) -> str:
-    """The representation in which a top is solved where no closed form serves: its own, else that with the axis at z."""
+    """The representation in which a top without closed form is solved: that of its constants, or the one with the axis along z."""
     return AXIAL_REPRESENTATION.get(top.kind) or str(top.constants.representation or "Ir")
 
 
@@ -72,27 +69,27 @@ def solve_rotation(
     top : Top
         Constants, kind and spin weights.
     effects : tuple of QuantumEffect
-        What the Hamiltonian consists of.
+        Effects of the Hamiltonian.
     jmin, jmax : int
         Lowest and highest rotational angular momentum.
     vectors : bool, optional
-        False leaves the eigenvectors of an asymmetric top out.
+        Whether eigenvectors of an asymmetric top are computed.
     executor : Executor, optional
-        J are spread over it.
+        Solves different J in parallel.
     in_blocks : bool, optional
         Solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
     below_mhz : float, optional
-        Without vectors, levels above it may be left out; the others are all there.
+        Without vectors, levels above this energy may be missing.
 
     Returns
     -------
     Levels
-        Energies in MHz, true eigenvalues, by the cheapest exact method of the table above.
+        Energies in MHz, exact eigenvalues by the cheapest method.
 
     Raises
     ------
     ValueError
-        For constants that overflow, and as `coupled_levels` does where blocks are connected.
+        For constants that overflow, and as `coupled_levels` for coupled blocks.
     """
     operators, limits = hamiltonian(top, effects), k_limits_of(top, effects)
     if top.kind != "linear":
@@ -112,12 +109,14 @@ def solve_rotation(
 
 
 def _closed_form_holds(kind: str, operators: Operators) -> bool:
+    """Whether the operators have closed-form energies for this kind of top."""
     if kind == "spherical":
         return is_cubic(operators)
     return all(n == 0 for _, _, n in operators)
 
 
 def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, Floats]:
+    """J and Σ c X^p for each."""
     j = np.arange(jmin, jmax + 1)
     return j, np.array([scalar_energy(operators, int(value)) for value in j])
 
@@ -125,7 +124,7 @@ def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, 
 def _linear(
     top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int, in_blocks: bool
 ) -> Levels:
-    """Linear tops: E = Σ c X^p. In blocks, each J is the one Wang function of K = 0 of the representation Iʳ."""
+    """Linear tops: E = Σ c X^p. In blocks, each J is the Wang function of K = 0 in the representation Iʳ."""
     beyond = [powers for powers in operators if powers[1] or powers[2]]
     with_axis = [
         e.name or type(e).__name__ for e in effects if e.couplings(top) or e.states(top) or _has_j_operator(e, top)
@@ -154,18 +153,20 @@ def _linear(
 
 
 def _one_function(j: int, energy: float, row: int) -> SolvedBlock:
+    """A block of the single function K = 0."""
     basis = WangBlock(j, "eo" if j % 2 else "ee", 0, 1, 1)
     return SolvedBlock(basis, np.array([energy]), np.ones((1, 1)), row)
 
 
 def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
+    """Whether a parameter of an effect multiplies an operator other than powers of J."""
     return any(effect.j_operator(top, name, 1, "Ir") is not None for name in effect.parameters(top))
 
 
 def _spherical(
     weights: SpinWeights, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int
 ) -> Levels:
-    """Spherical tops: E = Σ c X^p in one row of 2J+1 components, or, with D_t, a row for every level that it splits."""
+    """Spherical tops: E = Σ c X^p with one row of 2J+1 components for each J, or with one row for each level that D_t splits."""
     scalars, dt = scalar_and_tensor(operators)
     j, energy = _scalar_energies(scalars, jmin, jmax)
     if not dt:
@@ -189,7 +190,7 @@ def _spherical(
 
 
 def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:
-    """Symmetric tops: E(J, K) = Σ c X^p K^2q, one row for ±K."""
+    """Symmetric tops: E(J, K) = Σ c X^p K^2q, with one row for ±K."""
     j = np.repeat(np.arange(jmin, jmax + 1), np.arange(jmin, jmax + 1) + 1)
     k = np.concatenate([np.arange(value + 1) for value in range(jmin, jmax + 1)])
     x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
@@ -203,13 +204,13 @@ def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operator
 
 
 def _axial_states(top: Top, model: Model) -> bool:
-    """Whether several states of a symmetric top have closed forms: nothing couples them, and K is good in each."""
+    """Whether several states of a symmetric top have closed forms: they are uncoupled, and K is good in each."""
     alone = len(model.states) > 1 and not model.couplings and not model.limits
     return top.kind in ("prolate", "oblate") and alone and all(n == 0 for o in model.states.values() for _, _, n in o)
 
 
 def _symmetric_states(top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int) -> Levels:
-    """The closed forms of every state, each with its own weights, by J, state and K."""
+    """Closed forms of all states, with the spin weights of each, ordered by J, state and K."""
     weights = {state.v: state.spin_weights for effect in effects for state in effect.states(top)}
     numbers = sorted(model.states)
 
@@ -245,6 +246,7 @@ def _in_wang_blocks(
     limits: tuple[int, int] | None = None,
     below_mhz: float = math.inf,
 ) -> Levels:
+    """Levels from Wang blocks, in parallel over J with an executor."""
     representation = representation_of(top)
     all_j = range(jmin, jmax + 1)
     pieces = [
@@ -252,7 +254,7 @@ def _in_wang_blocks(
         for js in ([[j] for j in all_j] if executor else [all_j])
     ]
     solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
-    blocks = tuple(_placed(block for of_some_j in solved for block in of_some_j))
+    blocks = tuple(_placed(block for solutions in solved for block in solutions))
 
     labels = [names_of(b.basis, representation) for b in blocks]
     sizes = [len(b.energies_mhz) for b in blocks]
@@ -277,7 +279,7 @@ def _in_wang_blocks(
 
 
 def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[str, NDArray[np.int64]]) -> Ints:
-    """Spin weights; of an asymmetric top one number a block."""
+    """Spin weights of levels in blocks; all levels of an asymmetric block have the same."""
     if top.kind == "asymmetric":
         return np.repeat(
             [top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], [len(b.energies_mhz) for b in blocks]
@@ -288,6 +290,7 @@ def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[s
 
 
 def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
+    """Solved blocks with the row of the first level of each."""
     start = 0
     for basis, energies, vectors in solved:
         yield SolvedBlock(basis, energies, vectors, start)
@@ -298,10 +301,12 @@ def _solve(
     operators: Operators, js: Iterable[int], representation: str, vectors: bool = True,
     limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
-    """The Wang blocks of some J solved: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
+    """Solve the Wang blocks of several J: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
     all_j = list(js)
-    of_each = zip(all_j, matrices_of(operators, all_j), strict=True)
-    pieces = [piece for j, of_j in of_each for piece in _blocks_of_j(operators, j, of_j, representation, limits)]
+    j_and_matrix = zip(all_j, matrices_of(operators, all_j), strict=True)
+    pieces = [
+        piece for j, matrix in j_and_matrix for piece in _blocks_of_j(operators, j, matrix, representation, limits)
+    ]
     if below_mhz < math.inf and not vectors:
         return [(block, lowest_energies(bands, below_mhz - scalar) + scalar, _NONE) for block, scalar, bands in pieces]
     solved = diagonalise_all([bands for _, _, bands in pieces], vectors)
@@ -312,11 +317,11 @@ def _solve(
 
 
 def _blocks_of_j(
-    operators: Operators, j: int, of_j: JMatrix, representation: str, limits: tuple[int, int] | None
+    operators: Operators, j: int, matrix: JMatrix, representation: str, limits: tuple[int, int] | None
 ) -> list[tuple[WangBlock, float, list[Floats]]]:
-    """The Wang blocks of one J: (block, the scalar part of the energy, the diagonals of the rest)."""
+    """The Wang blocks of one J: (block, scalar part of the energy, diagonals of the rest)."""
     scalar, out = scalar_energy(operators, j), []
     whole = wang_blocks(j, representation)
     for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
-        out.append((block, scalar, block_bands(of_j, block)))
+        out.append((block, scalar, block_bands(matrix, block)))
     return out

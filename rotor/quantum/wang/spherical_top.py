@@ -1,16 +1,16 @@
-"""Spherical tops: how the fourth-rank tensor splits each J into levels A1, A2, E, F1, F2, by exact symmetry.
+"""Spherical tops: exact splittings of each J into levels A1, A2, E, F1, F2 by the fourth-rank tensor.
 
     Ω = 6 J⁴ - 2 J² - 10 (Jx⁴ + Jy⁴ + Jz⁴),      E = B X - D X² + ... + D_t ω(J, irrep, rank),      X = J(J+1)
 
-(K. T. Hecht, J. Mol. Spectrosc. 5 (1960) 355, 390). ω are eigenvalues of Ω and depend on nothing else, so they are exact
-for every D_t. With z along a fourfold axis, states |J K s⟩ (see `basis`) with K of one residue modulo 4 and one s span
-the irreps A1, A2, B1, B2 of D4, by the signs e^{iπK/2} under C4z and s(-1)^J under C2x, and from O to D4
+(K. T. Hecht, J. Mol. Spectrosc. 5 (1960) 355, 390). ω are the eigenvalues of Ω and thus exact for any D_t. With z along a
+fourfold axis, states |J K s⟩ (see `basis`) with K of one residue modulo 4 and one s span the irreps A1, A2, B1, B2 of D4, by the signs
+e^{iπK/2} under C4z and s(-1)^J under C2x. From O to D4
 
     A1 → A1,    A2 → B1,    E → A1 + B1,    F1 → A2 + E,    F2 → B2 + E
 
-(Bunker and Jensen, Molecular Symmetry and Spectroscopy, table B-2). F1 and F2 are thus blocks of their own. A1 and A2 are
-distinguished from E by a threefold turn, whose matrix in such a block has the eigenvalue χ(C3)/dimension: 1 for A, -½ for E. Levels
-of one cluster, closer than round-off at high J, are therefore labelled rightly too.
+(Bunker and Jensen, Molecular Symmetry and Spectroscopy, table B-2). F1 and F2 thus are separate blocks. A threefold turn, whose matrix in
+such a block has the eigenvalue χ(C3)/dimension, distinguishes A1 and A2 (1) from E (-½). Labels are therefore correct even for levels of
+one cluster, which at high J are closer than round-off.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DIMENSION = {"A1": 1, "A2": 1, "E": 2, "F1": 3, "F2": 3}
 
 
 def is_cubic(operators: Operators) -> bool:
-    """Whether operators are those of a spherical top: J² alone, and the tensor of D_t."""
+    """Whether operators are those of a spherical top: powers of J² and the tensor of D_t."""
     dt = operators.get((0, 0, 2), 0.0) / CUBIC_TENSOR[0, 0, 2]
     others = {powers for powers in operators if powers[1] or powers[2]}
     return all(
@@ -41,10 +41,7 @@ def is_cubic(operators: Operators) -> bool:
 
 
 def scalar_and_tensor(operators: Operators) -> tuple[Operators, float]:
-    """Operators of a spherical top taken apart: those of J² alone, and D_t.
-
-    Terms that are not cubic are not held here; see `is_cubic`.
-    """
+    """Operators of a spherical top divided into powers of J² and D_t; terms that are not cubic (`is_cubic`) are ignored."""
     dt = operators.get((0, 0, 2), 0.0) / CUBIC_TENSOR[0, 0, 2]
     scalars = {
         powers: value - dt * CUBIC_TENSOR.get(powers, 0.0) for powers, value in operators.items() if not any(powers[1:])
@@ -56,7 +53,7 @@ def scalar_and_tensor(operators: Operators) -> tuple[Operators, float]:
 def tensor_eigenvalues(j: int, sign: int = 1) -> tuple[NDArray[np.str_], Floats]:
     """Irreps (n,) and eigenvalues ω (n,) of the tensor for one J, in the order A1, A2, E, F1, F2.
 
-    Of one irrep sign · ω rises, so that energies rise for a D_t of that sign.
+    Within each irrep sign · ω rises, so that energies rise for D_t of that sign.
 
     >>> irreps, omega = tensor_eigenvalues(2)
     >>> irreps.tolist(), omega.round(9).tolist()
@@ -72,11 +69,12 @@ def tensor_eigenvalues(j: int, sign: int = 1) -> tuple[NDArray[np.str_], Floats]
 
 
 def _eigenvalues(matrix: Floats) -> Floats:
+    """Eigenvalues of a symmetric matrix."""
     return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64)
 
 
 def _wang(j: int, name: str) -> tuple[WangBlock, slice]:
-    """The Wang block that holds an irrep of D4, and which of its states, every second one, do."""
+    """The Wang block that contains an irrep of D4, and its states of this irrep, alternate ones."""
     residue, character = _SUBBLOCKS[name]
     sign = character * (-1) ** j
     first = 0 if sign == 1 else 2
@@ -85,7 +83,7 @@ def _wang(j: int, name: str) -> tuple[WangBlock, slice]:
 
 
 def _block(j: int, name: str) -> Floats:
-    """The tensor's matrix, its scalar part left out, over the states of one irrep of D4."""
+    """The matrix of the tensor without its scalar part over the states of one irrep of D4."""
     block, chosen = _wang(j, name)
     if block.size == 0:
         return np.zeros((0, 0))
@@ -100,15 +98,15 @@ def _one_and_two_dimensional(j: int, name: str) -> tuple[Floats, Floats]:
     """Eigenvalues of A1 (or A2) and of E, which share an irrep of D4."""
     matrix, turn = _block(j, name), _threefold_turn(j, name)
     characters, states = np.linalg.eigh(turn)
-    of_a, of_e = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½
-    return _eigenvalues(of_a.T @ matrix @ of_a), _eigenvalues(of_e.T @ matrix @ of_e)
+    a_states, e_states = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½
+    return _eigenvalues(a_states.T @ matrix @ a_states), _eigenvalues(e_states.T @ matrix @ e_states)
 
 
 def _threefold_turn(j: int, name: str) -> Floats:
     """The matrix of C3 about (1, 1, 1) = C4z C4y over the states of A1 or B1 of D4.
 
-    C4y turns z into x, so that its matrix is Σ_m ⟨K|m⟩_x e^{-iπm/2} ⟨m|K'⟩_x up to phases that are 1 here, |m⟩_x being
-    the eigenvectors of Jx; of the exponential the cosine is left where K and K' are even. C4z then is 1 in A1, -1 in B1.
+    C4y turns z into x, so that its matrix is Σ_m ⟨K|m⟩_x e^{-iπm/2} ⟨m|K'⟩_x, up to phases that are 1 here, with |m⟩_x the eigenvectors of
+    Jx. For even K and K' only the cosine of the exponential remains. C4z is 1 in A1 and -1 in B1.
     """
     block, chosen = _wang(j, name)
     k = block.k[chosen]

@@ -1,11 +1,11 @@
-"""Some eigenvectors of many tridiagonal matrices side by side, from their eigenvalues.
+"""Selected eigenvectors of many tridiagonal matrices at once, from their eigenvalues.
 
-T - λ = L D⁺ Lᵀ from above and U D⁻ Uᵀ from below meet in row k, where γ_k = D⁺_k + D⁻_k - (T_kk - λ) is least; there z_k = 1, and
+T - λ = L D⁺ Lᵀ from above and U D⁻ Uᵀ from below meet in row k, where γ_k = D⁺_k + D⁻_k - (T_kk - λ) is smallest. There z_k = 1, and
 
     z_(i+1) = -T_(i,i+1) z_i / D⁻_(i+1) below,    z_(i-1) = -T_(i-1,i) z_i / D⁺_(i-1) above.
 
-Source: I. S. Dhillon and B. N. Parlett, Linear Algebra Appl. 387 (2004) 1 (twisted factorization). A fit needs the vectors of labelled
-states alone; where these are few it takes less time than a diagonalisation with all vectors.
+Source: I. S. Dhillon and B. N. Parlett, Linear Algebra Appl. 387 (2004) 1 (twisted factorization). A fit needs only the vectors of labelled
+states; if these are few this is faster than a diagonalisation with all vectors.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
 
-_NEAR = 1e-6  # of the largest eigenvalue: nearer ones would have vectors with less than nine digits
-_ASIDE = 1e-15  # of it, by which λ is moved: a pivot that is 0 exactly could not be divided by
-_NOTHING = 1e-280  # in place of the largest eigenvalue of a matrix that is 0
-_RESIDUAL = 1e-12  # of it, times the size: |γ| above it is more than round-off
+_NEAR = 1e-6  # closer eigenvalues, relative to the largest, would give vectors with less than nine digits
+_ASIDE = 1e-15  # shift of λ, relative to the largest eigenvalue, that avoids division by a pivot of exactly 0
+_NOTHING = 1e-280  # replaces the largest eigenvalue of a zero matrix
+_RESIDUAL = 1e-12  # |γ| above this, relative to the largest eigenvalue times the size, is more than round-off
 
 
 def vectors_of_values(
     diagonal: Floats, beside: Floats, values: Floats, matrix: Ints, state: Ints, space: Workspace
 ) -> Floats | None:
-    """Eigenvectors (size, n) of length 1 of some states: which matrix, and which of its eigenvalues.
+    """Normalised eigenvectors (size, n) of selected states of many matrices.
 
     Parameters
     ----------
@@ -32,25 +32,26 @@ def vectors_of_values(
     values : (matrices, size) array
         All eigenvalues, rising, infinite beyond the size of a matrix.
     matrix, state : (n,) array
+        For each vector, the number of the matrix and of the eigenvalue.
     space : Workspace
-        In which the vectors are.
+        Memory of the vectors.
 
     Returns
     -------
     array or None
-        None where two eigenvalues are so near each other that their vectors had better be found together, or a division fails.
+        None if two eigenvalues are too close for separate vectors, or a division fails.
 
     Examples
     --------
     >>> matrix = np.zeros((1, 2)), np.array([[1.0, 0.0]])
-    >>> found = vectors_of_values(*matrix, np.array([[-1.0, 1.0]]), np.array([0]), np.array([1]), Workspace())
-    >>> np.round(found[:, 0] ** 2, 12).tolist()
+    >>> vectors = vectors_of_values(*matrix, np.array([[-1.0, 1.0]]), np.array([0]), np.array([1]), Workspace())
+    >>> np.round(vectors[:, 0] ** 2, 12).tolist()
     [0.5, 0.5]
     """
     size, inside = diagonal.shape[1], np.isfinite(values)
-    known = np.where(inside, values, 0.0)
-    largest = np.abs(known).max(axis=1) + _NOTHING
-    near = np.diff(known, axis=1) <= _NEAR * largest[:, None]
+    finite_values = np.where(inside, values, 0.0)
+    largest = np.abs(finite_values).max(axis=1) + _NOTHING
+    near = np.diff(finite_values, axis=1) <= _NEAR * largest[:, None]
     if (near & inside[:, 1:]).any():
         return None
     full = np.where(inside, diagonal, 4.0 * largest[:, None]).T.copy()
@@ -74,7 +75,7 @@ def vectors_of_values(
 
 
 def _pivots(shifted: Floats, squared: Floats, above: Floats, below: Floats) -> None:
-    """D⁺ and D⁻ (size, n) are put into `above` and `below`."""
+    """Compute D⁺ and D⁻ (size, n) into `above` and `below`."""
     above[0], below[-1] = shifted[0], shifted[-1]
     for i in range(1, len(shifted)):
         np.divide(squared[i - 1], above[i - 1], out=above[i])
@@ -84,7 +85,7 @@ def _pivots(shifted: Floats, squared: Floats, above: Floats, below: Floats) -> N
 
 
 def _products(row: Ints, down: Floats, up: Floats, lower: Floats, upper: Floats) -> Floats:
-    """z (size, n), in place of `lower`: 1 in a row of its own, and from there the products of the negative ratios down and up."""
+    """z (size, n) in the memory of `lower`: 1 in the row where the factorisations meet, products of ratios below and above it."""
     columns = np.arange(len(row))
     lower.fill(0.0)
     upper.fill(0.0)

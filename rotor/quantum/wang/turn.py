@@ -1,4 +1,4 @@
-"""Blocks whose diagonal ceases to rise with K, where the constants say nothing of the molecule any more."""
+"""Blocks whose diagonal elements cease to rise with K, beyond the range in which the constants describe the molecule."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from rotor.arrays import Floats, Ints
 
 
 def turned(diagonal: Floats, sizes: Sequence[int]) -> tuple[Ints, Ints]:
-    """The blocks whose diagonal ceases to rise, and where it does, by block."""
+    """Numbers of the blocks whose diagonal has its maximum (the turn) before the end, and the place of the maximum in each block."""
     size = np.asarray(sizes)
     turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
     return np.flatnonzero((turn > 0) & (turn < size - 1)), turn
 
 
 def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
+    """Move states beyond the turn of the diagonal to the end of their block, ordered by mean K, in place.
 
-    Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
-    state is mostly beyond the turn, and the labels of the others are the ranks among themselves, whatever it does.
+    Constants that describe K up to 20 may shift states of K = 60 down among lower K, where the distortion series diverges. These states are
+    mostly beyond the turn; the other states are labelled by rank among themselves.
 
     Parameters
     ----------
     turning : (array, array)
-        What `turned` finds of the diagonals, with the sign with which they rise in a molecule.
+        Result of `turned` for the diagonals, with the sign that makes them rise in a molecule.
     sizes : sequence of int
+        Number of states of each block.
     energies : (blocks, size) array
-        Rising.
+        Energies, rising.
     vectors : (blocks, size, size) array
-        In columns.
+        Eigenvectors in columns.
     """
     blocks, turn = turning
     for b in blocks.tolist():

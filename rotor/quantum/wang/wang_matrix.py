@@ -20,29 +20,29 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import Operators
 
-FEW = 20  # of so many eigenvalues a bisection to one takes no longer than the finding of all
-AT_ONCE = 32  # rows up to which matrices of one size are solved together
-J_AT_ONCE = 32  # whose matrix elements are computed together
+FEW = 20  # bisection pays for at most one in so many eigenvalues
+AT_ONCE = 32  # matrices of one size with at most so many rows are solved together
+J_AT_ONCE = 32  # number of J whose matrix elements are computed together
 _NONE: Floats = np.zeros((0, 0))
 _ROOT_2 = float(np.sqrt(2))
-SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
+SMALL = 100  # tridiagonal blocks with at most so many rows do not justify loading scipy.linalg (0.2 s)
 
 
 def scalar_energy(operators: Operators, j: int) -> float:
-    """The part that is one number for the whole of J, Σ c X^p, left out of the matrices for the sake of digits."""
+    """The part Σ c X^p that is equal for all states of a J; matrices do not contain it, which reduces round-off."""
     x = j * (j + 1)
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 
 
 class JMatrix:
-    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out.
+    """Matrix elements over |J K⟩ of one J without the scalar part, for its four Wang blocks.
 
-    elements: those that `matrices_of` computed for many J.
+    elements: elements that `matrices_of` computed for many J; by default they are computed here.
     """
 
     def __init__(self, operators: Operators, j: int, elements: list[Floats] | None = None) -> None:
         self.order = _order(operators)
-        self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
+        self._margin = 2 * self.order  # K starts at -margin, to include folded elements
         self._elements = _elements(operators, [j])[0] if elements is None else elements
 
     def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
@@ -54,13 +54,13 @@ class JMatrix:
         return float(self._elements[n][self._margin - low])
 
     def band(self, block: WangBlock, n: int) -> NDArray[np.float64]:
-        """⟨K+2n|H|K⟩ over the K of a block, size - n of them."""
+        """⟨K+2n|H|K⟩ over the K of a block, (size - n,)."""
         first = self._margin + block.first_k
         return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
 
 
 def matrices_of(operators: Operators, js: Sequence[int]) -> Iterator[JMatrix]:
-    """The matrix elements of each J, computed for some J together."""
+    """Matrix elements of each J, computed for several J together."""
     for first in range(0, len(js), J_AT_ONCE):
         chunk = js[first : first + J_AT_ONCE]
         for j, elements in zip(chunk, _elements(operators, chunk), strict=True):
@@ -68,6 +68,7 @@ def matrices_of(operators: Operators, js: Sequence[int]) -> Iterator[JMatrix]:
 
 
 def _order(operators: Operators) -> int:
+    """The highest power n of the ladder operators."""
     return max((n for _, _, n in operators), default=0)
 
 
@@ -75,14 +76,14 @@ def _elements(operators: Operators, js: Sequence[int]) -> list[list[Floats]]:
     """⟨K+2n|H|K⟩ of each J by n, for K from -2 `order` to J."""
     order, highest = _order(operators), max(js)
     k, j = np.arange(-2 * order, highest + 2 * order + 1), np.array(js)[:, None]
-    steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # what J₊ makes of |J K⟩; zero beyond K = J
-    with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
-        of_n = [_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
-    return [[elements_of_n[row, : 2 * order + number + 1] for elements_of_n in of_n] for row, number in enumerate(js)]
+    steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # elements of J₊ over |J K⟩; zero beyond K = J
+    with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
+        by_n = [_elements_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
+    return [[elements_of_n[row, : 2 * order + number + 1] for elements_of_n in by_n] for row, number in enumerate(js)]
 
 
-def _of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
-    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p, (J, K)."""
+def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
+    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p: (J, K)."""
     powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
     coefficients = np.zeros((len(js), 1 + max((q for _, q, _ in powers), default=0)))
     for row, j in enumerate(js):
@@ -103,33 +104,33 @@ def _of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: F
     return np.asarray(total)
 
 
-def block_bands(of_j: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
-    """Diagonals of the block's matrix, without the scalar part: the n-th has the elements (i+n, i), size - n of them.
+def block_bands(matrix: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
+    """Diagonals of the block's matrix without the scalar part; the n-th has the elements (i+n, i), (size - n,).
 
-    ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 where one of them is K = 0. The second term is there where
-    K + K' = 2n and folds an operator of high n back to lower diagonals.
+    ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 if one of K, K' is 0. The second term exists for K + K' = 2n; it folds an operator of
+    high n back to lower diagonals.
     """
-    bands = [of_j.band(block, n) for n in range(min(of_j.order, block.size - 1) + 1)]
+    bands = [matrix.band(block, n) for n in range(min(matrix.order, block.size - 1) + 1)]
     if block.first_k == 0:
         for band in bands[1:]:
             band[0] *= _ROOT_2
 
     last = block.first_k + 2 * (block.size - 1)
-    for n in range(1, of_j.order + 1):
+    for n in range(1, matrix.order + 1):
         for low in range(max(block.first_k, 2 - block.first_k % 2), n + 1, 2):
             high = 2 * n - low
             if high <= last:
-                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * of_j.folded(low, n)
+                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * matrix.folded(low, n)
     return bands
 
 
 def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
-    """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
+    """Eigenvalues (rising) and eigenvectors (columns) of a symmetric matrix from its diagonals.
 
-    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd, numpy's eigh). So do
-    tridiagonal ones of up to `SMALL` rows where scipy.linalg is not loaded, which takes longer than all of them together: the
-    dense form leaves a tridiagonal matrix as it is and goes on like the other, to the same bits.
-    Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
+    LAPACK's divide and conquer solves tridiagonal matrices (dstevd), its dense form wider ones (dsyevd, numpy's eigh). The dense form also
+    solves tridiagonal matrices of up to `SMALL` rows if scipy.linalg is not loaded yet, as loading takes longer; both give identical bits.
+
+    Raises ValueError if LAPACK does not converge or the matrix is not finite.
     """
     size = len(bands[0])
     if size == 1:
@@ -150,7 +151,7 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
 
 
 def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> list[tuple[Floats, Floats]]:
-    """`diagonalise` of many matrices; with vectors, small ones of one size and band width are solved in one call."""
+    """`diagonalise` for many matrices; with vectors, small ones of equal size and band width are solved in one call."""
     alike: dict[tuple[int, int], list[int]] = {}
     out: list[tuple[Floats, Floats]] = []
     for number, bands in enumerate(matrices):
@@ -176,18 +177,17 @@ def _are_finite(bands: list[Floats]) -> bool:
 
 
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
-    """Eigenvalues up to `below`, rising; also higher ones where finding all takes no longer. Raises as `diagonalise` does.
+    """Eigenvalues up to `below`, rising, and higher ones where computing all takes no longer. Raises as `diagonalise` does.
 
-    A few of a large tridiagonal matrix are bisected for (LAPACK's dstebz).
+    A few eigenvalues of a large tridiagonal matrix are computed by bisection (LAPACK's dstebz).
     """
     size = len(bands[0])
     if size <= SMALL or len(bands) != 2 or not _are_finite(bands):
         return diagonalise(bands, vectors=False)[0]
     from scipy.linalg.lapack import dstebz
 
-    lowest = -2.0 * (
-        np.abs(bands[0]).max() + np.abs(bands[1]).max()
-    )  # below the discs of Gershgorin, 2|e| wide on each side
+    # below all Gershgorin discs, which extend 2|e| to each side
+    lowest = -2.0 * (np.abs(bands[0]).max() + np.abs(bands[1]).max())
     if below <= lowest:
         return np.zeros(0)
     rough, *_ = dstebz(bands[0], bands[1], 1, lowest, below, 1, size, below - lowest, b"E")  # their number, at once
@@ -200,11 +200,13 @@ def lowest_energies(bands: list[Floats], below: float) -> Floats:
 
 
 def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
+    """Sorted energies and vectors of a diagonal matrix."""
     order = np.argsort(band, kind="stable")
     return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
 
 
 def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    """Energies and vectors by the dense solver."""
     size = len(bands[0])
     matrix = np.zeros((size, size))
     for n, band in enumerate(bands):

@@ -26,7 +26,7 @@ from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
-from rotor.quantum.estimates.labelled_spins import found_with_spins
+from rotor.quantum.estimates.labelled_spins import assigned_with_spins
 from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
@@ -223,7 +223,7 @@ def _of_spins(
         return _rows_of(group, levels, form, labels[here[chosen]])
 
     functions = partial(_functions_of, group) if group.effect.pairs else None
-    found = found_with_spins(group.top, (group.effect,), own, start, twice, rows_of, functions)
+    found = assigned_with_spins(group.top, (group.effect,), own, start, twice, rows_of, functions)
     return [_Solved(here[one.rows], columns, one.blocks) for one in found]
 
 
