@@ -223,10 +223,8 @@ def blocks_of_elements(
     rank[order] = np.arange(len(order)) - np.repeat(starts, counts)
     size[order] = np.repeat(counts, counts)
     block = np.where(present, part, -1)
-    stacks, in_stack = (
-        [],
-        np.zeros((2, int(part.max(initial=0)) + 1), dtype=np.int64),
-    )  # number of blocks before, and in the stack
+    stacks = list[Ints]()
+    in_stack = np.zeros((2, int(part.max(initial=0)) + 1), dtype=np.int64)  # blocks before, of all and of the stack
     for width in np.unique(counts).tolist():
         members = np.flatnonzero(counts == width)
         places = np.arange(len(members))

@@ -64,52 +64,8 @@ class AtStart(NamedTuple):
     shares: Floats
 
 
-class NamedBlock(NamedTuple):
-    """A block of which states have names, and how."""
-
-    block: LinearBlock
-    named: NamedFunctions
-
-
-class NamedStack(NamedTuple):
-    """Blocks side by side, with members (blocks, sub-blocks, functions): 1 where a function is in a sub-block."""
-
-    stack: LinearStack
-    members: Floats
-    namers: tuple[Namer, ...]
-
-    @classmethod
-    def of(cls, blocks: Sequence[NamedBlock]) -> NamedStack:
-        """From blocks in the order of size."""
-        stack = LinearStack.of([each.block for each in blocks])
-        sub_blocks = [each.named.sub_blocks for each in blocks]
-        members = np.zeros((len(blocks), 1 + max(int(numbers.max(initial=0)) for numbers in sub_blocks), stack.size))
-        for place, numbers in enumerate(sub_blocks):
-            members[place, numbers, np.arange(len(numbers))] = 1.0
-        return cls(stack, members, tuple(each.named.namer for each in blocks))
-
-    def names(self, solved: SolvedStack, place: int) -> Ints:
-        """The names of the states of one block."""
-        n = int(self.stack.sizes[place])
-        matrix = solved.matrices[self.stack.offsets[place] : self.stack.offsets[place + 1]].reshape(n, n)
-        return self.namers[place](matrix, solved.energies[place, :n], solved.vectors[place, :n, :n])
-
-    def leading(self, solved: SolvedStack) -> tuple[Ints, Floats]:
-        """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
-        apart the lower number first, whichever way round they come."""
-        if self.members.shape[1] == 1 or self.stack.size == 1:
-            return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
-        shares = self.members @ solved.vectors**2
-        largest_state, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
-        whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
-        turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (largest_state[:, :-1] > largest_state[:, 1:])
-        turned[:, 1:] &= ~turned[:, :-1]
-        block, place = np.nonzero(turned)
-        largest_state[block, place], largest_state[block, place + 1] = (
-            largest_state[block, place + 1],
-            largest_state[block, place],
-        )
-        return largest_state, largest
+NamedBlock = tuple[LinearBlock, NamedFunctions]
+"""A block of which states have names, and how."""
 
 
 class Tracked(NamedTuple):
@@ -143,22 +99,48 @@ def tracked_blocks(
         Blocks in which labels lie.
     """
     tracked, space = list[Tracked](), Workspace()
-    for numbers in stack_numbers([block.block for block in blocks]):
-        of_names = NamedStack.of([blocks[i] for i in numbers.tolist()])
-        stack = of_names.stack
+    for numbers in stack_numbers([block for block, _ in blocks]):
+        stack = LinearStack.of([blocks[i][0] for i in numbers.tolist()])
+        members = _members([blocks[i][1].sub_blocks for i in numbers.tolist()], stack.size)
         solved = stack.solved(values_mhz, space)
-        named = [of_names.names(solved, place) for place in range(len(numbers))]
-        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
+        made = [blocks[i][1].namer(*stack.states(solved, place)) for place, i in enumerate(numbers.tolist())]
+        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), made, strict=True)]
         slopes = stack.slopes(solved.vectors, _padded([states for _, states in tracked_rows], 0), space)
-        leading, shares = of_names.leading(solved)
+        leading, shares = _leading(members, solved)
         for place, (rows, states) in enumerate(tracked_rows):
             if len(rows):
-                block, of_block = blocks[numbers[place]]
+                block, named = blocks[numbers[place]]
                 block_rows = slopes[place, : len(rows), : len(block.parameters)]
                 of_states = leading[place, : block.size], shares[place, : block.size]
                 start = AtStart(values_mhz[block.parameters], solved.energies[place, states], block_rows, *of_states)
-                tracked.append(Tracked(block, of_block, rows, named[place][states], states, start))
+                tracked.append(Tracked(block, named, rows, made[place][states], states, start))
     return LabelledBlocks(count, tuple(tracked))
+
+
+def _members(sub_blocks: Sequence[Ints], size: int) -> Floats:
+    """1 where a function of a block is in a sub-block, (blocks, sub-blocks, functions)."""
+    members = np.zeros((len(sub_blocks), 1 + max(int(numbers.max(initial=0)) for numbers in sub_blocks), size))
+    for place, numbers in enumerate(sub_blocks):
+        members[place, numbers, np.arange(len(numbers))] = 1.0
+    return members
+
+
+def _leading(members: Floats, solved: SolvedStack) -> tuple[Ints, Floats]:
+    """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
+    apart the lower number first, whichever way round they come."""
+    if members.shape[1] == 1 or members.shape[2] == 1:
+        return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
+    shares = members @ solved.vectors**2
+    largest_state, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
+    whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
+    turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (largest_state[:, :-1] > largest_state[:, 1:])
+    turned[:, 1:] &= ~turned[:, :-1]
+    block, place = np.nonzero(turned)
+    largest_state[block, place], largest_state[block, place + 1] = (
+        largest_state[block, place + 1],
+        largest_state[block, place],
+    )
+    return largest_state, largest
 
 
 def _padded(rows: Sequence[Ints], fill: int) -> Ints:
@@ -176,9 +158,11 @@ def _filled(values: Floats, count: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Labelled:
-    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels)."""
+    """Blocks side by side with the labels in them: members (blocks, sub-blocks, functions), 1 where a function is in a sub-block; rows
+    (blocks, labels), the place behind all where padded; states (blocks, labels)."""
 
-    named: NamedStack
+    stack: LinearStack
+    members: Floats
     tracked: tuple[Tracked, ...]
     rows: Ints
     states: Ints
@@ -186,20 +170,10 @@ class _Labelled:
 
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
+        stack = LinearStack.of([each.block for each in tracked])
+        members = _members([each.named.sub_blocks for each in tracked], stack.size)
         rows, states = _padded([each.rows for each in tracked], -1), _padded([each.states for each in tracked], 0)
-        leading = _padded([each.start.leading for each in tracked], 0)
-        return cls(
-            NamedStack.of([NamedBlock(each.block, each.named) for each in tracked]),
-            tuple(tracked),
-            rows,
-            states,
-            leading,
-        )
-
-    @property
-    def stack(self) -> LinearStack:
-        """The blocks."""
-        return self.named.stack
+        return cls(stack, members, tuple(tracked), rows, states, _padded([each.start.leading for each in tracked], 0))
 
     @cached_property
     def _at_start(self) -> Ints:
@@ -214,7 +188,7 @@ class _Labelled:
     def _states(self, solved: SolvedStack) -> Ints:
         """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
         share one now or did so at the start: names are those of these constants, whatever the way to them was."""
-        leading, shares = self.named.leading(solved)
+        leading, shares = _leading(self.members, solved)
         moved = self._unclear_at_start | self._unclear(leading, shares)
         if (self._below & (leading != self.leading)).any():
             moved |= ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
@@ -223,7 +197,7 @@ class _Labelled:
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
             block = self.tracked[b]
-            made = self.named.names(solved, b)
+            made = block.named.namer(*self.stack.states(solved, b))
             states[b, : len(block.rows)] = _states_of(made, block.names)
         return states
 
@@ -252,7 +226,7 @@ class _Labelled:
     def _shared(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) in which sub-blocks lead other numbers of states than they have functions, so that some states up to the
         highest with a label may be given to another one than leads."""
-        sizes = self.named.members.sum(axis=2)
+        sizes = self.members.sum(axis=2)
         shared = (_counts(leading, self._inside, sizes.shape[1]) != sizes).any(axis=1)
         if shared.any():
             first = self._inside & (shares > _FIRST)
@@ -275,7 +249,7 @@ class _Labelled:
 
         What becomes of states above, such as doublets that nothing splits, has no bearing.
         """
-        if self.named.members.shape[1] == 1:
+        if self.members.shape[1] == 1:
             return np.zeros_like(self.states)
         leading_function = np.take_along_axis(leading, self.states, axis=1)
         below = np.arange(self.stack.size) < self.states[:, :, None]

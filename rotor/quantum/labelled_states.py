@@ -75,7 +75,7 @@ def labelled_states(
         for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
             members_here = [vertices[j][i] for i in members]
             if {(v, block.species) for v, block in members_here} & classes:
-                blocks.append(NamedBlock(here.block(members), named(members_here, representation)))
+                blocks.append((here.block(members), named(members_here, representation)))
                 inside.append(rows)
 
     def find(number: int, made: Ints) -> tuple[Ints, Ints]:

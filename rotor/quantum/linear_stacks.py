@@ -135,6 +135,12 @@ class LinearStack(NamedTuple):
         energies += zero[:, None]
         return SolvedStack(whole, energies, vectors)
 
+    def states(self, solved: SolvedStack, place: int) -> tuple[Floats, Floats, Floats]:
+        """Matrix, energies and vectors of one block."""
+        n = int(self.sizes[place])
+        matrix = solved.matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
+        return matrix, solved.energies[place, :n], solved.vectors[place, :n, :n]
+
     def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
         (count, most), size, elements = states.shape, self.size, self.rows.shape[1]

@@ -150,12 +150,12 @@ class _Makers:
         if self._functions:
             return _turned(linear, *self._functions(block))
         if isinstance(block, SpinBlock):
-            return NamedBlock(linear, _names_with_spins(block))
+            return linear, _names_with_spins(block)
         if self._naming:
-            return NamedBlock(linear, self._naming(vertices_of(block), self._representation))
+            return linear, self._naming(vertices_of(block), self._representation)
         if isinstance(block, SolvedBlock):
-            return NamedBlock(linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY))
-        return NamedBlock(linear, by_overlaps(vertices_of(block), self._representation))
+            return linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY)
+        return linear, by_overlaps(vertices_of(block), self._representation)
 
 
 def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
@@ -166,7 +166,7 @@ def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
 
     members = np.column_stack([names[:, 0], names[:, 1] % 2, names[:, 3:]])
     sub_blocks = np.unique(members, axis=0, return_inverse=True)[1].reshape(-1)
-    return NamedBlock(block.turned(functions), NamedFunctions(sub_blocks, namer, Follows.MOSTLY))
+    return block.turned(functions), NamedFunctions(sub_blocks, namer, Follows.MOSTLY)
 
 
 def _names_with_spins(block: SpinBlock) -> NamedFunctions:
