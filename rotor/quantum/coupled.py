@@ -9,39 +9,15 @@ one, so that the sum of all these overlaps is largest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.levels import Block
 from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.wang.basis import Part, WangBlock, names_of
 
 NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
-
-
-@dataclass(frozen=True)
-class CoupledBlock(Block):
-    """Wang blocks of one J solved together: energies (n,) in MHz, rising, eigenvectors (n, n) in columns over the parts.
-
-    labels: (n, 3) v, Ka, Kc of every state. mixing: (n,) its overlap, squared, with the function that names it. Functions
-    carry the factor of `j_operators.phase`. start: row of the first state.
-    """
-
-    j: int
-    parts: tuple[Part, ...]
-    energies_mhz: Floats
-    vectors: Floats
-    labels: Ints
-    mixing: Floats
-    start: int = 0
-
-    @property
-    def twice_total(self) -> int:
-        """2J."""
-        return 2 * self.j
 
 
 def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:

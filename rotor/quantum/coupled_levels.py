@@ -13,9 +13,9 @@ import numpy as np
 
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
-from rotor.quantum.coupled import CoupledBlock, names_of_states, parts_of
+from rotor.quantum.coupled import names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
-from rotor.quantum.levels import Levels, weights_by_state
+from rotor.quantum.levels import Levels, SolvedBlock, weights_by_state
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
@@ -159,19 +159,19 @@ def _refuse_mixed_weights(levels: Levels) -> None:
             )
 
 
-def _placed(solved: Iterator[CoupledBlock]) -> Iterator[CoupledBlock]:
+def _placed(solved: Iterator[SolvedBlock]) -> Iterator[SolvedBlock]:
     start = 0
     for block in solved:
         yield replace(block, start=start)
         start += len(block.energies_mhz)
 
 
-def solve_coupled(model: Model, every_j: Sequence[int]) -> list[CoupledBlock]:
+def solve_coupled(model: Model, every_j: Sequence[int]) -> list[SolvedBlock]:
     """The coupled blocks of some J, in the order of J."""
     vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in every_j}
     terms = StateTerms.of_values(model.states, _links(model), model.representation)
     elements = StateElements(terms, 1, model.representation, vertices)
-    by_j: dict[int, list[CoupledBlock]] = {}
+    by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(every_j, reverse=True):
         here = elements.of_j(j)
         zero = float(
@@ -188,7 +188,7 @@ def solve_coupled(model: Model, every_j: Sequence[int]) -> list[CoupledBlock]:
             energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
             parts = parts_of([vertices[j][i] for i in members])
             labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
-            by_j[j].append(CoupledBlock(j, parts, energies + zero, vectors, labels, mixing))
+            by_j[j].append(SolvedBlock(parts, energies + zero, vectors, labels=labels, mixing=mixing))
     return [block for j in every_j for block in by_j[j]]
 
 

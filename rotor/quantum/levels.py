@@ -67,6 +67,11 @@ class Block(ABC):
         return bool(self.axial_k)
 
     @property
+    def alone(self) -> bool:
+        """Whether it is a Wang block that nothing couples with others."""
+        return False
+
+    @property
     def used(self) -> Used | None:
         """How spins are treated, None where nothing was asked, which means exactly."""
         return None
@@ -99,27 +104,47 @@ class MomentBlock(Block):
         """∂E/∂c (n, names) of the states by constants of the Hamiltonian."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SolvedBlock(Block):
-    """One Wang block solved: energies (n,) in MHz, rising, and eigenvectors (n, n) in columns over `basis.k`.
+    """Wang blocks of one J, or functions |N K⟩, solved together: energies (n,) in MHz, rising, and eigenvectors (n, n) in columns.
 
-    `start` is the place of its first state in the arrays of `Levels`.
+    parts: the state v and the functions of each range of rows; `parts` of spins have the names of these too. start: place of the first
+    state in the arrays of `Levels`. labels: (n, 3) v, Ka, Kc of the states of a coupled block. mixing: (n,) squared overlaps with the
+    functions that name them. Functions of a coupled block carry the factor of `j_operators.phase`, those of a block without labels do not.
     """
 
-    basis: WangBlock
+    parts: tuple[Any, ...]
     energies_mhz: Floats
     vectors: Floats
-    start: int
+    start: int = 0
+    labels: Ints | None = None
+    mixing: Floats | None = None
+
+    @property
+    def basis(self) -> WangBlock:
+        """The Wang block, of a block of a single one."""
+        basis: WangBlock = self.parts[0].basis
+        return basis
+
+    @property
+    def j(self) -> int:
+        """J, or N beside spins."""
+        return int(self.parts[0].basis.j)
 
     @property
     def twice_total(self) -> int:
         """2J."""
-        return 2 * self.basis.j
+        return 2 * self.j
 
     @property
-    def parts(self) -> tuple[Part, ...]:
-        """The Wang block as the one part."""
-        return (Part(0, self.basis, 0),)
+    def alone(self) -> bool:
+        """Whether it is a Wang block that nothing couples with others."""
+        return self.labels is None
+
+
+def single_block(basis: WangBlock, energies_mhz: Floats, vectors: Floats, start: int) -> SolvedBlock:
+    """A Wang block solved by itself."""
+    return SolvedBlock((Part(0, basis, 0),), energies_mhz, vectors, start)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,19 +12,16 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.levels import MomentBlock, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
-AnyBlock = Any  # SolvedBlock, CoupledBlock or SpinBlock
+AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
 
 
 def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks of one kind, (n_up, n_low)."""
     if isinstance(up, SolvedBlock):
-        return wang_amplitudes(up, low, tensors[0, 0])
-    if isinstance(up, CoupledBlock):
-        return _of_coupled(up, low, tensors)
+        return wang_amplitudes(up, low, tensors[0, 0]) if up.alone else _of_coupled(up, low, tensors)
     if isinstance(up, MomentBlock):
         return up.amplitudes(low, tensors)
     from rotor.quantum.spins import lines
@@ -32,7 +29,7 @@ def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
     return lines.amplitudes(up, low, tensors)
 
 
-def _of_coupled(up: CoupledBlock, low: CoupledBlock, tensors: Tensors) -> Floats:
+def _of_coupled(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:
     moved = np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
     for target in up.parts:
         for source in low.parts:
@@ -50,7 +47,7 @@ def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tu
     blocks = list(blocks)
     if not blocks:
         return
-    if isinstance(blocks[0], SolvedBlock):
+    if blocks[0].alone:
         yield from connected_wang_blocks(blocks, tensors[0, 0])
         return
     yield from pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors))
@@ -74,7 +71,7 @@ def pairs_where(
 def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
     if isinstance(up, MomentBlock):
         return up.connects(low, tensors)
-    if not isinstance(up, CoupledBlock):
+    if not isinstance(up, SolvedBlock):
         from rotor.quantum.spins import lines
 
         return lines.connected(up, low, tensors)

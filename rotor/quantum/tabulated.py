@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock
@@ -78,6 +77,6 @@ def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
     blocks = tuple(
         replace(block, energies_mhz=energy[block.start : block.start + len(block.energies_mhz)])
         for block in levels.blocks
-        if isinstance(block, SolvedBlock | CoupledBlock)
+        if isinstance(block, SolvedBlock)
     )
     return replace(levels, energy_mhz=energy, blocks=blocks)

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
-from rotor.quantum.levels import Block, Levels, SolvedBlock
+from rotor.quantum.levels import Block, Levels, single_block
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import body_tensor
@@ -187,7 +187,7 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, rep
     """
     anisotropic = body_tensor(tensor, 2, representation)
     blocks = [
-        SolvedBlock(basis, np.zeros(basis.size), np.eye(basis.size), 0)
+        single_block(basis, np.zeros(basis.size), np.eye(basis.size), 0)
         for j in range(levels.jmax + 1)
         for basis in wang_blocks(j, representation)
     ]

@@ -84,7 +84,7 @@ def all_transitions(
         )
 
     blocks, some_missing = _existing_blocks(levels)
-    solved = [block for block in blocks if isinstance(block, SolvedBlock)]
+    solved = [block for block in blocks if isinstance(block, SolvedBlock) and block.alone]
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
@@ -116,7 +116,7 @@ def _connections(
     representation = str(levels.representation)
     tensors = {states: body_tensor(mu, 1, representation) for states, mu in dipoles.items()}
     pairs = list(connected_pairs(blocks, tensors))
-    if blocks and isinstance(blocks[0], SolvedBlock):
+    if blocks and blocks[0].alone:
         return pairs, lambda up, lows: wang_columns(up, lows, tensors[0, 0])
     return pairs, _side_by_side(lambda up, low: amplitudes(up, low, tensors))
 
@@ -213,7 +213,7 @@ def _many_f_transitions(
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
     """All transitions of levels with spins that were solved for many F together; None for other levels."""
-    if not blocks or isinstance(blocks[0], SolvedBlock):
+    if not blocks or blocks[0].alone:
         return None
     from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
 

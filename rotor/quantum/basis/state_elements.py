@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled import NOTHING, CoupledBlock, parts_of
+from rotor.quantum.coupled import NOTHING, parts_of
 from rotor.quantum.effect import QuantumEffect, couplings_of
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
@@ -268,21 +268,13 @@ class ElementsOfJ(NamedTuple):
         return LinearBlock(size, *np.divmod(places, size), factors, mix[:, parameters], parameters)
 
 
-class BlockOfParts(Protocol):
-    """A solved block: of one Wang block, of coupled states, or of N as spins see it."""
-
-    @property
-    def parts(self) -> tuple[Any, ...]:
-        """Its states v, each with the basis of its functions."""
-
-
-def vertices_of(block: BlockOfParts) -> list[Vertex]:
+def vertices_of(block: SolvedBlock) -> list[Vertex]:
     """The states and Wang blocks of a solved block."""
     return [(part.v, part.basis) for part in block.parts]
 
 
 def linear_blocks_of(
-    top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[SolvedBlock | CoupledBlock]
+    top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[SolvedBlock]
 ) -> list[LinearBlock]:
     """The linear blocks of solved blocks of levels, over the functions that their vectors have."""
     terms = StateTerms.of(top, levels.effects, names, str(levels.representation))
@@ -290,7 +282,7 @@ def linear_blocks_of(
 
 
 def blocks_of_terms(
-    terms: StateTerms, count: int, representation: str, blocks: Sequence[BlockOfParts]
+    terms: StateTerms, count: int, representation: str, blocks: Sequence[SolvedBlock]
 ) -> list[LinearBlock]:
     """The linear blocks of so many parameters over the functions of solved blocks."""
     every, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()

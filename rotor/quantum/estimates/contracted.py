@@ -23,11 +23,11 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import Plan, SpinBlock
 from rotor.quantum.spins.linear_blocks import Unit, unit_matrices
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
-from rotor.quantum.spins.rotor import Channel, RotorBlock
+from rotor.quantum.spins.rotor import Channel
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -70,7 +70,7 @@ class ContractedLevels:
     """Labelled levels as functions of the parameters; rotations, couplings: see `spins.linear_blocks.Units`."""
 
     count: int
-    rotors: dict[int, RotorBlock]
+    rotors: dict[int, SolvedBlock]
     rotations: dict[int, Unit]
     couplings: dict[tuple[int, int], dict[Channel, Unit]]
     blocks: tuple[_Block, ...]
@@ -129,7 +129,7 @@ def _eigen(matrix: Floats) -> tuple[Floats, Floats]:
     return energies + zero, vectors
 
 
-def _states_by_name(rotor: RotorBlock, vectors: Floats) -> dict[tuple[int, ...], int]:
+def _states_by_name(rotor: SolvedBlock, vectors: Floats) -> dict[tuple[int, ...], int]:
     """Rotational states by v, Ka, Kc."""
     return {tuple(name): state for state, name in enumerate(named_states(rotor, vectors).tolist())}
 

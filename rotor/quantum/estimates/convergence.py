@@ -17,7 +17,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.table import counted
@@ -216,7 +216,7 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
         return out
     operators = rigid_operators(top.constants)
     for block in levels.blocks:
-        if not isinstance(block, SolvedBlock) or block.basis.size == 1:
+        if not block.alone or block.basis.size == 1:
             continue
         j = block.basis.j
         matrices[j] = matrices[j] if j in matrices else JMatrix(operators, j)

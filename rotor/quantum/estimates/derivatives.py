@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Workspace, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.levels import Levels, MomentBlock
@@ -87,7 +86,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
         return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
     if "irrep" in levels.quanta:
         return _derivatives_of_spherical(top, levels, names, rows)
-    if any(isinstance(block, CoupledBlock) for block in levels.blocks):
+    if any(not block.alone for block in levels.blocks):
         return _derivatives_of_coupled(top, levels, names, rows)
     if "v" in levels.quanta:
         return _derivatives_of_uncoupled(top, levels, names, rows)

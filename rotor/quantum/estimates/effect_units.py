@@ -14,7 +14,6 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of, vertices_of
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.label_tracking import (
     Follows,
     LabelledBlocks,
@@ -35,7 +34,7 @@ from rotor.quantum.spins.three_spins import Allowed
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-Functions = Callable[[CoupledBlock | SpinBlock], tuple[Floats, Ints]]
+Functions = Callable[[SolvedBlock | SpinBlock], tuple[Floats, Ints]]
 
 
 def unit_levels(
@@ -111,7 +110,7 @@ def _quanta(levels: Levels) -> Ints:
 
 def _names(block: Any) -> Ints:
     """Labels of the states of a solved block; only the rank for a single Wang block."""
-    return np.arange(len(block.energies_mhz))[:, None] if isinstance(block, SolvedBlock) else block.labels
+    return np.arange(len(block.energies_mhz))[:, None] if block.alone else block.labels
 
 
 def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
@@ -153,7 +152,7 @@ class _Makers:
             return linear, _names_with_spins(block)
         if self._naming:
             return linear, self._naming(vertices_of(block), self._representation)
-        if isinstance(block, SolvedBlock):
+        if block.alone:
             return linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY)
         return linear, by_overlaps(vertices_of(block), self._representation)
 

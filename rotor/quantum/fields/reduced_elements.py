@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
 from rotor.quantum.moments import Moment
@@ -101,7 +100,7 @@ class ReducedElements:
             moment = self._moment(operator, first, second)
             return moment if moment is not None and moment.any() else None
         tensors = self._tensors_of(operator)
-        if isinstance(first, SolvedBlock):
+        if first.alone:
             return wang_amplitudes(first, second, tensors[0, 0])
         if isinstance(first, MomentBlock):
             return first.reduced(second, tensors)
@@ -114,7 +113,7 @@ class ReducedElements:
             raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
         if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
-        if isinstance(up, SolvedBlock | CoupledBlock):
+        if isinstance(up, SolvedBlock):
             return _rotational_moment(magnet.g, up, low, self.representation)
         if magnet.key not in self._moments:
             self._moments[magnet.key] = _spin_moments(magnet, self.states, low.shared)

@@ -23,7 +23,7 @@ from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLe
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.in_field import space_factor
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-class Sector(NamedTuple):
+class FieldSector(NamedTuple):
     """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F."""
 
     block: int
@@ -71,7 +71,7 @@ class SolvedFieldBlock(FieldBlock):
     def label(self) -> str:
         """Species of Wang functions, K where it is a good quantum number, else the lowest level."""
         blocks = [self.space.elements.blocks[self.space.sectors[i].block] for i in self.members]
-        if isinstance(blocks[0], SolvedBlock):
+        if blocks[0].alone:
             return "+".join(sorted({block.basis.species for block in blocks}))
         k = blocks[0].axial_k
         return f"from {self.levels.label(int(self.rows[0]))}" if k is None else f"k={k}"
@@ -149,7 +149,7 @@ class SolvedSpace(FieldSpace):
 
     levels: FreeLevels = field(repr=False)
     jmax: int
-    sectors: tuple[Sector, ...] = field(repr=False)
+    sectors: tuple[FieldSector, ...] = field(repr=False)
     elements: ReducedElements = field(repr=False)
     operators: tuple[FieldOperator, ...]
     _below: dict[Key, dict[int, list[tuple[int, int]]]] = field(default_factory=dict, repr=False)
@@ -247,17 +247,17 @@ def solved_space(
     return replace(space, levels=replace(free, family=family))
 
 
-def _sectors(levels: Levels, by_vt: bool) -> Iterator[Sector]:
+def _sectors(levels: Levels, by_vt: bool) -> Iterator[FieldSector]:
     """Sectors of solved blocks, divided by v_t if there is a torsion."""
     vt = levels.quanta.get("vt") if by_vt else None
     for number, block in enumerate(levels.blocks):
         rows = np.arange(block.start, block.start + len(block.energies_mhz))
         if vt is None:
-            yield Sector(number, None, rows, block.twice_total)
+            yield FieldSector(number, None, rows, block.twice_total)
             continue
         for value in np.unique(vt[rows]).tolist():
             places = np.flatnonzero(vt[rows] == value)
-            yield Sector(number, places, rows[places], block.twice_total)
+            yield FieldSector(number, places, rows[places], block.twice_total)
 
 
 def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:

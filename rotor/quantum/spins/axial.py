@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateTerms
+from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, tensors_of_stacks
 from rotor.quantum.spins.operators import AxialState, Cosines, CosinesWithN, Rotor, Scalar, factors_with_n, tensor_of
-from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
+from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
@@ -28,12 +29,12 @@ from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 Exist = Callable[[Ints], NDArray[np.bool_]]  # whether levels with these labels exist
 
 
-def are_axial(blocks: Sequence[RotorBlock]) -> bool:
+def are_axial(blocks: Sequence[SolvedBlock]) -> bool:
     """Whether the solved blocks of the rotation are functions |N K⟩."""
     return isinstance(blocks[0].parts[0].basis, AxialState)
 
 
-def existing_functions(blocks: Sequence[RotorBlock], exist: Exist, spins: int) -> list[RotorBlock]:
+def existing_functions(blocks: Sequence[SolvedBlock], exist: Exist, spins: int) -> list[SolvedBlock]:
     """The functions |N K⟩ whose v and K exist; all of them if none does."""
     names = [(block.parts[0].v, block.parts[0].basis.k[0], 0, *[0] * (1 + spins)) for block in blocks]
     existing = exist(np.array(names, dtype=np.int64)).tolist()
@@ -125,7 +126,7 @@ def tensors_of_axial_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[C
     return out
 
 
-def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[RotorBlock]) -> Floats:
+def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> Floats:
     """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (blocks, count); operators that change K do not contribute."""
     parts = [block.parts[0] for block in blocks]
     v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True))

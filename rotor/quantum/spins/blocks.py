@@ -22,7 +22,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
-from rotor.quantum.levels import Block, Used
+from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
@@ -32,7 +32,6 @@ from rotor.quantum.spins.parts import SpinPart, named_states
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
-    RotorBlock,
     channels_of,
     solved_rotor,
     valued_terms,
@@ -167,7 +166,7 @@ class Plan:
     """
 
     shared: Shared
-    blocks: list[RotorBlock]
+    blocks: list[SolvedBlock]
     families: list[list[tuple[int, int]]]
     contracted: InStacks = field(repr=False)
     replacement: Operators | None = field(default=None, repr=False)
@@ -189,7 +188,7 @@ class Plan:
         places: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
         for number, family in enumerate(self.families):
             for at, (i, symmetry_class) in enumerate(family):
-                places.setdefault((self.blocks[i].n, symmetry_class), {}).setdefault(number, []).append((at, i))
+                places.setdefault((self.blocks[i].j, symmetry_class), {}).setdefault(number, []).append((at, i))
         return places
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:

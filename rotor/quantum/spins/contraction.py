@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import Basis, Rotor
-from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
+from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, power_matrices, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
@@ -35,7 +36,7 @@ class Stack(NamedTuple):
     sections: tuple[Section, ...]
     vectors: Floats
     sizes: list[int]
-    blocks: list[RotorBlock]
+    blocks: list[SolvedBlock]
     single: list[bool]
 
 
@@ -56,7 +57,7 @@ class Contracted(NamedTuple):
         return Contracted(self.low, self.up, self.pairs.turned(), sign * self.matrices.transpose(0, 2, 1))
 
 
-def stacks_of(blocks: Sequence[RotorBlock]) -> list[Stack]:
+def stacks_of(blocks: Sequence[SolvedBlock]) -> list[Stack]:
     """Stacks of blocks with the same states v and kinds of Wang functions (for |N K⟩ the same v) and similar size."""
     alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
     for number, block in enumerate(blocks):
@@ -72,10 +73,10 @@ def _kind(basis: Basis) -> tuple[int, ...]:
     return (basis.first_k, basis.sign) if isinstance(basis, WangBlock) else ()
 
 
-def _runs_of_similar_size(blocks: Sequence[RotorBlock], members: list[int]) -> Iterator[list[int]]:
+def _runs_of_similar_size(blocks: Sequence[SolvedBlock], members: list[int]) -> Iterator[list[int]]:
     """Runs of blocks of similar size, by rising N."""
     run: list[int] = []
-    for number in sorted(members, key=lambda number: blocks[number].n):
+    for number in sorted(members, key=lambda number: blocks[number].j):
         if run and len(blocks[number].energies_mhz) > max(_SMALL, 1.5 * len(blocks[run[0]].energies_mhz)):
             yield run
             run = []
@@ -83,7 +84,7 @@ def _runs_of_similar_size(blocks: Sequence[RotorBlock], members: list[int]) -> I
     yield run
 
 
-def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack:
+def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int]) -> Stack:
     """The stack of these blocks."""
     members = [blocks[number] for number in numbers]
     sections, start = [], 0
@@ -100,7 +101,7 @@ def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack
     return Stack(
         kind,
         np.array(numbers),
-        np.array([block.n for block in members]),
+        np.array([block.j for block in members]),
         tuple(sections),
         vectors,
         sizes,

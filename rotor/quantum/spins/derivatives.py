@@ -172,7 +172,7 @@ def _link_tables(
         states = frame.energies_mhz[kind].shape[1]
         table = tables.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
         units = [linked.index(parameter) for parameter in block.parameters.tolist()]
-        table[rotor.n - frame.lowest, units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
+        table[rotor.j - frame.lowest, units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
     mix = np.tile(np.eye(len(linked)), (frame.count_of_n, 1, 1))
     return {key: UnitTables(table, np.array(linked), mix) for key, table in tables.items()}
 

@@ -17,11 +17,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
 from rotor.quantum.spins.blocks import Shared, SpinBlock, couplings_of
 from rotor.quantum.spins.contraction import Contracted, stacks_of
-from rotor.quantum.spins.rotor import Channel, Channels, RotorBlock, parameter_channels
+from rotor.quantum.spins.rotor import Channel, Channels, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -56,7 +57,7 @@ class Units(NamedTuple):
 
 
 def unit_matrices(
-    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared, rotors: Mapping[int, RotorBlock]
+    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared, rotors: Mapping[int, SolvedBlock]
 ) -> Units:
     """∂H/∂c of parameters over the functions of rotational blocks, by their numbers."""
     numbers = sorted(rotors)
@@ -72,7 +73,7 @@ def unit_matrices(
     return Units(rotations, couplings)
 
 
-def _rotations(terms: StateTerms, count: int, blocks: Sequence[RotorBlock], representation: str) -> list[Unit]:
+def _rotations(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], representation: str) -> list[Unit]:
     """Unit matrices of the rotation alone for each block, with both triangles."""
     if are_axial(blocks):
         first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
@@ -89,7 +90,7 @@ def _mirrored(block: LinearBlock) -> Unit:
 
 
 def _by_channel(
-    channels: Sequence[Channels], blocks: Sequence[RotorBlock], shared: Shared
+    channels: Sequence[Channels], blocks: Sequence[SolvedBlock], shared: Shared
 ) -> Iterator[tuple[Channel, list[int], list[list[Contracted]]]]:
     """Each channel with the parameters that act in it and their elements between the functions of all blocks."""
     stacks = stacks_of(blocks)

@@ -112,7 +112,7 @@ def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], distances: Ints) 
         energies_of_kind = energies.setdefault(stack.kind, np.zeros((highest - lowest + 1, largest[stack.kind])))
         for number, block in zip(stack.numbers.tolist(), stack.blocks, strict=True):
             kinds[number], sizes[number] = stack.kind, len(block.energies_mhz)
-            energies_of_kind[block.n - lowest, : sizes[number]] = block.energies_mhz
+            energies_of_kind[block.j - lowest, : sizes[number]] = block.energies_mhz
     patterns = {f: numbers.tolist() for f, numbers in places.items()}
     n_patterns = [(rise, symmetry_class) for rise, symmetry_class in distances[:, [0, -1]].tolist()]
     return Frame(list(places), lowest, kinds, sizes, energies, patterns, n_patterns)

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import SpinBlock, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns
 from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import RotorBlock, RotorPart
+from rotor.quantum.spins.rotor import RotorPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.spins.written_moments import written_elements
 from rotor.quantum.tensors import BodyTensor, body_tensor
@@ -92,7 +92,7 @@ class SpinMoments:
         element: Floats | None = self._cache[key]
         return element
 
-    def _block_element(self, moment: Moment, up: RotorBlock, low: RotorBlock) -> Floats | None:
+    def _block_element(self, moment: Moment, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
         """The element of a moment between the eigenstates of two rotational blocks; None where it is zero."""
         total: Floats | None = None
         for left in up.parts:

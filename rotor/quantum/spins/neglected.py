@@ -65,7 +65,7 @@ def largest_shifts(plan: Plan) -> tuple[float, float]:
     """
     sizes = np.array([len(block.energies_mhz) for block in plan.blocks], dtype=np.int64)
     starts = np.cumsum(sizes) - sizes
-    n = np.array([block.n for block in plan.blocks], dtype=np.int64)
+    n = np.array([block.j for block in plan.blocks], dtype=np.int64)
     highest = int(n.max(initial=0))
     acting = {channel for _, _, matrices in _matrices(plan) for _, channels in matrices for channel in channels}
     alone = {channel: coupling_alone(plan.shared.scheme, channel, highest) for channel in acting}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.rotor import RotorBlock
+from rotor.quantum.levels import SolvedBlock
 
 _AT_A_TIME = 1000  # entries of a table of weights that are examined together
 
@@ -24,7 +24,7 @@ class SpinPart(NamedTuple):
     """
 
     number: int
-    rotor: RotorBlock
+    rotor: SolvedBlock
     patterns: slice
     place: slice
 
@@ -39,7 +39,7 @@ class SpinPart(NamedTuple):
         return int(self.patterns.stop - self.patterns.start)
 
 
-def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
+def named_states(rotor: SolvedBlock, vectors: Floats) -> Ints:
     """v, Ka, Kc (n, 3) of rotational states: those of the part with the largest weight, in order of energy."""
     shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
     part_of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
@@ -37,16 +36,6 @@ class RotorPart(NamedTuple):
     basis: Basis
     place: slice
     names: Ints  # v, Ka and Kc of the functions in order of energy, (size, 3); v, K and 0 of |N K⟩
-
-
-@dataclass(frozen=True, eq=False)
-class RotorBlock:
-    """States of one N that are solved together: energies (n,) in MHz and eigenvectors (n, n) in columns over the parts."""
-
-    n: int
-    parts: tuple[RotorPart, ...]
-    energies_mhz: Floats
-    vectors: Floats
 
 
 class Channel(NamedTuple):
@@ -83,7 +72,7 @@ Terms = list[tuple[float, SpinTerm]]
 
 def solved_rotor(
     top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
-) -> tuple[list[RotorBlock], str]:
+) -> tuple[list[SolvedBlock], str]:
     """Solve the rotation from N = `nmin` to `nmax`.
 
     A symmetric top whose terms are all axial has functions |N K⟩, one in each block.
@@ -103,7 +92,7 @@ def solved_rotor(
 
     Returns
     -------
-    blocks : list of RotorBlock
+    blocks : list of SolvedBlock
         Solved blocks, energies in MHz.
     representation : str
         Representation of the functions, such as Ir.
@@ -115,8 +104,8 @@ def solved_rotor(
         return blocks, "Ir" if top.kind == "prolate" else "IIIr"
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
-    if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
-        return [_rotor_block(block, representation) for block in levels.blocks], representation
+    if "ka" not in levels.quanta or not levels.blocks[0].alone:
+        return [_with_names(block, representation) for block in levels.blocks], representation
     # labels of states in order of energy, as labels of functions are
     names = np.column_stack([np.zeros(len(levels), dtype=np.int64), levels.quanta["ka"], levels.quanta["kc"]])
     return [_single_state_block(block, names) for block in levels.blocks], representation
@@ -138,31 +127,27 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     return not coupled and all(operator is None for operator in operators)
 
 
-def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[RotorBlock]:
+def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[SolvedBlock]:
     """A block of one function for each level; their arrays are views of shared ones."""
     names, alone, vector = np.column_stack([v, k, np.zeros_like(k)]), slice(0, 1), np.ones((1, 1))
     rows = enumerate(zip(v.tolist(), n.tolist(), k.tolist(), strict=True))
     return [
-        RotorBlock(m, (RotorPart(state, AxialState(m, q), alone, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
+        SolvedBlock((RotorPart(state, AxialState(m, q), alone, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
         for i, (state, m, q) in rows
     ]
 
 
-def _single_state_block(block: SolvedBlock, names: Ints) -> RotorBlock:
-    """A solved block of one state v as a rotor block."""
+def _single_state_block(block: SolvedBlock, names: Ints) -> SolvedBlock:
+    """A Wang block with the names of its functions, which those of levels (n, 3) have."""
     size = block.basis.size
     part = RotorPart(0, block.basis, slice(0, size), names[block.start : block.start + size])
-    return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
+    return SolvedBlock((part,), block.energies_mhz, block.vectors)
 
 
-def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:
-    """A solved or coupled block as a rotor block."""
-    if isinstance(block, CoupledBlock):
-        n, where = block.j, [(part.v, part.basis, part.place) for part in block.parts]
-    else:
-        n, where = block.basis.j, [(0, block.basis, slice(0, block.basis.size))]
-    parts = (RotorPart(v, basis, place, _names(v, basis, representation)) for v, basis, place in where)
-    return RotorBlock(n, tuple(parts), block.energies_mhz, block.vectors)
+def _with_names(block: SolvedBlock, representation: str) -> SolvedBlock:
+    """A solved block with the names of its functions."""
+    parts = (RotorPart(p.v, p.basis, p.place, _names(p.v, p.basis, representation)) for p in block.parts)
+    return SolvedBlock(tuple(parts), block.energies_mhz, block.vectors)
 
 
 def _names(v: int, basis: WangBlock, representation: str) -> Ints:

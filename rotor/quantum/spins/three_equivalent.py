@@ -22,11 +22,12 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import part_numbers
+from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Member, Plan, States, coefficients_of, diagonalised
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import ALONE, Channel, RotorBlock, RotorPart
+from rotor.quantum.spins.rotor import ALONE, Channel, RotorPart
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import phase
@@ -79,11 +80,11 @@ def in_wang_functions(plan: Plan) -> Plan:
         hamiltonian = (block.vectors * block.energies_mhz) @ block.vectors.T
         _check_axis(block, hamiltonian)
         turned.setdefault((number, number), []).append((hamiltonian, [ALONE]))
-        blocks.append(RotorBlock(block.n, block.parts, np.diag(hamiltonian).copy(), np.eye(len(hamiltonian))))
+        blocks.append(SolvedBlock(block.parts, np.diag(hamiltonian).copy(), np.eye(len(hamiltonian))))
     return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, replacement=turned)
 
 
-def _check_axis(block: RotorBlock, matrix: Floats) -> None:
+def _check_axis(block: SolvedBlock, matrix: Floats) -> None:
     """Raise ValueError if the rotation connects K with K' other than ±K + 3n."""
     k = np.concatenate([_wang(part).k for part in block.parts])
     apart = ((k[:, None] - k) % 3 != 0) & ((k[:, None] + k) % 3 != 0)
@@ -124,7 +125,7 @@ def _parts(plan: Plan, patterns: Ints) -> list[SpinPart]:
     """All solved blocks whose N couples to the F, each with all patterns of its N."""
     parts, start = [], 0
     for number, block in enumerate(plan.blocks):
-        pattern_rows = np.flatnonzero(patterns[:, 0] == 2 * block.n)
+        pattern_rows = np.flatnonzero(patterns[:, 0] == 2 * block.j)
         if len(pattern_rows):
             stop = start + len(pattern_rows) * len(block.energies_mhz)
             parts.append(
@@ -224,7 +225,7 @@ def _matrix(plan: Plan, patterns: Ints, parts: list[SpinPart], rows: list[Row], 
         for i, k, element in elements:
             rotor[starts[i] : starts[i + 1], starts[k] : starts[k + 1]] += element
             if i != k:  # c(p', p) = (-1)^(N'-N) c(p, p'), and the product is symmetric
-                turned = (-1.0) ** (parts[i].rotor.n - parts[k].rotor.n) * element.T
+                turned = (-1.0) ** (parts[i].rotor.j - parts[k].rotor.j) * element.T
                 rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] += turned
         coupling = _coupling(plan, channel, patterns)
         for r, p, c in zip(functions.wang, functions.pattern, functions.factor, strict=True):

@@ -14,7 +14,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
+from rotor.quantum.levels import Levels, SolvedBlock, single_block, weights_of_levels
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
@@ -155,7 +155,7 @@ def _linear(
 def _one_function(j: int, energy: float, row: int) -> SolvedBlock:
     """A block of the single function K = 0."""
     basis = WangBlock(j, "eo" if j % 2 else "ee", 0, 1, 1)
-    return SolvedBlock(basis, np.array([energy]), np.ones((1, 1)), row)
+    return single_block(basis, np.array([energy]), np.ones((1, 1)), row)
 
 
 def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
@@ -293,7 +293,7 @@ def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[Solv
     """Solved blocks with the row of the first level of each."""
     start = 0
     for basis, energies, vectors in solved:
-        yield SolvedBlock(basis, energies, vectors, start)
+        yield single_block(basis, energies, vectors, start)
         start += len(energies)
 
 

@@ -53,7 +53,7 @@ def both_ways(up, low, pieces: list, representation: str) -> np.ndarray | None:
     back = one_way(low, up, [piece for piece in pieces if piece.bra != piece.ket], representation)
     if back is None:
         return computed
-    turned = (-1.0) ** (up.n - low.n) * back.T
+    turned = (-1.0) ** (up.j - low.j) * back.T
     return turned if computed is None else computed + turned
 
 
@@ -91,7 +91,7 @@ def test_operators_are_those_of_pairs(name, effects):
         expected = {}
         for i, up in enumerate(blocks):
             for k, low in enumerate(blocks[: i + 1]):
-                near = abs(up.n - low.n) <= piece.rotor.rank <= up.n + low.n
+                near = abs(up.j - low.j) <= piece.rotor.rank <= up.j + low.j
                 item = both_ways(up, low, [piece], representation) if near else None
                 if item is not None and item.any():
                     expected[i, k] = item
@@ -112,7 +112,7 @@ def test_dipoles_are_those_of_pairs(sign):
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
-            item = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
+            item = plain_tensor(up, low, tensors) if abs(up.j - low.j) <= 1 <= up.j + low.j else None
             assert (item is None) == ((i, k) not in computed)
             if item is not None:
                 count += 1
@@ -130,7 +130,7 @@ def test_tensors_of_axial_tops_are_those_of_pairs(body):
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
-            item = plain_tensor(up, low, tensors) if abs(up.n - low.n) <= rank <= up.n + low.n else None
+            item = plain_tensor(up, low, tensors) if abs(up.j - low.j) <= rank <= up.j + low.j else None
             assert (item is None) == ((i, k) not in computed)
             if item is not None:
                 count += 1

@@ -24,13 +24,12 @@ from rotor.formats.spcat.hamiltonian.l_spins import functions_with_spins, named_
 from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import assigned_with_spins
 from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
@@ -264,7 +263,7 @@ def _functions_of(group: Group, levels: Levels) -> Functions:
     """The functions by which levels of l-doubled states are called."""
     pairs, representation = group.effect.pairs, str(levels.representation)
 
-    def functions(block: CoupledBlock | SpinBlock) -> tuple[Floats, Ints]:
+    def functions(block: SolvedBlock | SpinBlock) -> tuple[Floats, Ints]:
         if isinstance(block, SpinBlock):
             return functions_with_spins(block, pairs, representation)
         return functions_of_l(block, pairs, representation)

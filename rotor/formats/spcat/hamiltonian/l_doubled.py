@@ -28,8 +28,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.quantum.coupled import CoupledBlock
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.operators import AxialState, Basis
 from rotor.quantum.spins.parts import assigned
 from rotor.quantum.states import Coupling, OperatorOfJ
@@ -178,7 +177,7 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
     return renamed(levels, *zip(*found, strict=True))
 
 
-def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     """The functions (n, n), in rows, by which the states of a block are called, and their names v, Ka, Kc (n, 3).
 
     Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. Half a turn
@@ -242,7 +241,7 @@ def _wang(basis: Basis) -> WangBlock:
     return basis
 
 
-def _names_of_block(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+def _names_of_block(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
     functions, names = functions_of_l(block, pairs, representation)
     shares = (functions @ block.vectors) ** 2
     of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))

@@ -14,11 +14,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_parts, over_real_states
 from rotor.formats.spcat.hamiltonian.labels import renamed
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
 from rotor.quantum.spins.parts import assigned
-from rotor.quantum.spins.rotor import RotorBlock
 from rotor.quantum.spins.terms import SpinTerm
 
 
@@ -125,6 +124,6 @@ def _names_of_block(block: SpinBlock, known: dict[int, tuple[Floats, Ints]]) -> 
     return np.concatenate(names)[of_state], np.asarray(table[of_state, np.arange(len(of_state))])
 
 
-def _functions(rotor: RotorBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+def _functions(rotor: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     places = [(part.v, part.basis, part.place.start) for part in rotor.parts]
     return functions_of_parts(places, len(rotor.vectors), pairs, representation)

@@ -28,9 +28,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
-from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.label_tracking import Follows, NamedFunctions, Naming
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned
 from rotor.quantum.wang.basis import WangBlock, names_of
@@ -123,7 +122,7 @@ def _needs_names(block: object, diag: int) -> bool:
     """Whether a block without spins holds several Wang blocks, or one with spins several of one v and pattern and DIAG is 3."""
     if isinstance(block, SpinBlock):
         return diag == 3 and _connects_wang_blocks(block)
-    return isinstance(block, CoupledBlock) and len(block.parts) > 1
+    return isinstance(block, SolvedBlock) and len(block.parts) > 1
 
 
 def _connects_wang_blocks(block: SpinBlock) -> bool:
@@ -141,7 +140,7 @@ def _connects_wang_blocks(block: SpinBlock) -> bool:
 
 def _of_clear_parts(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
     """Names v, Ka, Kc by DIAG 0 and shares where every state has more than half of it in one Wang block; None elsewhere."""
-    if not isinstance(block, CoupledBlock):
+    if not isinstance(block, SolvedBlock) or block.alone:
         return None
     of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
     of_state, shares = of_parts.argmax(axis=0), of_parts.max(axis=0)
@@ -230,15 +229,11 @@ def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, en
     return found
 
 
-def functions_of(block: object, representation: str) -> Functions:
+def functions_of(block: SolvedBlock | SpinBlock, representation: str) -> Functions:
     """The functions |N K ±⟩ of a solved block, with every coupling pattern, in order of parts, patterns and K."""
     if isinstance(block, SpinBlock):
         return _of_spin_block(block, representation)
-    if isinstance(block, CoupledBlock):
-        wangs = [(part.v, part.basis, block.vectors[part.place]) for part in block.parts]
-    else:
-        wangs = [(0, block.basis, block.vectors)]  # type: ignore[attr-defined]
-    return _joined([(v, basis, None, vectors) for v, basis, vectors in wangs], representation)
+    return _joined([(part.v, part.basis, None, block.vectors[part.place]) for part in block.parts], representation)
 
 
 def _of_spin_block(block: SpinBlock, representation: str) -> Functions:
