@@ -14,7 +14,7 @@ from places import PROJECT
 SUBJECTS = (
     "molecule_to_spectrum", "isotopologues", "levels", "free_rotation", "equipartition", "classical", "fit", "structure",
     "stark", "alignment", "hard_cases", "accuracy", "rigid_steps", "spins_and_states", "view", "assign",
-    "internal_rotation", "locked_rotation", "simulation",
+    "internal_rotation", "locked_rotation", "simulation", "observed", "five_species",
 )  # fmt: skip
 
 
