@@ -1,4 +1,4 @@
-"""Compiled loops of the search. Their plain forms are `rotor.api.line_list` (lines of a top) and the tests' own loops."""
+"""Compiled loops of the search. `rotor.api.line_list` (lines of a top) and loops in the tests are the plain forms."""
 
 import numpy as np
 from numba import njit
@@ -26,7 +26,7 @@ def place(theta: Floats, kappa: float) -> tuple[int, float]:
 
 @njit(cache=True, nogil=True)
 def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats, energy: Floats) -> tuple[int, float]:
-    """Energies (MHz) of all levels to first order in the quartic constants; returns the place on the grid."""
+    """Write energies (MHz) of all levels, to first order in the quartic constants; return the position on the grid."""
     mean, half = 0.5 * (constants[0] + constants[2]), 0.5 * (constants[0] - constants[2])
     kappa = (constants[1] - mean) / half
     i, w = place(theta, kappa)
@@ -47,7 +47,7 @@ def lines_in_band(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, strength: NDArray[np.float32],
     constants: Floats, windows: Floats, energy: Floats, row: Ints, frequency: Floats, s_nu: Floats,
 ) -> int:  # fmt: skip
-    """Lines within windows (n, 2) of frequency: their rows in the table, frequencies and S ν²; returns how many."""
+    """Write lines within frequency windows (n, 2): rows in the table, frequencies and S ν²; return their number."""
     level_energies(levels, theta, jj, constants, energy)
     kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
     points = strength.shape[0]
@@ -91,9 +91,9 @@ def strongest_lines(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
     tops: Floats, log_dipoles: Floats, temperatures: Floats, windows: Floats, count: int, apart: float,
 ) -> tuple[Ints, Floats]:  # fmt: skip
-    """The strongest lines in the band of each top by types a, b, c, and of all types with its dipole; of near lines the first.
+    """The strongest lines of each top in the band, for types a, b, c, and for all types with its dipole; close lines count once.
 
-    log_dipoles (tops, 3) : ln μ². Returns rows (tops, 4, count), -1 where there is none, and ∂ν/∂(A, B, C) (tops, 4, count, 3).
+    log_dipoles (tops, 3) : ln μ². Returns rows (tops, 4, count), padded with -1, and ∂ν/∂(A, B, C) (tops, 4, count, 3).
     """
     rows = np.full((len(tops), 4, count), -1)
     slopes = np.zeros((len(tops), 4, count, 3))
@@ -109,11 +109,11 @@ def strongest_lines(
             taken = np.empty(count)
             at = 0
             if q == MIXED:
-                of_type = np.arange(line_count)
+                candidates = np.arange(line_count)
                 height += log_dipoles[t][kind[row[:line_count]]]
             else:
-                of_type = np.flatnonzero(kind[row[:line_count]] == q)
-            for n in of_type[np.argsort(-height[of_type])]:
+                candidates = np.flatnonzero(kind[row[:line_count]] == q)
+            for n in candidates[np.argsort(-height[candidates])]:
                 near = False
                 for m in range(at):
                     if abs(taken[m] - f[n]) < apart:
@@ -134,7 +134,7 @@ def _hits(
     jj: Floats, energies: Floats, k: int, w: float, mean: float, half: float,
     near: Bytes, low: float, high: float, per_mhz: float, reach: float,
 ) -> tuple[int, int]:  # fmt: skip
-    """How many lines of a top lie near peaks and how many do not, counted until they cannot win; κ is at k + w."""
+    """Numbers of lines of a top near peaks and away from peaks, counted until the top cannot win; κ is at grid position k + w."""
     hits, misses = 0, 0
     for q in range(len(jj)):
         f = jj[q] * mean + half * (energies[k, q] + w * (energies[k + 1, q] - energies[k, q]))
@@ -153,7 +153,7 @@ def _hits(
 def _crossing(
     first: Floats, second: Floats, a: float, b: float, frequency: float, k: int, last: int
 ) -> tuple[int, float]:
-    """Place k + w between k and last where a first + b second is a frequency; w < 0 where it is not."""
+    """Grid position k + w between k and last where a first + b second equals a frequency; w < 0 without one."""
     before = a * first[k] + b * second[k]
     for n in range(k, last):
         after = a * first[n + 1] + b * second[n + 1]
@@ -191,7 +191,7 @@ def _root(
     linear: tuple[Floats, Floats, Floats, Floats, Floats], kappa: Floats, sa: float, sb: float, above: float, third: float,
     first: int, last: int,
 ) -> tuple[int, float, float, float, float]:  # fmt: skip
-    """Point of κ and place behind it where the third line has a frequency, ½(A+C), ½(A-C) and κ there; a place below 0 is none."""
+    """Grid point of κ and position beyond it where the third line has a frequency, with ½(A+C), ½(A-C), κ; position < 0: no root."""
     mean_a, mean_b, inverse, third_a, third_b = linear
     i, w = _crossing(third_a, third_b, sa, sb, third, first, last)
     mean = sa * (mean_a[i] + w * (mean_a[i + 1] - mean_a[i])) + sb * (mean_b[i] + w * (mean_b[i + 1] - mean_b[i]))
@@ -224,11 +224,11 @@ def sweep(
     near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,
     bounds: Floats, need: int, stride: int, out: Floats,
 ) -> int:  # fmt: skip
-    """Roots of a family: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed; returns how many.
+    """Write the roots of a family and return their number: pairs of seeds give ½(A±C) at each κ, the third line crosses a third seed.
 
-    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (κ, n), companion_jj (n,) alike
+    difference (3, κ), jj (3,) : E_κ and J(J+1) differences of the family's lines; companions (κ, n), companion_jj (n,) : of the predicted
     near : distance from each bin's centre to the nearest peak in fifths of `bin_width`, at most 255; a hit is nearer than the larger of
-    `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : points of κ between two looks for a crossing.
+    `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : grid points of κ between tests for a crossing.
     out (m, 5) : hits, misses, A, B, C
     """
     n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
@@ -246,7 +246,7 @@ def sweep(
                 continue
             sb = seeds[b]
             above = jj[0] * sb - jj[1] * sa
-            if (rises and above <= 0) or (falls and above >= 0):  # ½(A-C) below 0 at every κ
+            if (rises and above <= 0) or (falls and above >= 0):  # ½(A-C) below 0 at all κ
                 continue
             _third_lines(sa, sb, above, looks, mean_a, mean_b, inverse, third_a, third_b, bounds, thirds)
             before, p, at = -1.0, 0, 0
@@ -285,9 +285,9 @@ def joint_ratio(
     f: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
     spread: float, detected: float, used: Ints, mark: int,
 ) -> float:  # fmt: skip
-    """ln of the likelihood ratio of lines, strong ones first, against a random background of peaks; a peak serves one line only.
+    """ln of the likelihood ratio of lines, strongest first, against a random background of peaks; a peak matches only one line.
 
-    height : ln of the expected intensities. used (peaks,) : work space, in which `mark` stands for a peak that is taken
+    height : ln of the expected intensities. used (peaks,) : work space, where `mark` denotes a matched peak
     """
     total = 0.0
     for n in range(len(f)):
@@ -314,9 +314,9 @@ def best_scales(
     f: Floats, expected: Floats, kind: Ints, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats,
     log_threshold: float, spread: float, detected: float, most: int, proposals: int,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """For each type ln of the best likelihood ratio (3,), 0 where no line is above chance, and ln of the scale of its intensities.
+    """For each type, ln of the best likelihood ratio (3,), 0 if no line is above chance, and ln of its intensity scale (3,).
 
-    Scales are proposed by peaks near the strongest lines. `expected` is ln of the relative intensity.
+    Trial scales come from peaks near the strongest lines. `expected` is ln of the relative intensity.
     """
     ratios, scales = np.zeros(3), np.full(3, -np.inf)
     used, mark = np.zeros(len(peaks), np.int64), 0
@@ -353,7 +353,7 @@ def best_scales(
 
 @njit(cache=True, nogil=True)
 def _highest(height: Floats, most: int) -> Ints:
-    """Places of the highest values by falling height, of equal ones the first before the others."""
+    """Indices of the highest values in descending order; equal values keep their order."""
     out, count = np.empty(most, np.int64), 0
     for n in range(len(height)):
         if count == most and height[n] <= height[out[most - 1]]:
@@ -369,7 +369,7 @@ def _highest(height: Floats, most: int) -> Ints:
 
 @njit(cache=True, nogil=True)
 def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
-    """The first lines of an order, without those nearer than `apart` to one before."""
+    """The first lines in this order, without lines closer than `apart` to a preceding one."""
     out = np.empty(min(most, len(order)), np.int64)
     count = 0
     for n in order:
@@ -392,7 +392,7 @@ def quick_ratios(
     tops: Floats, kinds: Ints, temperatures: Floats, windows: Floats, sigma_mhz: float, softness: float,
     peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float, spread: float, detected: float, most: int, apart: float,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """ln of the likelihood ratio of each rigid top (tops,), lines of one type or of all, and the temperature it is best at.
+    """ln of the likelihood ratio of each rigid top (tops,), with lines of one type or of all, and its best temperature.
 
     The standard error of a line is the larger of `sigma_mhz` and `softness` B.
     """

@@ -1,4 +1,4 @@
-"""What was found in a spectrum: species, their lines, and the peaks that nothing explains."""
+"""Result of an assignment: species, their lines, and unexplained peaks."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from rotor.tops.top import Top
 
 @dataclass(frozen=True, eq=False)
 class AssignedSpecies:
-    """One species.
+    """An assigned species.
 
-    grown, refined : the search's result, and the fit. peak (m, 2) : peaks of the request behind each assigned line, two of a split one.
+    grown, refined : result of the search, and the fit. peak (m, 2) : peaks of the request for each assigned line, two for a split line.
     strength : height of the strongest line in the units of the spectrum. probability : that the constants are right. twins : other
-    constants (3,) with evidence that is as good but for a factor e^10. isotopologue : what it is of the first species.
+    constants (3,) with evidence within a factor e^10. isotopologue : name, if it is an isotopologue of the first species.
     """
 
     grown: Grown
@@ -39,7 +39,7 @@ class AssignedSpecies:
 
     @property
     def word(self) -> str:
-        """certain or likely."""
+        """The confidence as a word: certain or likely."""
         return word(self.probability)
 
     @property
@@ -63,13 +63,13 @@ class AssignedSpecies:
 
     @property
     def dipole_ratio(self) -> Floats:
-        """|μa|, |μb|, |μc| over the largest of them (3,): intensities go with μ²."""
+        """|μa|, |μb|, |μc| relative to the largest (3,), from intensities ∝ μ²."""
         scales = np.where(self.grown.ratios > LEAST_RATIO, self.grown.scales, -np.inf)
         return np.asarray(np.exp((scales - scales.max()) / 2))
 
     @property
     def split(self) -> bool:
-        """Whether its lines are split in two."""
+        """Whether the lines are split into doublets."""
         return bool((self.peak[:, 0] != self.peak[:, 1]).mean() > 0.3)
 
     @property
@@ -79,7 +79,7 @@ class AssignedSpecies:
         return Top.from_constants(self.constants, dipole_abc_debye=(a, b, c))
 
     def facts(self) -> dict[str, Any]:
-        """Everything but the lines."""
+        """The facts of the species, without its lines."""
         constants, errors = self.refined.values.tolist(), self.refined.errors.tolist()
         return {
             "word": self.word,
@@ -104,7 +104,7 @@ class AssignedSpecies:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AssignedPeaks(Table):
-    """The peaks of a spectrum: to which species each belongs (0: none), its first line and what this is calculated at."""
+    """The peaks of a spectrum: species of each (0: none), its first line, and the calculated frequency of that line."""
 
     frequency_mhz: Floats
     intensity: Floats
@@ -117,12 +117,12 @@ class AssignedPeaks(Table):
 
     @property
     def residual_mhz(self) -> Floats:
-        """Observed minus calculated (n,); nan where no line is assigned."""
+        """Observed minus calculated (n,); nan for unassigned peaks."""
         return self.frequency_mhz - self.calculated_mhz
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """All columns; -1 and nan where no line is assigned."""
+        """All columns; -1 and nan for unassigned peaks."""
         labels = {
             f"{name}_{side}": getattr(self, side)[:, n]
             for side in ("upper", "lower")
@@ -137,10 +137,10 @@ class AssignedPeaks(Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AssignAnswer(TextOf):
-    """Species by falling strength, and which peaks nothing explains.
+    """Species by decreasing strength, and unexplained peaks.
 
-    unexplained, spurs (n,) : peaks of the request that belong to no species, and harmonics of a clock. ended : whether the search was ended
-    by its seconds.
+    unexplained, spurs (n,) : peaks of the request without a species, and harmonics of a clock. ended : whether the time limit ended
+    the search.
     """
 
     shown = "table"
@@ -153,12 +153,12 @@ class AssignAnswer(TextOf):
 
     @property
     def word(self) -> str:
-        """How sure the first species is: certain, likely or not found."""
+        """The confidence of the first species: certain, likely or not found."""
         return self.species[0].word if self.species else NOT_FOUND
 
     @property
     def table(self) -> AssignedPeaks:
-        """Every peak with its assignment."""
+        """All peaks with their assignments."""
         peaks = self.request.peaks
         size = len(peaks)
         species, calculated = np.zeros(size, dtype=np.int64), np.full(size, np.nan)
@@ -175,7 +175,7 @@ class AssignAnswer(TextOf):
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the frequencies of the first species can be trusted, given that its assignment is right."""
+        """Error budget of the frequencies of the first species, assuming that its assignment is right."""
         from rotor.fitting.budgets import predictions_budget
 
         quantity = "frequencies of the first species"
@@ -188,7 +188,7 @@ class AssignAnswer(TextOf):
         return replace(budget, of=quantity, model=replace(budget.model, source=right))
 
     def facts(self) -> dict[str, Any]:
-        """Everything but the table of peaks."""
+        """The facts of the answer, without the table of peaks."""
         return {
             "errors": self.errors.as_json(),
             "word": self.word,

@@ -1,4 +1,4 @@
-"""Lines that are split in two, by tunnelling or a nucleus, seen as one: the centres of near peaks of like height."""
+"""Doublets from tunnelling or a nucleus, replaced by their centres: pairs of close peaks of similar height."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from rotor.arrays import Ints
 from rotor.assignment.peaks import PeakList
 
 WIDEST_MHZ = 3.0
-UNLIKE = 2.5  # ratio of the intensities of two peaks that are not a doublet
+UNLIKE = 2.5  # smallest ratio of intensities of two peaks that are not a doublet
 
 
 def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
-    """The peaks and the centres of all doublets among them, and (n, 2) the peaks behind each; equal for a single peak.
+    """The peaks and the centres of all doublets, and (n, 2) their constituent peaks (equal for a single peak).
 
-    alone : of the single peaks only those that are in no doublet.
+    alone : omit single peaks that are part of a doublet.
 
-    A centre has the summed intensity. With unequal shares the centre is not the centre of gravity; its standard error then gets a
-    hundredth of the splitting.
+    A centre has the summed intensity. For unequal intensities the midpoint is not the centre of gravity; a hundredth of the splitting
+    is then added to its standard error.
     """
     f, height = peaks.frequency_mhz, peaks.intensity
     members = [np.column_stack([np.arange(len(f)), np.arange(len(f))])]

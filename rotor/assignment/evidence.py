@@ -25,13 +25,13 @@ def probability(grown: Grown) -> float:
     """Probability that the constants of a species are right."""
     if grown.lines < FEWEST:
         return 0.0
-    known = 1.0 if grown.determined else UNDETERMINED
+    factor = 1.0 if grown.determined else UNDETERMINED
     odds = float(max(grown.evidence, 0.0) / MIDDLE) ** POWER
-    return float(known * CEILING * odds / (1 + odds))
+    return float(factor * CEILING * odds / (1 + odds))
 
 
 def probability_of_isotopologue(grown: Grown) -> float:
-    """Probability that the constants of an isotopologue are right, whose evidence counts from a volume of constants that is small."""
+    """Probability that the constants of an isotopologue are right; its prior volume of constants is small."""
     return float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE_OF_ISOTOPOLOGUES) / 2.0, -50, 50))))
 
 

@@ -1,8 +1,8 @@
-"""Families of three lines to try: those that most tops have among their strongest lines in the band.
+"""Families of three lines to try, chosen so that most tops have one among their strongest lines in the band.
 
-A sample of tops within the bounds is drawn; for each, the strongest lines of a type in the band are known. A family is three of
-them that determine A, B and C well enough to predict the others. Families are ordered so that each next one is among the strongest
-lines of as many tops as possible that the ones before do not serve (greedy cover).
+Tops are sampled within the bounds, and the strongest lines of each type in the band are computed. A family is a set of three of these
+lines that determines A, B and C well enough to predict the others. Families are ordered by greedy cover: each next family belongs to the
+strongest lines of as many tops as possible that no preceding family covers.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from rotor.arrays import Floats, Ints
 from rotor.assignment._kernels import MIXED, strongest_lines
 from rotor.assignment.rigid_table import RigidTable
 
-STRONGEST = 7  # lines of a type from which families are chosen
+STRONGEST = 7  # strongest lines of a type from which families are formed
 COMPANIONS = 16  # lines that a family predicts
-LARGEST_ERROR = 4.0  # of a predicted line, in errors of the family's lines
+LARGEST_ERROR = 4.0  # largest error of a predicted line, in errors of the family's lines
 FEWEST_COMPANIONS = 4
 SMALLEST_DETERMINANT = 1e-4  # of the derivatives of a family's lines by A, B, C
-SAME_PEAK_MHZ = 0.3  # nearer lines are one peak
+SAME_PEAK_MHZ = 0.3  # closer lines form one peak
 SAMPLES, MOST = 2000, 1500
 MIXED_WORTH = 0.5  # of a top with lines of several types, over one with lines of a type
 WEAKEST_DIPOLE = 0.1  # component over the largest, of families of lines of several types
 PLACES = 4  # of a top: types a, b, c, and all of them
-LEAST_GAIN = 0.3  # tops that the last family serves anew
-DECAY = 0.45  # what another family is worth for a top that a family serves already
+LEAST_GAIN = 0.3  # smallest number of newly covered tops for a further family
+DECAY = 0.45  # weight of a second family for a top that is covered already
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Three lines by their rows in the table, those they predict, the share of sampled tops that they serve; kind: a, b, c or several."""
+    """Three lines by their rows in the table, the lines they predict, the covered share of sampled tops; kind: a, b, c or several."""
 
     kind: int
     lines: Ints
@@ -54,7 +54,7 @@ class Bounds:
         return np.column_stack([self.low, self.high]).ravel()
 
     def points(self, kappa: Floats) -> slice:
-        """Part of a rising grid of κ = (2B-A-C)/(A-C) that the bounds leave; κ rises with B and falls with A and C."""
+        """The part of an increasing grid of κ = (2B-A-C)/(A-C) within the bounds; κ increases with B and decreases with A and C."""
         (a, b, c), (a2, b2, c2) = self.low, self.high
         lowest = (2 * b - a2 - c2) / (a2 - c2) if a2 > c2 else -1.0
         highest = (2 * b2 - a - c) / (a - c) if a > c else 1.0
@@ -92,7 +92,7 @@ def families(
     samples: int = SAMPLES,
     most: int = MOST,
 ) -> list[Family]:
-    """Families in the order in which to try them.
+    """Families of lines in the order in which to try them.
 
     Parameters
     ----------
@@ -106,12 +106,12 @@ def families(
     rng : numpy Generator
         Draws the tops.
     samples, most : int
-        Tops, and families at most.
+        Number of sampled tops, and largest number of families.
 
     Returns
     -------
     list of Family
-        Those that serve the most tops first.
+        Ordered by greedy cover: families that cover most tops first.
     """
     tops = sample_tops(bounds, samples, rng)
     temperatures = np.exp(rng.uniform(np.log(temperature_k[0]), np.log(temperature_k[1]), len(tops)))
@@ -125,7 +125,7 @@ def families(
 
 
 def _members(table: RigidTable, rows: Ints, slopes: Floats) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """Families of each sampled top and type: lines (members, 3), the place 4 top + type, all lines and which of them are predicted."""
+    """Families of each sampled top and type: lines (members, 3), index 4 top + type, all lines, and which of them are predicted."""
     lines, slopes = rows.reshape(-1, COMPANIONS), slopes.reshape(-1, COMPANIONS, 3)
     enough = np.flatnonzero((lines >= 0).sum(axis=1) >= 3 + FEWEST_COMPANIONS)
     picks = np.array(list(combinations(range(STRONGEST), 3)))
@@ -171,12 +171,12 @@ def _cover(
 
 
 def _mixed(table: RigidTable, lines: Ints, kind: int) -> bool:
-    """Whether more than a third of lines are of another type than one."""
+    """Whether more than a third of the lines have another type than `kind`."""
     return bool((table.kind[lines] != kind).mean() > 1 / 3) if len(lines) else False
 
 
 def _family(table: RigidTable, chosen: Ints, lines: Ints, good: NDArray[np.bool_], share: float) -> Family:
-    """A family with the lines that it predicts in most tops, strong ones before weak ones."""
+    """A family with the lines that it predicts in most tops, strongest first."""
     weight = 1.0 / (4 + np.broadcast_to(np.arange(lines.shape[1]), lines.shape))
     useful = good & ~np.isin(lines, chosen)
     line, which = np.unique(lines[useful], return_inverse=True)

@@ -1,8 +1,9 @@
-"""From a root to a species: lines are added in the order in which they can be predicted, until none is left.
+"""From a root to a species: lines are added as they become predictable, until none is left.
 
-Constants c = (A, B, C, quartic) have a Gaussian state of knowledge: a-priori errors of the quartic ones, then least squares with the
-matched lines. A predicted line has the standard error √(gᵀCg + σ²), g = ∂ν/∂c; it takes the peak within 3.5 of them whose intensity
-fits, where chance would seldom put one. Each round refits; errors fall, and further lines come into reach.
+The constants c = (A, B, C, quartic) have a Gaussian distribution with covariance C: a-priori errors of the quartic ones, then least
+squares with the matched lines. A predicted line has the standard error √(gᵀCg + σ²), g = ∂ν/∂c. It is matched to a peak of suitable
+intensity within 3.5 standard errors if a chance match is unlikely. Each round refits; the errors decrease, and further lines can be
+matched.
 """
 
 from __future__ import annotations
@@ -16,28 +17,28 @@ from rotor.assignment import _kernels
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
 from rotor.units import MHZ_PER_K
 
-SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrations from which a priori sizes of quartic constants follow
+SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrational wavenumber for the a-priori sizes of quartic constants
 ROUNDS = 24
 WINDOW = 3.5  # standard errors
-LEAST_RATIO = 3.0  # ln of the likelihood ratio of a type from which it counts as present
-FEW, CHANCE_OF_FEW = 12, 0.25  # chance peaks in a window above which a line is not taken, while few lines are assigned
-FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # later on, rising from round to round: safe lines first
-SMALLEST_MHZ = 0.003  # standard error of a peak, at least
-BLENDED_MHZ = 0.08  # predicted lines nearer than this are one peak
+LEAST_RATIO = 3.0  # ln of the likelihood ratio above which a type counts as present
+FEW, CHANCE_OF_FEW = 12, 0.25  # largest number of chance peaks in a window while few lines are assigned
+FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # this limit with more lines, increasing by round: safe lines first
+SMALLEST_MHZ = 0.003  # smallest standard error of a peak
+BLENDED_MHZ = 0.08  # predicted lines closer than this form one peak
 TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
 LEAST_SHARE = (
-    0.1  # of a line in a peak from which it is assigned: the place of a weaker one is not measured by the peak
+    0.1  # smallest share of a peak for an assigned line; the peak does not measure the frequency of a weaker one
 )
 MOST_LINES = 400
-OPEN = 1e-3  # relative standard error from which a constant is not known
+OPEN = 1e-3  # relative standard error above which a constant is not determined
 FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
 LARGER = (10.0, 40.0)  # factors of the errors when a species is grown again
-SHARP_MHZ = 0.03  # standard error of predicted lines that tell the temperature
+SHARP_MHZ = 0.03  # largest standard error of predicted lines used for the temperature
 
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Lines of all types in the band at some constants: row in the table, frequency, ln of relative intensity, type, lower energy."""
+    """Predicted lines of all types in the band: row in the table, frequency, ln of relative intensity, type, lower energy."""
 
     row: Ints
     frequency: Floats
@@ -48,12 +49,12 @@ class Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """A species as far as lines could be added.
+    """A species with all lines that could be matched.
 
     constants (8,), covariance (8, 8) in MHz: A, B, C, DJ, DJK, DK, d1, d2. temperature_k. ratios (3,), scales (3,) by type: ln of
     likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks,
     obs - calc in MHz, share in the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
-    start : the root that it was grown from.
+    start : the root from which it was grown.
     """
 
     constants: Floats
@@ -72,7 +73,7 @@ class Grown:
 
     @property
     def determined(self) -> bool:
-        """Whether B and C are known to 0.1 %; lines of Q branches alone leave A + C open, and what is a twin."""
+        """Whether B and C are known to 0.1 %. Q branches alone do not determine A + C, so that twins are possible."""
         errors = np.sqrt(np.diag(self.covariance)[1:3])
         return bool((errors < OPEN * self.constants[1:3]).all())
 
@@ -100,7 +101,7 @@ def quartic_prior(field: Field, constants: Floats) -> tuple[Floats, Floats]:
 
 
 def prior_weight(field: Field, constants: Floats, sizes: Floats) -> Floats:
-    """1/σ² of all constants (8, 8) before any line is assigned: A, B, C to 5 % where nothing else is known."""
+    """1/σ² of all constants (8, 8) before any line is assigned; A, B, C to 5 % by default."""
     spread = 0.05 * constants[:3] if field.spread is None else field.spread
     return np.diag(1 / np.concatenate([spread, sizes]) ** 2)
 
@@ -133,7 +134,7 @@ def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
 
 
 def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
-    """The species that a candidate leads to; None where its constants run out of order."""
+    """Grow a species from a candidate; None if its constants leave the order A > B > C."""
     centre, sizes = quartic_prior(field, start.constants)
     constants = np.concatenate([start.constants, centre])
     prior = prior_weight(field, constants, sizes)
@@ -143,9 +144,9 @@ def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
 
 
 def regrown(field: Field, species: Grown) -> Grown:
-    """The species grown again from its constants with larger errors, where that gives more evidence.
+    """The species grown again from its constants with larger errors, if that increases the evidence.
 
-    Lines that were taken too early and hold others off are given up that way.
+    This removes lines that were matched too early and exclude others.
     """
     return max([species, *grown_anew(field, species)], key=lambda rival: rival.evidence)
 
@@ -202,7 +203,7 @@ class _Matched:
 
 
 def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0: float) -> float:
-    """The temperature with the greatest likelihood ratio, of the fixed ones or of a grid."""
+    """The temperature with the largest likelihood ratio, among the given ones or on a grid."""
     if len(field.temperatures) == 1:
         return float(field.temperatures[0])
     lines = predict(field, constants, TEMPERATURES[-1], 4000)
@@ -227,7 +228,7 @@ def _variances(slopes: Floats, covariance: Floats) -> Floats:
 
 
 def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
-    """Standard errors of predicted lines: of the constants and of a measurement."""
+    """Standard errors of predicted lines, from the constants and from the measurement."""
     return np.asarray(np.sqrt(_variances(slopes, covariance) + sigma0**2))
 
 
@@ -255,7 +256,7 @@ def _matched(
     most_chance: float,
     before: Grown | None,
 ) -> _Matched | None:
-    """Lines that take a peak."""
+    """The lines matched to peaks."""
     _, ratios, scales, _, _ = _ratios(field, constants, covariance, temperature_k, sigma0)
     if not (ratios > LEAST_RATIO).any():
         return None
@@ -272,10 +273,10 @@ def _matched(
 
 @dataclass(frozen=True, eq=False)
 class Merged:
-    """Predicted lines of all types that are seen as peaks.
+    """Predicted lines of all types, merged into peaks.
 
-    row, share, blend (lines,) : in the table, share in the peak, which peak. centre, height, main (peaks,), slope (peaks, 8) : frequency,
-    ln of the intensity, row of the strongest line, ∂ν/∂c
+    row, share, blend (lines,) : row in the table, share in the peak, index of the peak. centre, height, main (peaks,), slope (peaks, 8) :
+    frequency, ln of the intensity, row of the strongest line, ∂ν/∂c
     """
 
     row: Ints
@@ -290,7 +291,7 @@ class Merged:
 def merged_lines(
     field: Field, constants: Floats, temperature_k: float, scales: Floats, most: int = MOST_LINES
 ) -> Merged:
-    """Lines above the threshold, those nearer than the width of a peak as one."""
+    """Lines above the threshold; those closer than the width of a peak are merged."""
     lines = predict(field, constants, temperature_k, most)
     level = lines.expected + scales[lines.kind]
     selected = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
@@ -314,7 +315,7 @@ def merged_lines(
 def _predicted_by_others(
     field: Field, before: Grown | None, rows: Ints, centre: Floats, variance: Floats
 ) -> tuple[Floats, Floats]:
-    """Predictions of lines and their variances without what the lines themselves added in the last round.
+    """Predictions of lines and their variances, without the lines' own contributions in the last round.
 
     An observation of weight w has leverage h = w g C gᵀ; without it the variance is g C gᵀ/(1-h) and the prediction moves by
     -r h/(1-h) (R. D. Cook and S. Weisberg, Residuals and Influence in Regression (1982), section 2.2).
@@ -328,7 +329,7 @@ def _predicted_by_others(
 
 
 def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_chance: float) -> Ints:
-    """The peak that each line takes (lines,), -1 for none."""
+    """The peak matched to each line (lines,), or -1."""
     peaks = field.peaks
     f = peaks.frequency_mhz
     window = WINDOW * errors
@@ -347,7 +348,7 @@ def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_
 
 
 def _without_doubles(chosen: Ints, height: Floats) -> Ints:
-    """Each peak by one line only: the strongest that takes it."""
+    """Match each peak to one line only, the strongest."""
     out = chosen.copy()
     for peak in np.flatnonzero(np.bincount(chosen[chosen >= 0], minlength=1) > 1).tolist():
         rivals = np.flatnonzero(chosen == peak)
@@ -365,7 +366,7 @@ def _refitted(
     sigma0: float,
     start: Candidate,
 ) -> tuple[Floats, Floats, float, Grown]:
-    """One step of weighted least squares, with weights that fall for far lines."""
+    """A step of weighted least squares; distant lines have lower weights."""
     peaks = field.peaks
     energy = np.empty(len(field.jj))
     _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
@@ -378,8 +379,8 @@ def _refitted(
     slope = np.zeros((len(peak), slopes.shape[1]))
     np.add.at(slope, group, share[:, None] * slopes)
     residual = peaks.frequency_mhz[peak] - centre
-    known = np.maximum(peaks.uncertainty_mhz[peak], SMALLEST_MHZ)
-    sigma = np.maximum(known, sigma0 / 1.5)
+    peak_errors = np.maximum(peaks.uncertainty_mhz[peak], SMALLEST_MHZ)
+    sigma = np.maximum(peak_errors, sigma0 / 1.5)
     weight = 1 / (sigma**2 * (1 + (residual / (2.4 * sigma)) ** 2))
     normal = slope.T @ (weight[:, None] * slope) + prior
     pull = slope.T @ (weight * residual)
@@ -388,7 +389,7 @@ def _refitted(
     new = constants + covariance @ pull
     after = residual - slope @ (new - constants)
     scatter = 1.4826 * float(np.median(np.abs(after))) * np.sqrt(len(peak) / max(len(peak) - 4, 1.0))
-    sigma0 = float(np.clip(max(scatter, np.median(known)), SMALLEST_MHZ, sigma0))
+    sigma0 = float(np.clip(max(scatter, np.median(peak_errors)), SMALLEST_MHZ, sigma0))
     grown = Grown(
         new, covariance, temperature, matched.ratios, matched.scales, matched.rows, matched.peak, after[group], matched.share,
         weight[group],
@@ -398,11 +399,11 @@ def _refitted(
 
 
 def with_evidence(field: Field, grown: Grown) -> Grown:
-    """The species with its evidence against chance.
+    """Add the evidence against chance to a species.
 
-    ln Z = ln L/L₀ - ½ Σ (c/σ_prior)² + ½ ln det(C/σ_prior²) of the quartic constants, and of A, B, C in place of a Gaussian prior
-    the volume of the bounds: - ln V + ½ ln det(2π C) (Laplace's approximation; D. J. C. MacKay, Information Theory,
-    Inference, and Learning Algorithms (2003), eq. 28.10).
+    ln Z = ln L/L₀ - ½ Σ (c/σ_prior)² + ½ ln det(C/σ_prior²) for the quartic constants; for A, B, C the prior is uniform in the volume V
+    of the bounds, which gives - ln V + ½ ln det(2π C) (Laplace's approximation; D. J. C. MacKay, Information Theory, Inference, and
+    Learning Algorithms (2003), eq. 28.10).
     """
     sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
     lines = predict(field, grown.constants, grown.temperature_k, 120)
@@ -437,7 +438,7 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
 
 
 def _joint_ratio(field: Field, grown: Grown, scales: Floats, sigma0: float) -> float:
-    """ln of the likelihood ratio of the lines of all types, those of a peak as one, each peak by one line only."""
+    """ln of the likelihood ratio of the lines of all types; lines of a peak are merged, and each peak is matched once."""
     merged = merged_lines(field, grown.constants, grown.temperature_k, scales)
     order = np.argsort(-merged.height, kind="stable")
     peaks = field.peaks

@@ -7,11 +7,11 @@ from typing import Any
 from rotor.requests.readers import Numbers
 
 PREFIX = "SMILES:"
-WORST = 0.03  # median relative error of the constants of a geometry up to which it is a guess
+WORST = 0.03  # largest median relative error of the constants of a geometry that serves as a guess
 
 
 def guess_values(guess: Any) -> tuple[float, ...]:
-    """A, B, C (MHz) of a guess, of several behind each other: numbers, or `SMILES:...` with the constants of its conformers."""
+    """A, B, C (MHz) of one or several guesses, concatenated: numbers, or the constants of the conformers of `SMILES:...`."""
     if isinstance(guess, str) and guess.startswith(PREFIX):
         return constants_of_smiles(guess.removeprefix(PREFIX))
     values = Numbers("MHz", (), "2458,490,409").read(guess)
@@ -21,9 +21,9 @@ def guess_values(guess: Any) -> tuple[float, ...]:
 
 
 def constants_of_smiles(text: str) -> tuple[float, ...]:
-    """A, B, C (MHz) of the conformers of a SMILES within 10 kJ/mol of the lowest, one behind the other.
+    """A, B, C (MHz) of the conformers of a SMILES within 10 kJ/mol of the lowest, concatenated.
 
-    Raises ValueError where the force field is known to fail by more than 3 %, and for a molecule that is no asymmetric top.
+    Raises ValueError if the error of the force field exceeds 3 %, and for a molecule that is not an asymmetric top.
     """
     from rotor.molecules.readers.smiles import NEAR_KJ_PER_MOL, conformers
     from rotor.tops.top import Top

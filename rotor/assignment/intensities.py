@@ -1,12 +1,12 @@
 """Temperature and dipole ratios from the heights of peaks at the lines of known constants.
 
-A line of type q (a, b, c) has the height I = s_q S ν² exp(-E″/kT), with hν ≪ kT, S of the dipole that was given. So
+A line of type q (a, b, c) has the height I = s_q S ν² exp(-E″/kT) for hν ≪ kT, with S from the given dipole. So
 
     ln I - ln(S ν²) = ln s_q - E″/kT
 
 is linear in ln s_a, ln s_b, ln s_c and 1/T; it is fitted with Huber's weights (P. J. Huber, Ann. Math. Statist. 35, 73 (1964)), since
-some peaks are blends. The dipole components are those given times √s_q. A type
-of which less than half of the lines that ought to be seen have a peak is absent: its peaks are chance.
+some peaks are blends. The dipole components are the given ones times √s_q. If less than half of the lines of a type that should be
+visible have a peak, the type is absent: its peaks are chance matches.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from rotor.assignment.peaks import PeakList
 from rotor.spectra.lines import Lines
 from rotor.units import MHZ_PER_K
 
-NEAR_MHZ = 0.1  # of a peak to its line, or three errors of the peak
-APART_MHZ = 0.3  # lines nearer to each other than this are a blend, and left out
+NEAR_MHZ = 0.1  # largest distance of a peak from its line, or three errors of the peak
+APART_MHZ = 0.3  # lines closer than this are a blend and are left out
 STRONGEST = 300  # lines that are looked for
-HUBER = 1.5  # standard deviations beyond which a line counts less
-LEAST_SPREAD = 1.0  # of E″/k over the lines, K: less tells no temperature
+HUBER = 1.5  # standard deviations beyond which the weight of a line decreases
+LEAST_SPREAD = 1.0  # smallest range of E″/k (K) that determines a temperature
 LEAST_LINES = 5
 CLEARLY, LEAST_SEEN = (
     2.0,
@@ -35,10 +35,10 @@ TURNS = 30
 
 @dataclass(frozen=True, eq=False)
 class Intensities:
-    """What heights tell: temperature with its error (K; nan where they tell none), |μa|, |μb|, |μc| over the largest, lines and scatter.
+    """Results from intensities: temperature and error (K; nan if not determined), |μa|, |μb|, |μc| relative to the largest.
 
-    line, peak (n,) : the lines that were compared and their peaks. scatter : of ln I, standard deviation. log_scale (3,) : ln s of each
-    type, -inf for one without a line.
+    line, peak (n,) : the compared lines and their peaks. scatter : standard deviation of ln I. log_scale (3,) : ln s of each type, -inf
+    without lines.
     """
 
     temperature_k: float
@@ -50,7 +50,7 @@ class Intensities:
     log_scale: Floats
 
     def heights(self, lines: Lines) -> Floats:
-        """Heights of lines in the units of the peaks; at the temperature of the lines where the peaks tell none."""
+        """Heights of lines in the units of the peaks; at the temperature of the lines if the peaks do not determine one."""
         temperature = self.temperature_k if np.isfinite(self.temperature_k) else lines.temperature_k
         scale = self.log_scale[types_of(lines, np.arange(len(lines)))]
         below = lines.levels.energy_mhz[lines.lower] - lines.levels.energy_mhz.min()
@@ -60,7 +60,7 @@ class Intensities:
 
 
 def matched(lines: Lines, peaks: PeakList) -> tuple[Ints, Ints]:
-    """Strong single lines, and the peak of each; -1 where there is none."""
+    """Strong single lines and their peaks; -1 without a peak."""
     order = np.argsort(-lines.intensity_nm2_mhz, kind="stable")[:STRONGEST]
     rows = np.sort(order)
     f = lines.frequency_mhz[rows]
@@ -84,12 +84,12 @@ def types_of(lines: Lines, rows: Ints) -> Ints:
 
 
 def fit_intensities(lines: Lines, peaks: PeakList) -> Intensities:
-    """Temperature and dipole ratios from the peaks at lines.
+    """Fit temperature and dipole ratios to the heights of peaks at lines.
 
     Parameters
     ----------
     lines : Lines
-        With a dipole that has every component to be fitted.
+        Lines computed with a dipole that has all components to be fitted.
     peaks : PeakList
 
     Returns

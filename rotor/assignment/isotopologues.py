@@ -1,8 +1,8 @@
 """Isotopologues of a species in natural abundance, from its constants and a geometry.
 
-Constants of an isotopologue are those of the parent times the ratio that the geometry gives (`rotor.tops.isotopes`); errors of the
-geometry cancel but for some per mille. Within that distance threes of the strongest lines are laid on peaks of the expected height;
-each gives shifts of A, B, C, which all visible lines then judge. Dipole, temperature and quartic constants are the parent's.
+The constants of an isotopologue are those of the parent times the ratio from the geometry (`rotor.tops.isotopes`), in which errors of
+the geometry cancel within some per mille. In this range, triples of the strongest lines are matched to peaks of the expected height; each
+gives shifts of A, B, C, which are judged by all visible lines. Dipole, temperature and quartic constants are those of the parent.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from rotor.tops.isotopes.isotopologues import isotopologues
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
-SHIFT_ERROR = 0.03  # of the shift of a constant: of a geometry whose bond lengths are right to 1 %
+SHIFT_ERROR = 0.03  # relative error of the shift of a constant, for bond lengths within 1 %
 MOMENT_ERROR = 0.05  # u Å², of the change of a moment of inertia: 2 Δm r δr for 1 u at 1.5 Å, known to 0.016 Å
-TYPICAL = 0.5  # deviation of constants in these errors, which are wide: 0.35 in benchmarks/isotopologue_cases.py
+TYPICAL = 0.5  # typical deviation in units of these generous errors (0.35 in benchmarks/isotopologue_cases.py)
 LEAST_ABUNDANCE = 1e-3
-LOG_HEIGHT = 1.2  # of peaks about the expected height that are tried
-ROUGH_MHZ = 0.05  # standard error of lines of the parent's distortion
+LOG_HEIGHT = 1.2  # range of trial peaks about the expected height
+ROUGH_MHZ = 0.05  # standard error of lines because of the parent's distortion constants
 MOST_LINES, MOST_OF_TRIPLES, TRIPLES, MOST_SHIFTS, GROWN = 30, 9, 84, 2000, 6
-LEAST_OF_SHIFT = 3.0  # ln of the likelihood ratio of a shift that is grown
+LEAST_OF_SHIFT = 3.0  # smallest ln of the likelihood ratio of a shift that is grown
 SAME_SPECIES = 3e-5  # relative difference of constants of one species
-ENOUGH = 8.0  # evidence above which an isotopologue is reported; its constants are nearly known
+ENOUGH = 8.0  # smallest evidence of a reported isotopologue; low, because its constants are nearly known
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """An isotopologue to look for: its name, constants (3,) in MHz with their errors, and abundance over the parent's."""
+    """An expected isotopologue: name, constants (3,) in MHz with errors, abundance relative to the parent."""
 
     label: str
     constants: Floats
@@ -50,7 +50,7 @@ class Expected:
 def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]:
     """Singly substituted species of a molecule at natural abundance, the most abundant first.
 
-    Raises ValueError where the geometry's constants are more than a fifth away from those of the parent.
+    Raises ValueError if the constants of the geometry differ from those of the parent by more than a fifth.
     """
     top = Top.from_molecule(molecule)
     computed = np.array([top.constants[name] for name in "ABC"]) if top.kind == "asymmetric" else np.zeros(3)
@@ -74,10 +74,10 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
 def find_isotopologues(
     peaks: PeakList, parent: Grown, expected: list[Expected], table: RigidTable, over: Callable[[], bool]
 ) -> list[tuple[Expected, Grown]]:
-    """Isotopologues among peaks, the one with the most evidence first.
+    """Isotopologues among peaks, by decreasing evidence.
 
-    Windows of several isotopologues overlap, so that each may lead to the lines of another. Every species that is met is given to one
-    isotopologue, such that the sum of squared deviations of A, B, C from those expected, in their errors, is least.
+    The windows of isotopologues overlap, so that the search for one may find the lines of another. The species are assigned to
+    isotopologues so that the sum of squared deviations of A, B, C from the expected values, in units of their errors, is minimal.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -105,7 +105,7 @@ def find_isotopologues(
 
 
 def _score(expected: Expected, grown: Grown, parent: Grown) -> float:
-    """Evidence less half the squared deviation from the expected constants; 0 for a species that cannot be this isotopologue."""
+    """Evidence minus half the squared deviation from the expected constants; 0 for a species that cannot be this isotopologue."""
     off = (grown.constants[:3] - expected.constants) / expected.errors
     if np.abs(off).max() > 4 or not _like(grown, parent.scales + np.log(expected.abundance)):
         return 0.0
@@ -113,7 +113,7 @@ def _score(expected: Expected, grown: Grown, parent: Grown) -> float:
 
 
 def candidates(peaks: PeakList, parent: Grown, expected: Expected, table: RigidTable) -> list[Grown]:
-    """Species near the expected constants of an isotopologue that stand above chance."""
+    """Significant species near the expected constants of an isotopologue."""
     bounds = Bounds(expected.constants - 3 * expected.errors, expected.constants + 3 * expected.errors)
     seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants, expected.errors)
     scales = parent.scales + np.log(expected.abundance)
@@ -146,7 +146,7 @@ def candidates(peaks: PeakList, parent: Grown, expected: Expected, table: RigidT
 
 
 def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
-    """Threes of visible lines that determine the shifts of the constants, strong and independent ones first."""
+    """Triples of visible lines that determine the shifts of the constants; strong and independent triples first."""
     chosen = []
     for three in combinations(range(min(len(visible), MOST_OF_TRIPLES)), 3):
         rows = visible[list(three)]
@@ -174,7 +174,7 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> 
 
 
 def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:
-    """ln of the likelihood ratio of the visible lines moved by a shift of the constants."""
+    """ln of the likelihood ratio of the visible lines at shifted constants."""
     centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
     value = _kernels.joint_ratio(
         centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,
@@ -184,13 +184,13 @@ def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> floa
 
 
 def _like(grown: Grown, scales: Floats) -> bool:
-    """Whether the intensities are those of the abundance within a factor of three."""
+    """Whether the intensities agree with the abundance within a factor of three."""
     strongest = int(np.argmax(scales))
     return bool(abs(grown.scales[strongest] - scales[strongest]) < np.log(3.0))
 
 
 def _within(grown: Grown, bounds: Bounds) -> bool:
-    """Whether the constants stayed where they were expected."""
+    """Whether the constants are within the expected bounds."""
     margin = bounds.high - bounds.low
     return bool(
         (grown.constants[:3] > bounds.low - margin).all() and (grown.constants[:3] < bounds.high + margin).all()

@@ -10,9 +10,9 @@ from rotor.requests.plan import Plan
 
 
 def plan_of_assign(request: Any) -> Plan:
-    """What a search for constants will do; its time is bounded by the seconds of the request."""
+    """The plan of a search for constants; its time is bounded by the seconds of the request."""
     peaks = request.peaks
-    known = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
+    temperature = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
     bounds = request.bounds
     limits = ", ".join(
         f"{name} {low:g} to {high:g}" for name, low, high in zip("ABC", bounds.low, bounds.high, strict=True)
@@ -24,7 +24,7 @@ def plan_of_assign(request: Any) -> Plan:
         parts=(
             ("method", "families of three lines on the strongest peaks, evidence against chance, refinement by a fit"),
             ("bounds", f"{limits} MHz"),
-            ("temperature", known),
+            ("temperature", temperature),
         ),
         counts={"peaks": len(peaks), "species": request.species},
         seconds=float(min(request.seconds, 1.0 + request.species)),

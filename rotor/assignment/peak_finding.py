@@ -1,6 +1,6 @@
 """Peaks of a spectrum on a grid: noise, local maxima of the smoothed spectrum, and a parabola through the logarithm of each.
 
-The noise is 1.4826 times the median of |x_(k+1) - x_k|/√2 in windows, so that neither lines nor a slow baseline count. The width w of lines
+The noise is 1.4826 times the median of |x_(k+1) - x_k|/√2 in windows, which lines and a slow baseline hardly affect. The width w of lines
 (standard deviation of a Gaussian) is that of the strongest ones. The spectrum is smoothed with a Gaussian of that width, the filter
 matched to the lines; maxima above six times its noise are peaks, and a parabola through the logarithms of three points, exact for a
 Gaussian, gives the centre. With white noise σ, steps Δ and height h the matched filter places a line within
@@ -17,10 +17,10 @@ from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList, peak_list
 
 THRESHOLD = 6.0  # times the noise
-WINDOW = 4096  # points over which the noise is one number
-SMALLEST_MHZ = 0.001  # standard error of a centre: what a parabola through three points is good to
+WINDOW = 4096  # points in a window with constant noise
+SMALLEST_MHZ = 0.001  # smallest standard error of a centre: accuracy of a parabola through three points
 MOST_PEAKS = 20_000
-STRONGEST = 30  # peaks that tell the width
+STRONGEST = 30  # strongest peaks that determine the width
 
 
 def noise_of(intensity: Floats) -> Floats:
@@ -36,7 +36,7 @@ def noise_of(intensity: Floats) -> Floats:
 def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: str = "") -> PeakList:
     """Peaks of a spectrum.
 
-    Raises ValueError for frequencies that do not rise in equal steps, for fewer than two peaks, and for more than 20,000.
+    Raises ValueError for frequencies that do not increase in equal steps, for fewer than two peaks, and for more than 20,000.
 
     >>> f = np.arange(6000.0, 6100.0, 0.02)
     >>> lines = sum(np.exp(-(((f - f0) / 0.06) ** 2)) for f0 in (6020.011, 6071.3))

@@ -20,10 +20,10 @@ LOG_WIDTH = 0.35  # of the kernel that estimates the density of ln intensity
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PeakList(Table):
-    """Peaks rising in frequency.
+    """Peaks in order of frequency.
 
-    frequency_mhz, intensity, uncertainty_mhz (n,). band_mhz : first and last frequency recorded. given_windows (k, 2) : parts of the
-    band, where they are known.
+    frequency_mhz, intensity, uncertainty_mhz (n,). band_mhz : first and last recorded frequency. given_windows (k, 2) : recorded parts
+    of the band, if known.
     """
 
     frequency_mhz: Floats
@@ -44,7 +44,7 @@ class PeakList(Table):
 
     @cached_property
     def windows(self) -> Floats:
-        """Parts of the band that were recorded (n, 2), without stretches that are empty though thirty peaks were to be expected."""
+        """Recorded parts of the band (n, 2), without empty stretches in which thirty peaks would be expected."""
         if self.given_windows is not None:
             return self.given_windows
         f = np.concatenate([[self.band_mhz[0]], self.frequency_mhz, [self.band_mhz[1]]])
@@ -56,7 +56,7 @@ class PeakList(Table):
         return np.column_stack([first, last])
 
     def where(self, mask: NDArray[np.bool_]) -> PeakList:
-        """The peaks of a mask."""
+        """The peaks selected by a mask."""
         return replace(
             self,
             frequency_mhz=self.frequency_mhz[mask],
@@ -72,7 +72,7 @@ class PeakList(Table):
 
     @cached_property
     def log_threshold(self) -> float:
-        """ln of the intensity below which peaks are missing: that of the weakest, without stray ones."""
+        """ln of the detection threshold: the intensity of the weakest peak, without outliers."""
         return float(np.quantile(self.log_intensity, 0.02))
 
     @cached_property
@@ -99,7 +99,7 @@ def peak_list(
     uncertainty_mhz : (n,) array or float, optional
         Standard errors of the frequencies; 0.01 MHz by default.
     band_mhz : (float, float), optional
-        First and last frequency that was recorded; by default of the peaks.
+        First and last recorded frequency. Default: those of the peaks.
     source : str
         Named in messages.
 
@@ -146,7 +146,7 @@ def peak_list(
 
 
 def local_density(at: Floats, frequency: Floats, band_mhz: tuple[float, float]) -> Floats:
-    """Peaks per MHz near frequencies: counts in a window of 400 MHz that stays in the band, one peak added."""
+    """Peaks per MHz near frequencies, from counts (plus one) in a window of 400 MHz within the band."""
     first = np.clip(at - DENSITY_WIDTH_MHZ / 2, band_mhz[0], max(band_mhz[0], band_mhz[1] - DENSITY_WIDTH_MHZ))
     last = np.minimum(first + DENSITY_WIDTH_MHZ, band_mhz[1])
     counts = np.searchsorted(frequency, last, side="right") - np.searchsorted(frequency, first)
@@ -164,10 +164,10 @@ def _log_density_of(values: Floats) -> Floats:
 
 
 def spurs(peaks: PeakList) -> NDArray[np.bool_]:
-    """Which peaks are harmonics of a clock: multiples of its frequency, far more of them than chance makes.
+    """Which peaks are harmonics of a clock: more multiples of its frequency than expected by chance.
 
-    For each clock the peaks within 0.03 MHz of multiples are counted; they are spurs where Poisson's probability of so many is below
-    1e-4.
+    For each clock the peaks within 0.03 MHz of multiples are counted; they are spurs if the Poisson probability of this number is
+    below 1e-4.
     """
     out = np.zeros(len(peaks), dtype=bool)
     f = peaks.frequency_mhz

@@ -1,7 +1,7 @@
 """Constants with errors: the assigned lines of a species fitted with the full Hamiltonian by `rotor.fitting`.
 
-Quartic constants that the lines do not determine are held near 0 by a-priori errors of the size they can have
-(`rotor.assignment.growth.quartic_sizes`), so that the errors of A, B, C contain what they may shift.
+Quartic constants that the lines do not determine are restrained to 0 with a-priori errors of their typical size
+(`rotor.assignment.growth.quartic_sizes`), so that the errors of A, B, C include their influence.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rotor.fitting.parameters import parameters
 from rotor.tops.constants import Constants
 
 REJECTED = 5.0  # standard errors beyond which a line does not count
-SCATTERED = 3.0  # scatter of lines over the errors of their peaks, from which the scatter counts
+SCATTERED = 3.0  # ratio of scatter to peak errors above which the scatter replaces the errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Refined:
 
     @property
     def open_constants(self) -> tuple[str, ...]:
-        """Which of A, B, C the lines leave open: known to no better than 0.1 %."""
+        """Which of A, B, C are not determined: relative error above 0.1 %."""
         return tuple(
             name for name, value, error in zip("ABC", self.values, self.errors, strict=False) if error > OPEN * value
         )
@@ -51,18 +51,18 @@ def assigned_lines(grown: Grown, peaks: PeakList, table: RigidTable) -> Assignme
 
 
 def excess_scatter(grown: Grown, peaks: PeakList) -> float:
-    """Scatter (MHz) of the lines beyond the errors of their peaks; 0 where it is less than `SCATTERED` times these.
+    """Scatter (MHz) of the lines in excess of the errors of their peaks; 0 if it is below `SCATTERED` times these.
 
-    Lines of a splitting that is not resolved as doublets scatter alike about the constants; without this they were rejected as
-    outliers until a few lines were left that fit by chance.
+    Lines with an unresolved splitting all scatter about their calculated frequencies. Without this term the fit would reject them as
+    outliers until only a few chance matches are left.
     """
-    known = float(np.median(np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)))
+    peak_error = float(np.median(np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)))
     scatter = 1.4826 * float(np.median(np.abs(grown.residual)))
-    return float(np.sqrt(scatter**2 - known**2)) if scatter > SCATTERED * known else 0.0
+    return float(np.sqrt(scatter**2 - peak_error**2)) if scatter > SCATTERED * peak_error else 0.0
 
 
 def refine(grown: Grown, peaks: PeakList, table: RigidTable) -> Refined:
-    """The species fitted."""
+    """Fit a species with the full Hamiltonian."""
     lines = assigned_lines(grown, peaks, table)
     start = Constants(
         **dict(zip(PARAMETERS, grown.constants.tolist(), strict=True)), reduction="S", representation="Ir"

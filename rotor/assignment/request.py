@@ -1,4 +1,4 @@
-"""A request for constants from a spectrum, and its answer."""
+"""Request for constants from a spectrum, and the search that answers it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Custom, Flag, Numbers, Quantity, Whole
 
-LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # of A, B, C, where nothing is known
+LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # default bounds of A, B, C
 COLDEST_K, HOTTEST_K = 0.7, 12.0
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
 GUESS_ERROR = 0.033  # of a guess: 3 % and a little
@@ -52,12 +52,12 @@ MOST_EXTRA = 3  # species beyond those of the request
 
 @dataclass(frozen=True)
 class AssignRequest:
-    """Constants to find in a spectrum; every field is checked when the request is made.
+    """A search for constants in a spectrum; all fields are checked when the request is made.
 
-    peaks : of the spectrum. species : how many are looked for; a stronger one that is met on the way is added. temperature_k : of the
-    gas; None: not known. guess_mhz : A, B, C known to 3 %, or several such triples. low_mhz, high_mhz : bounds of A, B, C.
-    isotopologues : whether those of `molecule` are looked for. molecule : geometry of the first species. seconds : after which the
-    search ends with what it has. seed : of the sample of tops from which families of lines are chosen.
+    peaks : of the spectrum. species : number of species to find; stronger ones found on the way are added. temperature_k : of the gas;
+    None: unknown. guess_mhz : A, B, C known to 3 %, or several such triples. low_mhz, high_mhz : bounds of A, B, C. isotopologues :
+    whether to search for those of `molecule`. molecule : geometry of the first species. seconds : time limit; the search ends with the
+    species found so far. seed : of the sample of tops from which families of lines are chosen.
     """
 
     peaks: PeakList
@@ -113,7 +113,7 @@ class AssignRequest:
 
     @property
     def each_guess(self) -> list[AssignRequest]:
-        """The request for each guess alone; itself without any or with one."""
+        """A request for each guess; the request itself with one guess or none."""
         return [replace(self, guess_mhz=guess) for guess in self._guesses] if len(self._guesses) > 1 else [self]
 
     @property
@@ -130,14 +130,14 @@ class AssignRequest:
 
     @property
     def root_bounds(self) -> Bounds:
-        """Bounds of the constants of roots: the rigid A that three lines of a near-prolate top give may be some per cent off."""
+        """Bounds of the constants of roots; wider, because the rigid A from three lines of a near-prolate top has an error of some %."""
         if self.guess_mhz is None:
             return self._range
         margin = np.array(ROOT_MARGINS)
         return Bounds(self.bounds.low * (1 - margin), self.bounds.high * (1 + margin))
 
     def allows(self, grown: Grown) -> bool:
-        """Whether constants are those of the guess within its error, or five of theirs."""
+        """Whether the constants agree with the guess within its error, or within five of their standard errors."""
         if self.guess_mhz is None:
             return True
         errors = 5 * np.sqrt(np.diag(grown.covariance)[:3])
@@ -150,7 +150,7 @@ class AssignRequest:
 
     @property
     def temperatures(self) -> Floats:
-        """Those that are tried (K)."""
+        """Trial temperatures (K)."""
         return np.array(TRIED_K if self.temperature_k is None else [self.temperature_k])
 
 
@@ -158,7 +158,7 @@ class AssignRequest:
 def families_for(
     bounds: tuple[float, ...], band_mhz: tuple[float, float], range_k: tuple[float, float], seed: int, samples: int
 ) -> list[Family]:
-    """Families in the order in which to try them; the same ones again where nothing has changed."""
+    """Families in the order in which to try them, cached by arguments."""
     pairs = np.array(bounds).reshape(3, 2)
     rng = np.random.default_rng(seed)
     return families(rigid_table(JMAX), Bounds(pairs[:, 0], pairs[:, 1]), band_mhz, range_k, rng, samples, MOST)
@@ -166,14 +166,14 @@ def families_for(
 
 def families_of(request: AssignRequest) -> list[Family]:
     """Families for the band, bounds and temperature of a request."""
-    known = request.temperature_k
-    range_k = (COLDEST_K, HOTTEST_K) if known is None else (0.8 * known, 1.25 * known)
+    temperature = request.temperature_k
+    range_k = (COLDEST_K, HOTTEST_K) if temperature is None else (0.8 * temperature, 1.25 * temperature)
     samples = SAMPLES if request.guess_mhz is None else SAMPLES_OF_GUESS
     return families_for(tuple(request.bounds.array.tolist()), request.peaks.band_mhz, range_k, request.seed, samples)
 
 
 def answer_assign(request: AssignRequest) -> AssignAnswer:
-    """The species of a spectrum with their constants, as far as they stand above chance.
+    """Find the significant species of a spectrum and their constants.
 
     Parameters
     ----------
@@ -182,12 +182,12 @@ def answer_assign(request: AssignRequest) -> AssignAnswer:
     Returns
     -------
     AssignAnswer
-        Species by falling strength; none where nothing is found.
+        Species by decreasing strength; empty if none was found.
 
     Notes
     -----
-    The method is described in docs/assign.md. Only asymmetric tops with lines of J up to 30 are found. The answer to a request is always
-    the same, unless the search ends by its seconds.
+    The method is described in docs/assign.md. Only asymmetric tops with lines of J up to 30 are found. The answer is reproducible unless
+    the time limit ends the search.
     """
     search = _Search(request, spurs(request.peaks))
     search.main_species()
@@ -198,14 +198,14 @@ def answer_assign(request: AssignRequest) -> AssignAnswer:
 
 @dataclass(eq=False)
 class _Search:
-    """A search under way: which peaks are left, and the species so far."""
+    """State of a search: the remaining peaks and the species found so far."""
 
     request: AssignRequest
-    of_clock: NDArray[np.bool_]
+    spurs: NDArray[np.bool_]
     species: list[AssignedSpecies] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.left = ~self.of_clock
+        self.left = ~self.spurs
         self.table = rigid_table(JMAX)
         for guess in self.request.each_guess:
             families_of(guess)
@@ -213,15 +213,15 @@ class _Search:
         self.clock = Clock(self.request.seconds)
 
     def main_species(self) -> None:
-        """Species with structure of their own: as many as the request says, and stronger ones."""
+        """Find the requested number of species (not isotopologues), and stronger ones."""
         extra = MOST_EXTRA if self.request.guess_mhz is None else 0
         while len(self.species) < self.request.species or (extra and self._stronger_may_be_left()):
             extra -= len(self.species) >= self.request.species
-            if not self._one_more():
+            if not self._find_next():
                 break
 
-    def _one_more(self) -> bool:
-        """Whether a further species was found, split lines as their centres where single ones show none."""
+    def _find_next(self) -> bool:
+        """Find a further species, with doublets replaced by their centres if needed; whether one was found."""
         rows = np.flatnonzero(self.left)
         if len(rows) < 5:
             return False
@@ -252,7 +252,7 @@ class _Search:
         return STRONG_STAGES if self._strong_left() >= MANY else NEXT_STAGES
 
     def _as_doublets(self, centres: PeakList, rivals: list[Grown]) -> list[Grown]:
-        """The species grown on centres of doublets, where its lines scatter less about these."""
+        """The species grown on centres of doublets, if its lines scatter less about these."""
         seen = Field(centres, self.table, self.request.root_bounds, self.request.temperatures)
         anew = [again for again in grown_anew(seen, rivals[0]) if again.rms_mhz < rivals[0].rms_mhz / 2]
         return sorted((again for again in anew if again.evidence > 0), key=lambda again: -again.evidence)[:1]
@@ -268,7 +268,7 @@ class _Search:
         return rivals if rivals and word(probability(rivals[0])) != "not found" else []
 
     def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> None:
-        """Take the first of the rivals, and what it explains from the peaks."""
+        """Accept the first of the rivals and remove the peaks that it explains."""
         best = rivals[0]
         seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
         refined = refine(best, peaks, self.table)
@@ -283,12 +283,12 @@ class _Search:
         self.left[members[mask].ravel()] = False
 
     def _strong_left(self) -> int:
-        """Number of the strongest peaks that belong to no species yet."""
-        order = np.argsort(np.where(self.of_clock, 0.0, -self.request.peaks.intensity))[:STRONG]
+        """Number of the strongest peaks without a species."""
+        order = np.argsort(np.where(self.spurs, 0.0, -self.request.peaks.intensity))[:STRONG]
         return int(self.left[order].sum())
 
     def _stronger_may_be_left(self) -> bool:
-        """Whether the peaks that are left may hold a stronger species: several strong ones are left, or the strongest of all."""
+        """Whether a stronger species may remain: several strong peaks are left, or the strongest of all."""
         if self._strong_left() >= MANY or not self.species:
             return True
         high = np.sort(self.request.peaks.intensity[self.left])[-FEW_HIGH:] / max(
@@ -317,6 +317,6 @@ class _Search:
                 break
 
     def answer(self) -> AssignAnswer:
-        """Species by falling strength, isotopologues behind them."""
+        """Species by decreasing strength, followed by isotopologues."""
         order = sorted(self.species, key=lambda species: (bool(species.isotopologue), -species.strength))
-        return AssignAnswer(self.request, tuple(order), self.left, self.of_clock, self.clock.over())
+        return AssignAnswer(self.request, tuple(order), self.left, self.spurs, self.clock.over())

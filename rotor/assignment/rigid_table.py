@@ -1,12 +1,12 @@
-"""Levels and line strengths of every rigid asymmetric top, tabulated in Ray's κ.
+"""Levels and line strengths of all rigid asymmetric tops, tabulated in Ray's κ.
 
     E = ½(A+C) J(J+1) + ½(A-C) E_κ(κ),    κ = (2B-A-C)/(A-C) = -cos θ
 
 (G. W. King, R. M. Hainer, P. C. Cross, J. Chem. Phys. 11, 27 (1943), eqs. 7 to 9). E_κ, its derivatives by A, B, C and the quartic
-constants (S reduction, Iʳ) and the strengths S of dipole components a, b, c depend on κ alone. `rotor.quantum` computes them at
-Chebyshev nodes in θ; between nodes they are interpolated. Distortion shifts levels to first order. What interpolation
-neglects stays below 1e-5 (A-C) (`tests/assignment/test_assignment_table.py`); refined constants come from `rotor.fitting` with the
-full Hamiltonian.
+constants (S reduction, Iʳ) and the strengths S of dipole components a, b, c depend on κ only. `rotor.quantum` computes them at
+Chebyshev nodes in θ; between nodes they are interpolated with an error below 1e-5 (A-C)
+(`tests/assignment/test_assignment_table.py`). Distortion shifts levels to first order. Refined constants come from `rotor.fitting` with
+the full Hamiltonian.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from rotor.tops.top import Top
 PARAMETERS = ("A", "B", "C", "DJ", "DJK", "DK", "d1", "d2")
 TYPES = "abc"
 JMAX = 30
-KA_MAX = 10  # of lines; at the temperatures of jets higher ones are weak
+KA_MAX = 10  # highest J of lines; higher ones are weak at the temperatures of jets
 NODES, STRENGTH_NODES = 96, 24
 POINTS, STRENGTH_POINTS = 401, 101
-WEAKEST = 0.02  # strength at every κ below which a line is left out
+WEAKEST = 0.02  # lines whose strength is below this at all κ are left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class RigidTable:
 
     theta (POINTS,) : grid, κ = -cos θ. quanta (levels, 3) : J, Ka, Kc. levels (POINTS, levels, 9) : E_κ, then ∂E/∂ of `PARAMETERS`
     upper, lower (lines,) : rows of levels. kind (lines,) : 0, 1, 2 for a, b, c. strength (STRENGTH_POINTS, lines) : S per D²
-    Lines that have either sign of frequency stand twice, with upper and lower exchanged.
+    Lines whose frequency changes sign with κ are listed twice, with upper and lower exchanged.
     """
 
     theta: Floats
@@ -67,7 +67,7 @@ class RigidTable:
 
 @lru_cache(maxsize=2)
 def rigid_table(jmax: int = JMAX) -> RigidTable:
-    """The table up to J, computed once in a session (1 s)."""
+    """The table up to `jmax`, computed once per process (1 s)."""
     nodes = np.pi * (np.arange(NODES) + 0.5) / NODES
     coarse_nodes = np.pi * (np.arange(STRENGTH_NODES) + 0.5) / STRENGTH_NODES
     quanta, kind, upper, lower = _lines(jmax)
@@ -121,13 +121,13 @@ def _strengths_at(kappa: float, jmax: int) -> Floats:
 
 
 def _order(quanta: dict[str, Ints]) -> Ints:
-    """Levels by J, then Ka, then falling Kc: the order of energy within J."""
+    """Sort levels by J, then Ka, then decreasing Kc: the order of energy within J."""
     return np.lexsort((-quanta["kc"], quanta["ka"], quanta["j"]))
 
 
 @lru_cache(maxsize=2)
 def _lines(jmax: int) -> tuple[Ints, Ints, Ints, Ints]:
-    """Quantum numbers of levels, and kind, upper and lower of all lines that the selection rules allow."""
+    """Quantum numbers of levels, and type, upper and lower level of all allowed lines."""
     levels = solve_levels(_top(0.0), jmax)
     order = _order(levels.quanta)
     quanta = np.column_stack([levels.quanta[name][order] for name in ("j", "ka", "kc")]).astype(np.int64)
@@ -141,7 +141,7 @@ def _lines(jmax: int) -> tuple[Ints, Ints, Ints, Ints]:
 
 
 def _interpolation(nodes: Floats, points: Floats) -> Floats:
-    """Matrix (points, nodes) of the polynomial in cos θ' through Chebyshev nodes, θ' the nodes' own angle mapped onto a line.
+    """Interpolation matrix (points, nodes) of the polynomial through Chebyshev nodes.
 
     Barycentric form, J.-P. Berrut, L. N. Trefethen, SIAM Rev. 46, 501 (2004), eqs. 4.2 and 5.3.
     """

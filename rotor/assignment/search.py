@@ -1,8 +1,8 @@
-"""The search: families of lines laid on the strongest peaks, roots ranked by a likelihood ratio.
+"""The search: families of lines are matched to the strongest peaks, and the roots are ranked by a likelihood ratio.
 
-At a fixed κ the three lines of a family are linear in ½(A+C) and ½(A-C): two peaks give both, and the third line as a function of κ
-crosses a third peak at isolated roots. A root whose further lines lie near peaks is ranked by the likelihood ratio of its
-strongest lines (`rotor.assignment.evidence`).
+At fixed κ the frequencies of a family's three lines are linear in ½(A+C) and ½(A-C). Two peaks determine both; the third line as a
+function of κ then crosses a third peak at isolated roots. Roots whose predicted lines lie near peaks are ranked by the likelihood ratio
+of their strongest lines (`rotor.assignment.evidence`).
 """
 
 from __future__ import annotations
@@ -21,19 +21,21 @@ from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
 
 BIN_MHZ = 0.1
-NEAR_MHZ = 0.5  # a peak this near to a predicted line counts as a hit: what distortion and the family's own errors make
-CHANCE = 0.025  # share of the band near a peak: so many of the strongest peaks are matched
-RATIO = np.log(10.0)  # of the intensities of a family's lines
+NEAR_MHZ = 0.5  # distance of a peak from a predicted line that counts as a hit: shifts by distortion and errors of the family's lines
+CHANCE = 0.025  # share of the band that is near a peak; limits the number of peaks to match
+RATIO = np.log(10.0)  # largest ratio of the intensities of a family's lines
 ROUGH_MHZ = 0.25  # standard error of rigid lines when roots are ranked
-SOFTNESS = 2e-4  # standard error of a rigid line over B, where this is larger: shifts by distortion go with E² B/ω², E of some kT
-SPREAD = 0.6  # of ln intensity about the model: response of the instrument, saturation
+SOFTNESS = (
+    2e-4  # standard error of a rigid line over B, if larger: distortion shifts scale as E² B/ω², with E of some kT
+)
+SPREAD = 0.6  # standard deviation of ln intensity about the model: response of the instrument, saturation
 DETECTED = 0.95  # probability that a line above the threshold is in the list
-STRIDE = 4  # points of κ between two looks for a crossing
-SAME = 3e-4  # relative difference of constants of roots that are the same
+STRIDE = 4  # grid points of κ between tests for a crossing
+SAME = 3e-4  # relative difference below which roots are the same
 
 
 class Candidate(NamedTuple):
-    """A root: A, B, C in MHz, the family it comes from, ln of its likelihood ratio, the temperature this is best at."""
+    """A root: A, B, C in MHz, its family, ln of its likelihood ratio, and the best temperature."""
 
     constants: Floats
     family: Family
@@ -43,9 +45,9 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """What a search sees: peaks, the table, bounds of constants, temperatures to try.
+    """The inputs of a search: peaks, the table, bounds of constants, trial temperatures.
 
-    parent : constants (8,) of a species with like distortion. spread : a-priori standard errors of A, B, C (3,), where they are known.
+    parent : constants (8,) of a species with similar distortion. spread : a-priori standard errors of A, B, C (3,), if known.
     """
 
     peaks: PeakList
@@ -63,12 +65,12 @@ class Field:
 
     @cached_property
     def points(self) -> slice:
-        """Part of the grid of κ that the bounds leave."""
+        """The part of the grid of κ within the bounds."""
         return self.bounds.points(self.table.kappa)
 
     @cached_property
     def order(self) -> Ints:
-        """Peaks by falling intensity."""
+        """Peaks by decreasing intensity."""
         return np.argsort(-self.peaks.intensity, kind="stable")
 
     @cached_property
@@ -84,7 +86,7 @@ class Field:
         return np.minimum(5 * apart / BIN_MHZ, 255).astype(np.uint8)
 
     def seeds(self, count: int) -> Ints:
-        """The strongest peaks, rising in frequency."""
+        """The strongest peaks in order of frequency."""
         return np.sort(self.order[:count])
 
 
@@ -118,7 +120,7 @@ def _change_of_jj(field: Field, lines: Ints) -> Floats:
 
 
 def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Candidate]:
-    """Candidates of the best roots of a family with a ratio above `least`, each constants once, the best first."""
+    """Candidates from the roots of a family with a ratio above `least`, best first, without duplicates."""
     if not len(roots):
         return []
     order = np.argsort(roots[:, 1] - 2 * roots[:, 0], kind="stable")[:300]
@@ -134,7 +136,7 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
 
 
 def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Floats]:
-    """ln likelihood ratios of rigid tops (n, 3), each by lines of one type, and the best temperatures."""
+    """ln of the likelihood ratios of rigid tops (n, 3) from lines of one type each, and the best temperatures."""
     table, peaks = field.table, field.peaks
     ratios: tuple[Floats, Floats] = _kernels.quick_ratios(
         table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,

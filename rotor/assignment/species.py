@@ -1,4 +1,4 @@
-"""Species after species: the next best one among the peaks that are left, until no further one stands above chance."""
+"""Successive species: the best one among the remaining peaks, until no further species is significant."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, roots_of
 
 CLEAR = 300.0  # evidence at which a search ends at once
-FAINT = 10.0  # ln likelihood ratio below which a root is not grown
-CHUNK = 12  # families between two looks at the candidates
+FAINT = 10.0  # smallest ln likelihood ratio of a root that is grown
+CHUNK = 12  # families per chunk, after which candidates are examined
 PER_FAMILY, PER_CHUNK = 4, 5
 PATIENCE, OPEN_PATIENCE = 10, 40  # chunks without a better species after which a search ends; where constants are open
 BEYOND_ALIASES = 600.0  # evidence above which a species is not compared with tops whose lines it would be a part of
@@ -27,7 +27,7 @@ NEAR, GROWN_NEAR = (
     3e-4,
     2e-3,
 )  # relative difference of constants of roots of which one is grown; of those near a species
-AROUND = 0.01  # relative difference of constants of roots that may be of one species
+AROUND = 0.01  # relative difference below which roots may belong to one species
 MOST_ALIASES = 4
 LOW_J, LOW_KA, SHIFT_PEAKS = 8, 3, 25  # lines and peaks that tell shifts of A, B and C together
 PEAK_MHZ = 0.1  # half the width of a peak
@@ -38,7 +38,7 @@ Stop = Callable[[], bool]
 
 @dataclass(frozen=True)
 class Stage:
-    """So many of the strongest peaks laid on families from one place in their order to another."""
+    """A stage of a search: number of strongest peaks, and range of families to match."""
 
     seeds: int
     first: int
@@ -52,27 +52,27 @@ STRONG_STAGES = (
 )  # of a further species, while several of the strongest peaks are left
 GUESS_STAGES = (Stage(60, 0, 60), Stage(180, 0, 90), Stage(60, 60, 200), Stage(400, 0, 60))  # within narrow bounds
 NEXT_STAGES = (Stage(60, 0, 120),)
-SCARCE = 45  # peaks up to which all families are tried: a family costs as the third power of their number
+SCARCE = 45  # most peaks for which all families are tried: the cost of a family is cubic in their number
 
 
 @dataclass(eq=False)
 class Clock:
-    """Time of a search: seconds allowed, and whether they are over."""
+    """The time limit of a search in seconds."""
 
     seconds: float
     started: float = field(default_factory=time.monotonic)
 
     def over(self) -> bool:
-        """Whether the seconds are over."""
+        """Whether the time limit is exceeded."""
         return time.monotonic() - self.started > self.seconds
 
 
 def next_species(
     seen: Field, families: Sequence[Family], stages: Sequence[Stage], clock: Clock, clear: float = CLEAR
 ) -> list[Grown]:
-    """The species with the most evidence among the peaks, and rivals with other constants, the best first.
+    """The species with the most evidence among the peaks, and rivals with other constants, best first.
 
-    The search ends when a species is clear, when no better one came for a while, when all stages are done, or when the time is over.
+    The search ends when a species is clear, after some chunks without a better one, after all stages, or at the time limit.
     """
     grown, tried, highest, chunks, last = list[Grown](), list[tuple[Floats, float]](), 0.0, 0, 0
     best: Grown | None = None
@@ -107,7 +107,7 @@ def next_species(
 
 
 def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> list[Grown]:
-    """The species with their rivals: other roots near the best one, multiples of its J, and the best one grown again."""
+    """The species with rivals: other roots near the best one, multiples of its J, and the best one grown again."""
     best = _best(grown)
     if not best or best[0].evidence < 0:
         return best
@@ -123,7 +123,7 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
 
 @lru_cache(maxsize=1)
 def compiled(table: RigidTable) -> bool:
-    """Whether the compiled loops are loaded: a search of five peaks has run, so that no search counts the compiler's time."""
+    """Load the compiled loops by a search of five peaks, so that the time limit does not include the compiler."""
     from rotor.assignment.peaks import peak_list
 
     peaks = peak_list([9000.0, 9500.0, 10000.0, 10100.0, 11000.0], np.ones(5), 0.1)
@@ -139,7 +139,7 @@ def compiled(table: RigidTable) -> bool:
 
 
 def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, float]], most: int) -> list[Grown]:
-    """The best of the candidates grown, without those near to what was tried."""
+    """Grow the best candidates, except those near tried ones."""
     out = list[Grown]()
     for candidate in sorted(candidates, key=lambda candidate: -candidate.ratio):
         if len(out) >= most:
@@ -156,7 +156,7 @@ def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, f
 
 
 def _best(grown: Sequence[Grown]) -> list[Grown]:
-    """Each species once, by falling evidence."""
+    """Distinct species by decreasing evidence."""
     out = list[Grown]()
     for species in sorted(grown, key=lambda species: -species.evidence):
         if not any(alike(species.constants[:3], other.constants[:3], 1e-4) for other in out):
@@ -165,16 +165,16 @@ def _best(grown: Sequence[Grown]) -> list[Grown]:
 
 
 def aliases(seen: Field, grown: Grown) -> list[Candidate]:
-    """Candidates with other constants of which a species' lines are a part, so that it may be a wrong answer."""
+    """Candidates with other constants whose lines include those of a species, which may then be wrong."""
     return [*multiples(seen, grown), *shifts(seen, grown)]
 
 
 def multiples(seen: Field, grown: Grown) -> list[Candidate]:
-    """Candidates whose a-type R branches fall on the same peaks with J multiplied by a ratio r.
+    """Candidates whose a-type R branches coincide with the same peaks if J is multiplied by a ratio r.
 
-    With B' = B/r, C' = C/r and A' - ½(B'+C') = r (A - ½(B+C)) both the splitting of K = 1, (B-C) J, and the shift of K = 0,
-    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)), stay. Within some per cent of these
-    constants the lines of K = 0 and 1 are laid on the strongest peaks.
+    B' = B/r, C' = C/r and A' - ½(B'+C') = r (A - ½(B+C)) preserve the splitting of K = 1, (B-C) J, and the shift of K = 0,
+    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)). Within some per cent of these
+    constants, the lines of K = 0 and 1 are matched to the strongest peaks.
     """
     if not grown.ratios[0] > LEAST_RATIO:
         return []
@@ -194,7 +194,7 @@ def multiples(seen: Field, grown: Grown) -> list[Candidate]:
 
 
 def shifts(seen: Field, grown: Grown) -> list[Candidate]:
-    """Candidates A + x, B + x, C + x, which have the same Q branches; x lays a line of an R branch on a strong peak."""
+    """Candidates A + x, B + x, C + x with the same Q branches; x matches an R-branch line to a strong peak."""
     table, constants = seen.table, grown.constants.copy()
     energy = np.empty(len(seen.jj))
     _kernels.level_energies(table.levels, table.theta, seen.jj, constants, energy)
@@ -227,7 +227,7 @@ def shifts(seen: Field, grown: Grown) -> list[Candidate]:
 
 
 def _lowest_a_lines(seen: Field, j: int) -> Family | None:
-    """J ← J-1 of Ka = 0 and both of Ka = 1."""
+    """The a-type lines J ← J-1 with Ka = 0 and 1."""
     table = seen.table
     upper, lower = table.quanta[table.upper], table.quanta[table.lower]
     chosen = (
@@ -242,7 +242,7 @@ def _lowest_a_lines(seen: Field, j: int) -> Family | None:
 
 
 def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
-    """Which peaks a species explains: those assigned, and those at a predicted line that are not far stronger than it."""
+    """Which peaks a species explains: assigned ones, and those at a predicted line that are not much stronger than it."""
     out = np.zeros(len(seen.peaks), dtype=bool)
     out[grown.peak] = True
     lines = predict(seen, grown.constants, grown.temperature_k, 4000)
